@@ -42,6 +42,7 @@ from study.cli import (
     serve,
     sessions,
     show,
+    stream,
     study,
     twin,
     validate,
@@ -69,6 +70,9 @@ app.command("resume", short_help="Go on with a session where it stopped; no answ
 app.command(
     "watch", short_help="Follow, pause or stop a running session from a second terminal", rich_help_panel="Study"
 )(watch.watch)
+app.command("stream", short_help="Send a running session's facts as LSL markers", rich_help_panel="Study")(
+    stream.stream
+)
 app.command("note", short_help="Write a note into a session's log", rich_help_panel="Study")(note.note)
 app.command("sessions", short_help="List all sessions, latest first: how far each one is", rich_help_panel="Study")(
     sessions.sessions
@@ -200,9 +204,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _settle_in() -> None:
     """What streams, signals and libraries do in this process."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal without braille shows question marks, not a traceback
+    for output in (sys.stdout, sys.stderr):
+        if isinstance(output, io.TextIOWrapper):
+            output.reconfigure(errors="replace")  # a terminal without braille shows question marks, not a traceback
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _leave)

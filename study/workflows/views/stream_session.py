@@ -1,0 +1,147 @@
+"""A session's facts as markers of the lab streaming layer (LSL), stamped with the time at which they became facts.
+
+A program of its own follows the log, so that nothing of it can delay or end the session. A fact carries the session's
+monotonic clock; the offset of LSL's clock to it is measured again and again and is a marker too.
+"""
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from study.errors import StudyError
+from study.store.disk.regular_file import TABLE_BYTES, open_regular
+
+EVERY_S = 0.02
+"""Between two looks at the log: a marker comes so late, its time stamp does not."""
+OFFSET_EVERY_S = 10.0
+OFFSET_TRIES = 10
+"""The closest pair of readings counts: any other was interrupted in between."""
+FRESH_S = 5.0
+"""An older fact has another clock (a simulated session's, or that of before a restart): its marker is stamped when it
+is sent, and says so."""
+
+TOLD = (
+    "event", "run", "trial", "attempt", "phase", "frequency_hz", "level_n", "direction", "angle_deg", "polarity",
+    "answer", "response_time_s", "status", "cause", "missed_ticks", "delivered_mps2", "outcome",
+)  # fmt: skip
+"""Of each fact: nothing about the person, no notes, no forms."""
+
+LAST = "session_closed"
+
+
+class Outlet(Protocol):
+    def clock_s(self) -> float:
+        """LSL's own clock."""
+        ...
+
+    def push(self, marker: str, at_s: float) -> None:
+        """at_s: on LSL's clock."""
+        ...
+
+
+class MarkerOutlet:
+    """An outlet of the library. Raises StudyError where that is not installed."""
+
+    def __init__(self, session: str) -> None:
+        try:
+            import pylsl
+        except (ImportError, RuntimeError, OSError) as problem:  # installed, but without the C library
+            raise StudyError(
+                "Nothing can be streamed",
+                f"The lab streaming layer is not installed here ({problem}).",
+                "Install it: pip install '.[lsl]'. Where its wheel has no library for this system, install liblsl too.",
+                saved="The session is not touched.",
+            ) from problem
+        described = pylsl.StreamInfo(
+            "hapteq markers", "Markers", 1, pylsl.IRREGULAR_RATE, "string", f"hapteq {session}"
+        )
+        self._outlet = pylsl.StreamOutlet(described)
+        self._clock = pylsl.local_clock
+
+    def clock_s(self) -> float:
+        return float(self._clock())
+
+    def push(self, marker: str, at_s: float) -> None:
+        self._outlet.push_sample([marker], at_s)
+
+
+class LogFollower:
+    """Whole lines that came since the last look, as they are written; those that were there are passed over."""
+
+    def __init__(self, log: Path, from_start: bool = False) -> None:
+        self._log = log
+        self._offset = 0 if from_start else self._whole_bytes()
+
+    def lines(self) -> list[bytes]:
+        """A last line that is still being written waits. Raises OSError."""
+        with open_regular(self._log) as file:
+            file.seek(self._offset)
+            whole = file.read(TABLE_BYTES).split(b"\n")[:-1]
+        self._offset += sum(len(line) + 1 for line in whole)
+        return whole
+
+    def _whole_bytes(self) -> int:
+        with open_regular(self._log) as file:
+            return file.read(TABLE_BYTES).rfind(b"\n") + 1
+
+
+def stream_session(
+    log: Path,
+    outlet: Outlet,
+    on_marker: Callable[[str], None],
+    now_s: Callable[[], float] = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> int:
+    """Follow the log until the session is closed or Ctrl-C. How many facts became markers. Raises StudyError."""
+    try:
+        follower, sent, offset_s, next_offset_s = LogFollower(log), 0, 0.0, now_s()
+        while True:
+            if now_s() >= next_offset_s:
+                offset_s, next_offset_s = measured_offset_s(outlet, now_s), now_s() + OFFSET_EVERY_S
+                outlet.push(_text({"event": "clock", "lsl_minus_monotonic_s": offset_s}), outlet.clock_s())
+            for line in follower.lines():
+                fact: dict[str, Any] = json.loads(line)
+                _send(fact, outlet, offset_s, now_s(), on_marker)
+                sent += 1
+                if fact.get("event") == LAST:
+                    return sent
+            sleep(EVERY_S)
+    except (OSError, ValueError) as problem:
+        raise StudyError(
+            "The session's log cannot be followed",
+            f"{log.name} in {log.parent.name}: {problem}.",
+            "Check it with: hapteq validate FILE",
+            saved="The session is not touched.",
+        ) from problem
+
+
+def measured_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
+    """LSL's clock less the session's, from the reading that took least time."""
+    pairs = []
+    for _ in range(OFFSET_TRIES):
+        before_s = now_s()
+        theirs_s = outlet.clock_s()
+        after_s = now_s()
+        pairs.append((after_s - before_s, theirs_s - (before_s + after_s) / 2))
+    return min(pairs)[1]
+
+
+def _send(
+    fact: dict[str, Any], outlet: Outlet, offset_s: float, now_s: float, on_marker: Callable[[str], None]
+) -> None:
+    told = {name: fact[name] for name in TOLD if fact.get(name) is not None}
+    happened_s = fact.get("monotonic_s")
+    if isinstance(happened_s, float) and 0 <= now_s - happened_s <= FRESH_S:
+        stamped_s = happened_s + offset_s
+    else:
+        told["stamped"] = "when it was sent"
+        stamped_s = outlet.clock_s()
+    marker = _text(told)
+    outlet.push(marker, stamped_s)
+    on_marker(marker)
+
+
+def _text(told: dict[str, Any]) -> str:
+    return json.dumps(told, separators=(",", ":"))

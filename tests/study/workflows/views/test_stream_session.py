@@ -1,0 +1,166 @@
+"""A session's facts as markers: all of them, in order, with their own times, and nothing about the person."""
+
+import json
+import threading
+import time
+
+import pytest
+
+from study.cli.main import main
+from study.errors import StudyError
+from study.workflows.views import stream_session as module
+from study.workflows.views.stream_session import FRESH_S, MarkerOutlet, measured_offset_s, stream_session
+
+OFFSET_S = 1000.25
+
+
+class Clock:
+    """The session's; it goes on when the follower sleeps, and a writer writes then."""
+
+    def __init__(self, log, lines: list[bytes]) -> None:
+        self.now, self.log, self.lines = 50.0, log, lines
+
+    def now_s(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+        if self.lines:
+            with self.log.open("ab") as file:
+                file.write(self.lines.pop(0))
+
+
+class Kept:
+    def __init__(self, clock: Clock) -> None:
+        self.clock, self.pushed = clock, []
+
+    def clock_s(self) -> float:
+        return self.clock.now + OFFSET_S
+
+    def push(self, marker: str, at_s: float) -> None:
+        self.pushed.append((json.loads(marker), at_s))
+
+
+def line(event: str, **more: object) -> bytes:
+    return json.dumps({"utc": "2026-01-01T00:00:00+00:00", "event": event, **more, "chain": "0"}).encode() + b"\n"
+
+
+PRESENTED = {"run": 0, "trial": 3, "attempt": 0, "frequency_hz": 35.0, "level_n": 1.2, "direction": 2}
+
+
+def streamed(tmp_path, lines: list[bytes], before: bytes = b"") -> tuple[list, int]:
+    log = tmp_path / "events.jsonl"
+    log.write_bytes(before)
+    clock = Clock(log, lines)
+    outlet = Kept(clock)
+    said: list[str] = []
+    sent = stream_session(log, outlet, said.append, clock.now_s, clock.sleep)
+    assert said == [json.dumps(each, separators=(",", ":")) for each, _ in outlet.pushed if each["event"] != "clock"]
+    return outlet.pushed, sent
+
+
+def test_each_fact_becomes_a_marker_with_the_time_at_which_it_became_a_fact(tmp_path):
+    lines = [line("trial_presented", **PRESENTED, monotonic_s=49.9), line("session_closed", monotonic_s=50.01)]
+    pushed, sent = streamed(tmp_path, lines)
+    assert sent == 2
+    (clock, _), (presented, at_s), (closed, _) = pushed
+    assert clock == {"event": "clock", "lsl_minus_monotonic_s": pytest.approx(OFFSET_S)}
+    assert presented == {"event": "trial_presented", **PRESENTED}
+    assert at_s == pytest.approx(49.9 + OFFSET_S)
+    assert closed["event"] == "session_closed"
+
+
+def test_what_was_there_before_is_not_sent_and_a_torn_line_waits_for_its_end(tmp_path):
+    whole = line("answer_given", answer=1, monotonic_s=50.0)
+    lines = [whole[:20], whole[20:], line("session_closed", monotonic_s=50.0)]
+    pushed, sent = streamed(tmp_path, lines, before=line("session_opened", subject="P01"))
+    assert sent == 2
+    assert [marker["event"] for marker, _ in pushed] == ["clock", "answer_given", "session_closed"]
+
+
+def test_nothing_about_the_person_is_told(tmp_path):
+    private = {"subject": "P01", "text": "feels dizzy", "answers": ["left-handed"], "protocol_text": "secret"}
+    lines = [line("note_taken", **private, monotonic_s=50.0), line("session_closed", **private, monotonic_s=50.0)]
+    pushed, _ = streamed(tmp_path, lines)
+    said = json.dumps(pushed)
+    assert not any(word in said for word in ("P01", "dizzy", "left-handed", "secret"))
+
+
+@pytest.mark.parametrize("monotonic_s", [None, 50.0 - FRESH_S - 1, 60.0, 0.3])
+def test_a_fact_of_another_clock_is_stamped_when_it_is_sent_and_says_so(tmp_path, monotonic_s):
+    pushed, _ = streamed(tmp_path, [line("trial_presented", monotonic_s=monotonic_s), line("session_closed")])
+    marker, at_s = pushed[1]
+    assert marker["stamped"] == "when it was sent"
+    assert 50.0 <= at_s - OFFSET_S < 50.1
+
+
+def test_the_offset_is_measured_again_and_again(tmp_path):
+    lines = [b""] * round(2.5 * module.OFFSET_EVERY_S / module.EVERY_S)
+    pushed, _ = streamed(tmp_path, [*lines, line("session_closed", monotonic_s=50.0)])
+    assert [marker["event"] for marker, _ in pushed].count("clock") == 3
+
+
+def test_an_interrupted_reading_of_the_clocks_does_not_count():
+    times = iter([0.0, 0.5, 1.0, 1.001, *(2.0 + 0.2 * k for k in range(100))])
+
+    class Theirs:
+        def clock_s(self) -> float:
+            return 100.0
+
+    assert measured_offset_s(Theirs(), lambda: next(times)) == pytest.approx(100.0 - 1.0005)
+
+
+@pytest.mark.parametrize("broken", [b"not json\n", None])
+def test_a_log_that_cannot_be_followed_is_said(tmp_path, broken):
+    if broken is None:
+        clock = Clock(tmp_path / "gone.jsonl", [])
+        with pytest.raises(StudyError, match="cannot be followed"):
+            stream_session(clock.log, Kept(clock), print, clock.now_s, clock.sleep)
+    else:
+        with pytest.raises(StudyError, match="cannot be followed"):
+            streamed(tmp_path, [broken])
+
+
+def test_without_the_library_it_is_said_what_to_install(monkeypatch, tmp_path, small_text, capsys):
+    monkeypatch.setitem(__import__("sys").modules, "pylsl", None)
+    with pytest.raises(StudyError, match=r"pip install '\.\[lsl\]'"):
+        MarkerOutlet("P01_001")
+
+
+@pytest.mark.real_time
+def test_markers_arrive_at_another_end_with_their_times(tmp_path):
+    """A real outlet and a real inlet, over the loopback."""
+    pylsl = pytest.importorskip("pylsl", reason="the extra lsl is not installed: no loopback of markers was tested")
+    log = tmp_path / "events.jsonl"
+    log.write_bytes(b"")
+    outlet = MarkerOutlet(f"loopback {time.time_ns()}")
+    following = threading.Thread(target=stream_session, args=(log, outlet, lambda marker: None))
+    following.start()
+    try:
+        found = pylsl.resolve_byprop("name", "hapteq markers", timeout=20)
+        inlet = pylsl.StreamInlet(found[0])
+        inlet.open_stream(timeout=20)
+        written = []
+        for trial in range(20):
+            written.append(time.monotonic())
+            with log.open("ab") as file:
+                file.write(line("trial_presented", trial=trial, monotonic_s=written[-1]))
+        got = []
+        while len(got) < 20:
+            sample, at_s = inlet.pull_sample(timeout=20)
+            assert sample is not None, f"{len(got)} of 20 markers came"
+            marker = json.loads(sample[0])
+            if marker["event"] != "clock":
+                got.append((marker["trial"], at_s))
+    finally:
+        with log.open("ab") as file:
+            file.write(line("session_closed", monotonic_s=time.monotonic()))
+        following.join(20)
+    assert [trial for trial, _ in got] == list(range(20))
+    offset_s = pylsl.local_clock() - time.monotonic()
+    assert all(abs(at_s - offset_s - at) < 0.1 for (_, at_s), at in zip(got, written, strict=True))
+
+
+def test_the_command_streams_a_session_that_exists_only(tmp_path, capsys):
+    assert main(["stream", "P01_001", "--data", str(tmp_path)]) == 2
+    assert "There is no such session" in capsys.readouterr().err
