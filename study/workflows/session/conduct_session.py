@@ -13,7 +13,13 @@ from study.store.sessions.live_file import write_live
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.device_settings import device_settings
 from study.workflows.results.fold_session import fold_session
-from study.workflows.session.equalize_stimuli import Equalized, check_playable, equalized_again, equalized_stimuli
+from study.workflows.session.equalize_stimuli import (
+    Equalized,
+    check_playable,
+    equalized_again,
+    equalized_stimuli,
+    load_equalizer,
+)
 from study.workflows.session.open_session import (
     OpenedSession,
     SessionPlan,
@@ -69,6 +75,8 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
 def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> Conducted:
     """Fold the log, open the device, and go on where the session stopped."""
     state = fold_session(folder).state
+    if state.opened.equalized is not None:
+        load_equalizer()
     settings = device_settings(state.protocol)
     with contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device:
         equalized = equalized_again(folder, state, device.info)

@@ -8,11 +8,8 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import quality_sentence
-from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.equalizer import Equalizer, Identity
-from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
-from equalizer.tracking.feedforward.periodic_inverse import inverse_response
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.device import DeviceInfo
@@ -68,6 +65,13 @@ def check_playable(protocol: StudyProtocol, model: Path | None) -> None:
         )
     if model is not None:
         _check_model(read_identified_model(model), protocol, model)
+        load_equalizer()
+
+
+def load_equalizer() -> None:
+    """Before a device is opened, whose loop would wait for it. Its linear algebra takes longer to load than all else
+    that a session begins with, and most sessions command forces."""
+    import equalizer.tracking.feedforward.model_equalizer  # noqa: F401
 
 
 def equalized_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceInfo) -> Equalized:
@@ -133,7 +137,9 @@ def _largest(vectors: FloatArray) -> float:
     return float(np.linalg.norm(vectors, axis=1).max())
 
 
-def _equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo) -> ModelEqualizer:
+def _equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo) -> Equalizer:
+    from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
+
     if model.sample_rate_hz != info.sample_rate_hz:
         raise _refused(
             f"It runs at {model.sample_rate_hz:g} Hz, the device at {info.sample_rate_hz:g} Hz.",
@@ -181,6 +187,9 @@ def _check_axes(model: IdentifiedModel, path: Path) -> None:
 
 
 def _check_reach(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
+    from equalizer.plant.model_response import model_response
+    from equalizer.tracking.feedforward.periodic_inverse import inverse_response
+
     frequency_hz = np.array(protocol.all_frequencies_hz)
     wanted = np.stack([direction_vector(protocol.directions, direction) for direction in (1, 2)], axis=1)
     with np.errstate(all="ignore"):

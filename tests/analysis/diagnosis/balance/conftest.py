@@ -25,7 +25,7 @@ def balance_of():
     return lambda recording, without=(): balances_of([recording], frozenset(without), always)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def recording_of():
     """force (n, m) and response (n, p) of one quantity, without an axis behind them."""
 

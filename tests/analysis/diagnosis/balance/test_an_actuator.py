@@ -21,16 +21,21 @@ def found(axes, balance_of):
     return laws
 
 
+@pytest.fixture(scope="module")
+def dead_band(found):
+    """Of 1.5 N."""
+    return found(lambda u: u - np.clip(u, -1.5, 1.5))
+
+
 def named(balance):
     return {law.law.effect: law for law in balance.named}
 
 
-def test_a_dead_band_is_recovered_with_its_width(found):
-    balance = found(lambda u: u - np.clip(u, -1.5, 1.5))
-    law = named(balance)["force_deadband"]
+def test_a_dead_band_is_recovered_with_its_width(dead_band):
+    law = named(dead_band)["force_deadband"]
     assert law.values["width"] == pytest.approx(1.5, rel=0.1)
     assert law.gain > 0.8
-    assert set(named(balance)) == {"force_deadband"}
+    assert set(named(dead_band)) == {"force_deadband"}
 
 
 def test_a_limit_of_the_force_is_recovered(found):
@@ -44,9 +49,8 @@ def test_a_dead_band_leaves_the_dry_friction_beside_it(found, axes):
     assert named(balance)["coulomb_friction"].values["level"] == pytest.approx(0.5, rel=0.2)
 
 
-def test_the_error_before_is_that_of_the_force_as_commanded(found):
-    balance = found(lambda u: u - np.clip(u, -1.5, 1.5))
-    assert balance.error < 0.5 * balance.linear
+def test_the_error_before_is_that_of_the_force_as_commanded(dead_band):
+    assert dead_band.error < 0.5 * dead_band.linear
 
 
 @pytest.mark.parametrize("physics", [{"coulomb": 0.8}, {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}])

@@ -55,6 +55,13 @@ def two_bodies():
     return at(times_s)[:, None], _moved(times_s, slopes, 4)[:, :2]
 
 
+@pytest.fixture(scope="module")
+def of_both(two_bodies, recording_of, balance_of):
+    """Both motions measured, the driven one first: the recording, and the balances of it."""
+    recording = recording_of(*two_bodies, RATE_HZ)
+    return recording, balance_of(recording)
+
+
 def test_a_late_command_is_seen_and_its_friction_named(late_axis, recording_of, balance_of):
     force, motion = late_axis
 
@@ -66,21 +73,20 @@ def test_a_late_command_is_seen_and_its_friction_named(late_axis, recording_of, 
     assert balance.named[0].values["level"] == pytest.approx(LEVEL, rel=0.05)
 
 
-def test_a_command_in_time_is_not_shifted(two_bodies, recording_of, balance_of):
-    force, motion = two_bodies
-
-    (balance,) = balance_of(recording_of(force, motion, RATE_HZ))
+def test_a_command_in_time_is_not_shifted(of_both):
+    _, (balance,) = of_both
 
     assert abs(balance.searched.regression.beside.late_s) < 1 / RATE_HZ
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_of_two_measured_motions_the_driven_one_is_found_and_its_friction_named(
-    two_bodies, recording_of, balance_of, order
+    two_bodies, recording_of, balance_of, of_both, order
 ):
     force, motion = two_bodies
 
-    (balance,) = balance_of(recording_of(force, motion[:, order], RATE_HZ))
+    in_order = order == (0, 1)
+    (balance,) = of_both[1] if in_order else balance_of(recording_of(force, motion[:, order], RATE_HZ))
 
     driven = order.index(0)
     assert balance.searched.regression.beside.own == driven
@@ -95,23 +101,21 @@ def test_a_body_that_is_not_measured_does_not_hide_friction(two_bodies, recordin
 
     assert balance.named[0].law.effect == "coulomb_friction"
     assert balance.named[0].values["level"] == pytest.approx(LEVEL, rel=0.1)
-    assert not any(one.named for one in balance.laws if one.law.linear)
+    assert not any(law.named for law in balance.laws if law.law.linear)
 
 
-def test_what_is_left_of_a_command_drives_one_body(two_bodies, recording_of, balance_of):
+def test_what_is_left_of_a_command_drives_one_body(of_both):
     from analysis.diagnosis.first_model.model_of_balance import first_model
     from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduced_recordings
 
-    force, motion = two_bodies
-    recording = recording_of(force, motion, RATE_HZ)
-    balances = balance_of(recording)
+    recording, balances = of_both
 
     (reduced,) = reduced_recordings((recording,), balances)
     model = first_model(balances, reduced, "one body")
 
     assert is_reduced(balances)
     assert reduced.response.channels == ("x",)
-    assert reduced.command.samples.shape == force.shape
+    assert reduced.command.samples.shape == recording.command.samples.shape
     assert model is not None
     assert model.mass[0, 0] == pytest.approx(MASS, rel=0.1)
 

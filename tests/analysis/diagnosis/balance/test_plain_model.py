@@ -18,10 +18,15 @@ def played(axes, balance_of):
     return balances
 
 
-def test_beside_friction_it_is_that_of_the_balance(played, axes):
+@pytest.fixture(scope="module")
+def rubbing(played, axes):
+    return played(replace(axes.Physics(), coulomb=0.8))
+
+
+def test_beside_friction_it_is_that_of_the_balance(rubbing):
     from analysis.diagnosis.first_model.model_of_balance import plain_model
 
-    model = plain_model(*played(replace(axes.Physics(), coulomb=0.8)), "first")
+    model = plain_model(*rubbing, "first")
     assert model is not None
     assert model.mass[0, 0] == pytest.approx(0.3, rel=0.05)
     assert model.stiffness[0, 0] == pytest.approx(100.0, rel=0.1)
@@ -39,10 +44,10 @@ def test_a_second_body_asks_for_another_fit(played, axes):
     assert plain_model(*played(replace(axes.Physics(), coulomb=0.8, second_mass=0.1)), "first") is None
 
 
-def test_a_band_holds_the_friction_of_a_slow_motion_but_no_ripple_above_it(played, axes):
+def test_a_band_holds_the_friction_of_a_slow_motion_but_no_ripple_above_it(rubbing):
     from analysis.diagnosis.first_model.model_of_balance import share_within
 
-    balances, _ = played(replace(axes.Physics(), coulomb=0.8))
+    balances, _ = rubbing
     shares = [share_within(balances, band_hz) for band_hz in (1e-3, 1.0, 1e3)]
     assert shares[0] < 0.05 and shares[0] < shares[1] < shares[2]
     assert shares[2] == pytest.approx(1.0)
