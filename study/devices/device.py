@@ -82,6 +82,10 @@ class Health:
     peak_command_n: float
     feedback_clipped: int = 0
     """Spring, damper, or both together were above their cap (a lean on the spring)."""
+    late_ticks: int = 0
+    """Of a loop that does not wait: run, but their work ended after the next was due. Missed ones come on top."""
+    latest_s: float = 0.0
+    """The longest from when a tick was due until its work, or that of the one that came in its place, was done."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,6 +5,7 @@ The heavy parts (numba above all) are imported when a device is opened, so that 
 
 import contextlib
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
 
@@ -58,6 +59,13 @@ def open_device(name: str, settings: DeviceSettings, clock: Clock, seed: int) ->
     except BaseException:
         rig.close()
         raise
+
+
+def before_others() -> AbstractContextManager[object]:
+    """The calling thread, until it ends, as a real device's loop: before all other programs where that is allowed."""
+    from study.devices.drive.real_time_class import real_time_class
+
+    return real_time_class()
 
 
 def examine_device(name: str) -> tuple[DeviceFinding, ...]:

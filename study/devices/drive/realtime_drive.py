@@ -168,6 +168,7 @@ class RealtimeDrive:
             if gap_s > self._longest_gap_s:
                 self._runner.drop(Fault.STALLED)
                 return
+            first_s = self._due_s(self._run + 1)
             due = ticks_by(now_s - self._started_s, self._rate_hz)
             late = due - self._run - 1
             if late > 0 and not self._runner.catches_up:
@@ -175,8 +176,14 @@ class RealtimeDrive:
                 self._run += late
             self._runner.run(due - self._run)
             self._run = due
+            if not self._runner.catches_up:
+                done_s = self._clock.now_s()
+                self._governor.timed(done_s > self._due_s(due + 1), done_s - first_s)
             if self._glances.wanted:  # asked for a moment before this stimulus began
                 self._glances.taken()
+
+    def _due_s(self, tick: int) -> float:
+        return self._started_s + tick / self._rate_hz
 
     def _late(self) -> bool:
         if not self._thread.is_alive():
@@ -205,7 +212,7 @@ class RealtimeDrive:
         if self._runner.catches_up:
             self._clock.sleep(LEISURELY_S)
             return
-        due_s = self._started_s + (self._run + 1) / self._rate_hz
+        due_s = self._due_s(self._run + 1)
         self._clock.sleep(due_s - SPIN_S - self._clock.now_s())
         while self._clock.now_s() < due_s:
             pass

@@ -35,6 +35,7 @@ class Governor:
         self._keep_s = settings.keep_s
         self.settings = packed_settings(info, settings)
         self.state = np.zeros(cells.STATE_SIZE)
+        self._late_ticks, self._latest_s = 0, 0.0
         self.loop: FloatArray = np.zeros((1, 3))
         self.buffer: FloatArray = np.zeros((1, cells.ROW_SIZE))
         self.force = np.zeros(3)
@@ -119,6 +120,11 @@ class Governor:
             govern.record(self.state, self.buffer, nothing)
             self.state[[cells.TICK, cells.TICKS, cells.MISSED]] += 1.0
 
+    def timed(self, late: bool, after_s: float) -> None:
+        """Of the tick that was just run: whether it ended late, and how long after it was due."""
+        self._late_ticks += late
+        self._latest_s = max(self._latest_s, after_s)
+
     def health(self) -> Health:
         state = self.state
         return Health(
@@ -131,6 +137,8 @@ class Governor:
             slew_limited=int(state[cells.SLEW_LIMITED]),
             sensor_clipped=int(state[cells.SENSOR_CLIPS]),
             peak_command_n=float(state[cells.PEAK]),
+            late_ticks=self._late_ticks,
+            latest_s=self._latest_s,
         )
 
     def rows(self) -> FloatArray:
@@ -147,6 +155,7 @@ class Governor:
     def _begin(self, played: FloatArray, rows: int) -> None:
         self.loop = np.array(played, order="C")
         self.buffer = np.full((max(rows, 1), cells.ROW_SIZE), np.nan)
+        self._late_ticks, self._latest_s = 0, 0.0
         # Never clear the stop, not even for a moment: another thread may be asking for it just now.
         self.state[cells.STOP_ASKED + 1 :] = 0.0
         self.state[cells.LAST_POSITION : cells.LAST_POSITION + 3] = np.nan

@@ -22,6 +22,10 @@ LATE_TICKS = 1.0
 MISSED_SHARE = 0.001
 """Missed ticks that are still fine: a twentieth of what makes a trial void by default."""
 
+LATE_SHARE = 0.002
+"""Ticks that may come late, those among them that were missed: what a loop with a real-time class keeps on a quiet
+computer."""
+
 ADVICE = "Close other programs, switch power saving off, and measure again."
 
 
@@ -81,6 +85,16 @@ def judge_missed(missed_ticks: int, ticks: int, simulated: bool) -> DeviceFindin
     elif not fine:
         value += f"; at most {MISSED_SHARE:.1%} are fine"
     return DeviceFinding("Missed ticks", value, fine, "" if fine else ADVICE)
+
+
+def judge_late(late_ticks: int, latest_ms: float, ticks: int) -> DeviceFinding:
+    """Of a real device. late_ticks: whose work ended after the next was due, and those that were missed."""
+    share = late_ticks / max(ticks, 1)
+    fine = share <= LATE_SHARE
+    value = f"{late_ticks} of {ticks} ({share:.2%}) ended after the next was due, missed ones among them"
+    value += f"; the latest {latest_ms:.1f} ms after its time"
+    value += "" if fine else f"; at most {LATE_SHARE:.1%} are fine"
+    return DeviceFinding("Late ticks", value, fine, "" if fine else ADVICE)
 
 
 def judge_load(per_processor: float | None) -> DeviceFinding:

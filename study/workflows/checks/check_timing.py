@@ -1,6 +1,8 @@
 """How well this computer keeps 1 kHz: a stimulus of zero force is held in real time, and what came late is counted."""
 
+import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
@@ -9,8 +11,16 @@ import numpy as np
 from equalizer.signals.signal import Signal
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault, Health
+from study.devices.opening import before_others
 from study.session.stimulus.held_stimulus import HeldStimulus
-from study.session.stimulus.timing_verdict import Lateness, judge_lateness, judge_load, judge_missed, lateness_of
+from study.session.stimulus.timing_verdict import (
+    Lateness,
+    judge_late,
+    judge_lateness,
+    judge_load,
+    judge_missed,
+    lateness_of,
+)
 from study.session.views.views import DeviceFinding
 
 LOOP_S = 0.1
@@ -39,7 +49,7 @@ def check_timing(device: Device, clock: Clock, seconds: float, on_progress: Call
     zeros = Signal(np.zeros((round(LOOP_S * rate_hz), 3)), rate_hz, "force", "N", ("fx", "fy", "fz"))
     device.hold(HeldStimulus(zeros, FADE_S, FADE_S, "linear"))
     try:
-        late_s = wake_at_every_tick(clock, rate_hz, seconds, partial(_attend, device, on_progress))
+        late_s = _wake_as_its_loop(device, clock, seconds, partial(_attend, device, on_progress))
     finally:
         health = device.release().health
     lateness = lateness_of(np.array(late_s), rate_hz)
@@ -68,6 +78,24 @@ def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Call
     return late_s
 
 
+def _wake_as_its_loop(device: Device, clock: Clock, seconds: float, go_on: Callable[[float], bool]) -> list[float]:
+    """In a thread that goes before other programs where the device's loop does."""
+    rate_hz = device.info.sample_rate_hz
+    if device.info.simulated:
+        return wake_at_every_tick(clock, rate_hz, seconds, go_on)
+    left = threading.Event()
+
+    def wake() -> list[float]:
+        with before_others():
+            return wake_at_every_tick(clock, rate_hz, seconds, lambda done_s: not left.is_set() and go_on(done_s))
+
+    with ThreadPoolExecutor(1, "timing") as pool:
+        try:
+            return pool.submit(wake).result()
+        finally:
+            left.set()
+
+
 def _attend(device: Device, on_progress: Callable[[float], None], done_s: float) -> bool:
     device.keep_alive()
     on_progress(done_s)
@@ -76,9 +104,11 @@ def _attend(device: Device, on_progress: Callable[[float], None], done_s: float)
 
 def _findings(device: Device, seconds: float, health: Health, lateness: Lateness) -> tuple[DeviceFinding, ...]:
     simulated = device.info.simulated
+    late = judge_late(health.late_ticks + health.missed_ticks, 1000 * health.latest_s, health.ticks)
     return (
         _loop(seconds, health),
         judge_missed(health.missed_ticks, health.ticks, simulated),
+        *(() if simulated else (late,)),
         judge_lateness(lateness, simulated),
         DeviceFinding("Force", f"{health.peak_command_n:g} N commanded", fine=health.peak_command_n == 0.0),
     )

@@ -140,3 +140,46 @@ def test_the_loop_leaves_a_zero_behind_when_it_ends(rigs):
         assert rig.last_n.any()
         device._drive.close()
         assert not rig.last_n.any()
+
+
+only_real = pytest.mark.parametrize("bench", ["HeldForceRig"], indirect=True)
+
+
+def slow_by(bench, seconds: float) -> None:
+    """Its next reading takes so long."""
+
+    def wait() -> None:
+        bench.clock.seconds += seconds
+        bench.rig.before_sensing = lambda: None
+
+    bench.rig.before_sensing = wait
+
+
+@only_real
+@pytest.mark.parametrize(("takes_s", "late"), [(0.0009, 0), (0.0011, 1)])
+def test_a_tick_whose_work_ends_after_the_next_was_due_is_late(bench, rigs, takes_s, late):
+    bench.hold(rigs)
+    slow_by(bench, takes_s)
+    bench.pump(0.101)
+    health = bench.governor.health()
+    assert (health.late_ticks, health.missed_ticks) == (late, 0)
+    assert health.latest_s == pytest.approx(takes_s)
+
+
+@only_real
+def test_ticks_that_were_missed_tell_how_late_the_first_of_them_was_made_good_for(bench, rigs):
+    bench.hold(rigs)
+    bench.pump(0.1052)
+    health = bench.governor.health()
+    assert (health.late_ticks, health.missed_ticks) == (0, 4)
+    assert health.latest_s == pytest.approx(0.0042)
+
+
+@only_real
+def test_the_next_stimulus_counts_anew(bench, rigs):
+    bench.hold(rigs)
+    slow_by(bench, 0.002)
+    bench.pump(0.101)
+    assert bench.governor.health().late_ticks == 1
+    bench.governor.begin_hold(rigs.push())
+    assert (bench.governor.health().late_ticks, bench.governor.health().latest_s) == (0, 0.0)

@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 
-from study.session.stimulus.timing_verdict import judge_lateness, judge_load, judge_missed, lateness_of
+from study.session.stimulus.timing_verdict import judge_late, judge_lateness, judge_load, judge_missed, lateness_of
 
 
 def finding(late_ms, simulated: bool, rate_hz: float = 1000.0):
@@ -60,3 +60,11 @@ def test_load_is_a_warning_and_never_more():
 def test_missed_ticks_of_a_real_loop():
     assert judge_missed(1, 1000, simulated=False).fine
     assert judge_missed(2, 1000, simulated=False).wrong
+
+
+@pytest.mark.parametrize(("late", "fine"), [(0, True), (20, True), (21, False), (10_000, False)])
+def test_late_ticks_of_a_real_loop_are_judged_by_their_share(late, fine):
+    finding = judge_late(late, 3.21, 10_000)
+    assert (finding.fine, finding.warning) == (fine, False)
+    assert f"{late} of 10000" in finding.value and "the latest 3.2 ms after its time" in finding.value
+    assert finding.value.endswith("at most 0.2% are fine") != fine

@@ -1,6 +1,7 @@
 """Timing with zero force: what a loop that keeps up looks like, and one that does not."""
 
 import contextlib
+import threading
 import time
 from dataclasses import replace
 
@@ -83,6 +84,7 @@ def test_ticks_that_a_real_loop_missed_are_counted(rigs, settings):
     rig.before_sensing = lambda: time.sleep(0.01)
     timing, found = timed(SafeDevice(rig, settings, RealClock()), RealClock(), 0.3)
     assert timing.health.missed_ticks > 100
+    assert timing.health.latest_s > 0.009
     assert not found["Missed ticks"].fine
     assert found["Missed ticks"].advice == "Close other programs, switch power saving off, and measure again."
 
@@ -130,3 +132,33 @@ def test_before_a_sitting_the_computer_is_measured_for_a_second_without_the_devi
     assert [finding.name for finding in found] == ["Lateness", "Load"]
     assert [finding.verdict for finding in found] == verdicts
     assert 1.0 <= clock.now_s() < 3.0
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("real", [True, False])
+def test_wake_ups_are_measured_as_the_loop_of_that_device_has_them(rigs, settings, monkeypatch, real):
+    first: list[str] = []
+
+    @contextlib.contextmanager
+    def noted():
+        first.append(threading.current_thread().name)
+        yield
+
+    monkeypatch.setattr("study.workflows.checks.check_timing.before_others", noted)
+    rig = rigs.HeldForceRig() if real else rigs.compiled_rig()
+    _, found = timed(SafeDevice(rig, settings, RealClock()), RealClock(), 0.2)
+    assert [name.startswith("timing") for name in first] == ([True] if real else [])
+    assert ("Late ticks" in found) == real
+
+
+@pytest.mark.real_time
+def test_an_interruption_while_a_real_loop_is_timed_lets_go_at_once(rigs, settings):
+    def interrupt(done: float) -> None:
+        raise KeyboardInterrupt
+
+    started_s = time.monotonic()
+    with contextlib.closing(SafeDevice(rigs.HeldForceRig(), settings, RealClock())) as device:
+        with pytest.raises(KeyboardInterrupt):
+            check_timing(device, RealClock(), 60.0, interrupt)
+        assert time.monotonic() - started_s < 30.0
+        assert device.health().peak_command_n == 0.0
