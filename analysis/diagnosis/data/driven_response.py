@@ -3,7 +3,8 @@
 By the multiple coherence at the lines that the commands drive (Bendat and Piersol, Random Data, 4th ed., 7.3), which
 for K stretches of noise and r independent commands follows a beta distribution with r and K - r degrees of freedom.
 Stretches of a short recording may be shorter than the device's memory; a response that the commands' past foretells on
-held-out samples answers all the same.
+held-out samples answers all the same. So does one that foretells its command: beside dry friction or under control, a
+slow force that follows the motion may be hidden below a command's own noise.
 """
 
 from collections.abc import Iterator, Sequence
@@ -44,21 +45,27 @@ def answer(recordings: Sequence[Recording]) -> float | None:
     if (ANSWER_COHERENCE - expected.mean()) / spread < 2 * ANSWER_DEVIATIONS:
         return None
     sure = float(((found.mean(axis=0) - expected.mean()) / spread).max())
-    told = sure >= ANSWER_DEVIATIONS or not any(_foretold(recording) for recording in recordings)
+    told = sure >= ANSWER_DEVIATIONS or not any(_follow(recording) for recording in recordings)
     return sure if told else None
 
 
-def _foretold(recording: Recording) -> bool:
-    """Whether a filter of the commands, fitted to the first half, takes so much of a response in the second."""
-    command, n = recording.command.samples, len(recording)
+def _follow(recording: Recording) -> bool:
+    command, response = recording.command.samples, recording.response.samples
+    return _foretold(response, command, ahead=False) or _foretold(command, response, ahead=True)
+
+
+def _foretold(y: FloatArray, signals: FloatArray, ahead: bool) -> bool:
+    """Whether a filter of signals, fitted to the first half, takes so much of a channel of y in the second. ahead: half
+    of the filter lies in the signals' future, as a derivative does."""
+    n = len(y)
     every = max(int(MEMORY * n) // MOST_TAPS, 1)
     taps = min(int(MEMORY * n), MOST_TAPS)
-    padded = np.vstack([np.zeros((taps * every, command.shape[1])), command])
-    past = [padded[taps * every - k * every : len(padded) - k * every] for k in range(taps)]
+    before, after = ((taps - taps // 2) * every, taps // 2 * every) if ahead else (taps * every, 0)
+    padded = np.pad(signals, ((before, after), (0, 0)), mode="edge" if ahead else "constant")
+    past = [padded[taps * every - k * every :][:n] for k in range(taps)]
     rows = np.hstack([*past, np.ones((n, 1))])
-    kept = np.isfinite(recording.response.samples).all(axis=1) & np.isfinite(rows).all(axis=1)
+    kept = np.isfinite(y).all(axis=1) & np.isfinite(rows).all(axis=1)
     first = kept & (np.arange(n) < n // 2)
-    y = recording.response.samples
     gram = rows[first].T @ rows[first]
     weights = np.linalg.solve(gram + RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), rows[first].T @ y[first])
     last = kept & ~first

@@ -57,6 +57,18 @@ def test_gaps_in_the_response_are_left_out():
     assert sure is not None and sure > ANSWER_DEVIATIONS
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_slow_force_beside_friction_below_the_commands_noise_is_no_noise(seed):
+    """A shaft that goes to and fro under control: the current holds up dry friction, and a lot of noise."""
+    rng = np.random.default_rng(seed)
+    seconds = np.arange(5000) / RATE_HZ - 1
+    speed = 150 * np.clip(3 * np.sin(2 * np.pi * seconds / 6.3), -1, 1) * (seconds > 0)
+    current = 9 * np.sign(speed) + 8 * rng.standard_normal(5000)
+    position = np.cumsum(speed)[:, None] / RATE_HZ
+    sure = answer([recording(current[:, None], position)])
+    assert sure is None or sure >= ANSWER_DEVIATIONS
+
+
 def test_every_labelled_case_answers_its_commands(shared):
     from study.store.formats.recording_file import read_recording
 
