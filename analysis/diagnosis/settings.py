@@ -108,7 +108,7 @@ REFINED_MOST_GAIN = 0.7  # principle: half of the error power is more than plain
 
 # What a search found is taken back (`prune`, `identifiability`, `no_answer`).
 LAST_EFFECT_SHARE = 0.1  # of the mismatch. Bank 93000: below, four of five were wrong; right ones took a fifth or more
-UNDETERMINED_REACH = 5.0  # interval over distance from none. Bank 93000: right names up to 4.5, eight wrong from 6 on
+UNDETERMINED_REACH = 5.0  # interval over distance from none, beyond which no profile is asked. Bank 93000: wrong from 6
 REPLACEMENTS_TRIED = 2  # by hand
 NO_PREDICTION_SHARE = 0.9  # of its signal that an explanation may leave in every channel; by hand
 NO_PREDICTION_ERROR = 3.0  # by hand

@@ -1,13 +1,21 @@
-"""Identifiability: an effect whose numbers the recordings leave undetermined is not named."""
+"""Identifiability: an effect is named only where the interval of one of its numbers does not hold none.
+
+Intervals are linearised first. Where an effect has one such number and its interval holds none, but not by far, its
+profile decides: beside numbers that act alike, and where a law is bent, the linearised interval is too wide. The
+deviance between the fit without an effect and the fit with it needs no slope. Summed over stretches longer than the
+errors remember, its mean over its own spread is half of the number over its standard error, whatever the residuals'
+variance and colour (Vuong, Econometrica 57:307, 1989; for a quadratic deviance).
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Number
-from analysis.diagnosis.errors.intervals import standard_errors
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.intervals import STRETCH_S, standard_errors
+from analysis.diagnosis.errors.output_error import Fitted, evaluated
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
 from analysis.diagnosis.search.search_context import SearchContext, sensitivity_at
@@ -47,7 +55,7 @@ def identified(context: SearchContext, found: Explanation, time_left: TimeBudget
     that is as good and whose numbers are determined."""
     if not found.steps:
         return found
-    found = replace(found, errors=(found.steps[-1].fitted, final_errors(context, found)))
+    found = _profiled(context, found)
     left_open = [number for number, is_open in enumerate(_open(context, found)) if is_open]
     if not left_open:
         return found
@@ -72,7 +80,8 @@ def _instead(context: SearchContext, found: Explanation) -> Explanation | None:
     as_good = {candidate.newest: candidate for candidate in reversed(others) if both_stand(best, candidate)}
     for other in sorted(as_good.values(), key=lambda candidate: candidate.score.mean_log_error)[:REPLACEMENTS_TRIED]:
         rest = tuple(candidate for candidate in others if candidate is not other)
-        instead = replace(found, after=context.confirmed(other), rounds=((other, *rest),), steps=(other,))
+        instead = replace(found, after=context.confirmed(other), rounds=((other, *rest),), steps=(other,), errors=None)
+        instead = _profiled(context, instead)
         if not any(_open(context, instead)):
             return instead
     return None
@@ -82,21 +91,76 @@ def _nothing(found: Explanation) -> Explanation:
     return replace(found, after=found.retuned, steps=())
 
 
-def _open(context: SearchContext, found: Explanation) -> Iterator[bool]:
-    """By effect: whether all its numbers that have a value meaning no effect are undetermined."""
+def _profiled(context: SearchContext, found: Explanation) -> Explanation:
+    """With the standard errors of the final fit; those of an effect's only number from its profile, where the
+    linearised interval holds none, and the profile tells it from none."""
+    errors = final_errors(context, found).copy()
+    first = len(context.tuning.names)
+    for effect, own in enumerate(_could_be_none(found, errors[first:])):
+        if found.statistic is not None or len(own) != 1:
+            continue
+        number, place, at, error = own[0]
+        reach, away = _reach(number, at, error)
+        if not away < reach <= UNDETERMINED_REACH * away:
+            continue
+        sure = told_from_none(context, found, effect)
+        if sure > 1:
+            share = away / (sure * reach)
+            by_factor = number.parameter.scale == "log"
+            errors[first + place] = np.log1p(share * np.expm1(error)) if by_factor else share * error
+    return replace(found, errors=(found.steps[-1].fitted, errors))
+
+
+def _could_be_none(found: Explanation, errors: FloatArray) -> Iterator[list[tuple[Number, int, float, float]]]:
+    """Per effect, its numbers that have a value meaning no effect: with place, coordinate and standard error."""
     hypothesis, first = found.after.fitted.hypothesis, 0
-    errors = number_errors(context, found)
-    each = list(zip(hypothesis.numbers, hypothesis.point.tolist(), errors.tolist(), strict=True))
+    each = list(zip(hypothesis.numbers, range(len(errors)), hypothesis.point.tolist(), errors.tolist(), strict=True))
     for claim in hypothesis.claims:
         free = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
         own = [number for number in each[first : first + free] if np.isfinite(number[0].parameter.none or 0.0)]
         first += free
-        could_be_none = [(number, at, error) for number, at, error in own if number.parameter.none is not None]
-        yield bool(could_be_none) and all(_is_open(*number) for number in could_be_none)
+        yield [number for number in own if number[0].parameter.none is not None]
+
+
+def _open(context: SearchContext, found: Explanation) -> Iterator[bool]:
+    """By effect: whether the intervals of all its numbers that have a value meaning no effect hold it."""
+    for own in _could_be_none(found, number_errors(context, found)):
+        yield bool(own) and all(_is_open(number, at, error) for number, _, at, error in own)
 
 
 def _is_open(number: Number, at: float, error: float) -> bool:
+    reach, away = _reach(number, at, error)
     value, none = number.value(at), number.parameter.none or 0.0
-    reach = 1.96 * INTERVAL_FACTOR * abs(number.value(at + error) - value)
-    away = abs(value - none)
-    return away <= _ABSENT * max(abs(value), abs(none)) or not reach <= UNDETERMINED_REACH * away
+    return away <= _ABSENT * max(abs(value), abs(none)) or not reach <= away
+
+
+def _reach(number: Number, at: float, error: float) -> tuple[float, float]:
+    """Of the interval to one side, and of the value from none."""
+    value, none = number.value(at), number.parameter.none or 0.0
+    return 1.96 * INTERVAL_FACTOR * abs(number.value(at + error) - value), abs(value - none)
+
+
+def told_from_none(context: SearchContext, found: Explanation, effect: int) -> float:
+    """How many standard errors an effect's only number is away from none, over those that an interval spans; above 1,
+    the interval does not hold none. effect: its place."""
+    with_it = found.steps[-1].fitted
+    fewer = found.retuned if len(found.steps) == 1 else without_effect(context, found, effect).steps[-1]
+    # The re-tuned model is kept as it is on all samples.
+    without = evaluated(context.measure, context.tuning, fewer.fitted.deviations, fewer.fitted.hypothesis)
+    gained = np.concatenate([
+        _stretches(context.measure, without) - _stretches(context.measure, with_it),
+        # The calibration is an observation of its own.
+        [float(without.deviations @ without.deviations - with_it.deviations @ with_it.deviations)],
+    ])  # fmt: skip
+    spread = float(np.std(gained, ddof=1) * np.sqrt(len(gained)))
+    return 2 * float(gained.sum()) / max(spread, 1e-300) / (1.96 * INTERVAL_FACTOR)
+
+
+def _stretches(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
+    """(stretches,): sums of squares of what is left where it is fitted."""
+    sums: list[float] = []
+    for record, left in zip(measure.records, fitted.residuals, strict=True):
+        square = np.sum(left[record.fit] ** 2, axis=1)
+        width = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
+        sums += [float(square[begin : begin + width].sum()) for begin in range(0, len(square), width)]
+    return np.array(sums)

@@ -2,15 +2,17 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
 from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retuned_alone
-from analysis.diagnosis.search.identifiability import identified
+from analysis.diagnosis.search.identifiability import final_errors, identified, told_from_none
 from analysis.diagnosis.search.search import searched
 from analysis.diagnosis.search.time_budget import always
-from analysis.diagnosis.settings import UNDETERMINED_REACH
+from analysis.diagnosis.settings import INTERVAL_FACTOR
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
@@ -85,9 +87,53 @@ def test_what_has_no_number_that_could_be_none_is_not_judged(rubbing):
 
 
 def test_it_is_said_that_numbers_were_left_open(rubbing, monkeypatch):
-    monkeypatch.setattr("analysis.diagnosis.search.identifiability.UNDETERMINED_REACH", UNDETERMINED_REACH * 1e-6)
+    monkeypatch.setattr("analysis.diagnosis.search.identifiability.INTERVAL_FACTOR", 1e6)
     seen = searched(rubbing, [EFFECTS["coulomb_friction"]], lambda what, share: None)
     assert (seen.judged.verdict, seen.judged.named) == ("unexplained", False)
     assert seen.remarks == (
         "An explanation by dry friction is not named: these recordings leave its numbers as good as open.",
     )
+
+
+def fitted(context, *claims):
+    """As a search ends: each claim fitted beside those before it."""
+    base = context.candidate(retuned_alone(context))
+    steps, at = [], base
+    for one in claims:
+        start = evaluated(context.measure, context.tuning, at.fitted.deviations, together(at.fitted.hypothesis, one))
+        at = context.candidate(refine(context, start))
+        steps.append(at)
+    ends = [context.confirmed(each) for each in (base, base, at)]
+    return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
+
+
+def test_a_profile_tells_a_number_from_none_where_it_is_there_and_not_where_it_is_not(rubbing):
+    both = fitted(rubbing, FRICTION, OPEN)
+    assert told_from_none(rubbing, both, 0) > 1
+    assert told_from_none(rubbing, both, 1) < 1
+
+
+def test_an_interval_that_holds_none_is_judged_by_the_profile_and_then_does_not(rubbing, monkeypatch):
+    found = fitted(rubbing, FRICTION)
+    place, level = len(rubbing.tuning.names), found.after.fitted.hypothesis.placed()[0].values["level"]
+    plain = final_errors(rubbing, found)
+    wide = plain.copy()
+    wide[place] = np.log1p(2 / (1.96 * INTERVAL_FACTOR))
+    monkeypatch.setattr(
+        "analysis.diagnosis.search.identifiability.final_errors",
+        lambda context, found: found.errors[1] if found.errors else wide,
+    )
+    named = identified(rubbing, found, always)
+    assert names(named) == ["coulomb_friction"]
+    assert 1.96 * INTERVAL_FACTOR * level * np.expm1(named.errors[1][place]) < level
+
+
+def test_numbers_whose_intervals_all_hold_none_are_not_named(rubbing, monkeypatch):
+    found = fitted(rubbing, claim("asymmetric_friction", level_positive=FRICTION_N, level_negative=FRICTION_N))
+    wide = final_errors(rubbing, found).copy()
+    wide[len(rubbing.tuning.names) :] = np.log1p(2 / (1.96 * INTERVAL_FACTOR))
+    monkeypatch.setattr(
+        "analysis.diagnosis.search.identifiability.final_errors",
+        lambda context, found: found.errors[1] if found.errors else wide,
+    )
+    assert identified(rubbing, found, always).undetermined == ("asymmetric_friction",)
