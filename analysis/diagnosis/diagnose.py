@@ -53,7 +53,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
 from equalizer.signals.recording import Recording
 
 BALANCE = "the force balance"
-WEIGHED = ("force_deadband", "force_saturation")
+WEIGHED = ("force_deadband", "force_saturation", "force_nonlinearity")
 """Laws of the command that a balance has weighed: what it does not name is not there."""
 GAINS = ("force_gain", "sensor_gain")
 """A model that was fitted to the recordings holds them: only against a calibrated one can a gain be wrong."""

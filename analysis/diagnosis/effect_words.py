@@ -70,6 +70,9 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "amplifier_lag": EffectWords("a lag of the amplifier", {"time_constant": "time constant {}"}),
     "transport_delay": EffectWords("a delay of the command"),
     "force_gain": EffectWords("a wrong force gain", {"gain": "a factor of {}"}),
+    "force_nonlinearity": EffectWords(
+        "a force that is not in proportion to its command", {"square": "{} of it with the square"}
+    ),
     "sensor_lag": EffectWords("a low pass in the sensor", {"bandwidth": "at {}"}),
     "sensor_clipping": EffectWords("clipping in the sensor", {"limit": "at {}"}),
     "sensor_misalignment": EffectWords("a turned sensor"),
@@ -138,9 +141,6 @@ LAW_WORDS: Mapping[str, LawWords] = {
     ),
     "actuator_cubic": LawWords(
         EffectWords("an actuator whose gain changes with the square of the command"), place="actuator"
-    ),
-    "actuator_square": LawWords(
-        EffectWords("an actuator whose gain changes with the size of the command"), place="actuator"
     ),
     "actuator_asymmetry": LawWords(
         EffectWords("an actuator that pushes more to one side than to the other"), place="actuator"

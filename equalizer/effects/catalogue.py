@@ -16,6 +16,7 @@ from equalizer.effects import (
     extra_mode,
     force_deadband,
     force_gain,
+    force_nonlinearity,
     force_saturation,
     gravity_torque,
     hand_impedance,
@@ -53,6 +54,7 @@ CATALOGUE: tuple[Effect, ...] = tuple(
         backlash, loose_joint, end_stop, pose_dependent_inertia, extra_mode, added_mass,
         hand_impedance, time_varying_grip,
         body_on_actuator, force_saturation, force_deadband, slew_limit, amplifier_lag, transport_delay, force_gain,
+        force_nonlinearity,
         sensor_lag, sensor_clipping, sensor_misalignment, cross_axis_sensitivity, sensor_gain, sensor_nonlinearity,
         sensor_offset, sensor_drift, quantization, mains_hum, clock_drift, logger_offset, lost_samples,
     )

@@ -143,6 +143,7 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
     EffectName("amplifier_lag", "actuator", (_number("time_constant", "s"),)),
     EffectName("transport_delay", "actuator", (_number("delay", "s"),)),
     EffectName("force_gain", "actuator", (_number("gain", "1"),)),
+    EffectName("force_nonlinearity", "actuator", (_number("square", "1"), _level("reference"))),
     EffectName("sensor_lag", "sensor", (_number("bandwidth", "Hz"),)),
     EffectName("sensor_clipping", "sensor", (_number("limit", RESPONSE),)),
     EffectName(

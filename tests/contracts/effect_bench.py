@@ -149,6 +149,7 @@ EXAMPLES: dict[str, dict[str, float]] = {
     "amplifier_lag": {"time_constant": 0.001},
     "transport_delay": {"delay": 0.0013},
     "force_gain": {"gain": 0.9},
+    "force_nonlinearity": {"square": 0.4, "reference": 1.0},
     "sensor_lag": {"bandwidth": 90.0},
     "sensor_clipping": {"limit": 8.0},
     "sensor_misalignment": {"about_x": 3.0, "about_y": -2.0, "about_z": 4.0},

@@ -9,10 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from equalizer.effects.force_nonlinearity import bent
 from equalizer.signals.signal import FloatArray
 
 DEAD, FULL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
 """Shares of the samples that are commanded less: where a dead band ends, and where an actuator gives no more."""
+SQUARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
+"""Shares of the force at the largest command that grow with the square of the command."""
 CLOSER = (0.95, 0.98, 1.02, 1.05)
 """Factors by which a number is moved, as long as that helps."""
 
@@ -43,16 +46,21 @@ def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
             "force_saturation", {"limit": limit}, lambda u, of: np.clip(u, -of["limit"], of["limit"])[:, None]
         )
     unit = float(size.max(initial=0.0)) or 1.0
-    yield CommandLaw("actuator_cubic", {}, lambda u, _: np.stack([u, u * (u / unit) ** 2], axis=1))
-    yield CommandLaw("actuator_square", {}, lambda u, _: np.stack([u, u * np.abs(u / unit)], axis=1))
+    for square in SQUARES:
+        yield CommandLaw("force_nonlinearity", {"square": square, "reference": unit}, _bent)
     yield CommandLaw("actuator_asymmetry", {}, lambda u, _: np.stack([u, np.abs(u)], axis=1))
 
 
 def closer(law: CommandLaw) -> Iterator[CommandLaw]:
     """With its size moved a little."""
-    for name in {"width", "limit"} & set(law.values):
+    for name in {"width", "limit", "square"} & set(law.values):
         for factor in CLOSER:
-            yield replace(law, values={**law.values, name: factor * law.values[name]})
+            if name != "square" or abs(factor * law.values[name]) <= 1:
+                yield replace(law, values={**law.values, name: factor * law.values[name]})
+
+
+def _bent(command: FloatArray, of: dict[str, float]) -> FloatArray:
+    return bent(command, of["square"], of["reference"])[:, None]
 
 
 def _sizes(size: FloatArray, shares: Sequence[float]) -> list[float]:

@@ -39,6 +39,7 @@ ALONG: Mapping[str, Along] = {
     "force_saturation": "command",
     "force_deadband": "command",
     "force_gain": "command",
+    "force_nonlinearity": "command",
     "sensor_clipping": "reading",
     "sensor_gain": "reading",
     "sensor_nonlinearity": "reading",

@@ -48,6 +48,33 @@ def likeliest_value(
     return best if misfit < (1 - LEAST_SHARE) * sum(_misfit(force, basis) for force, basis in looks) else None
 
 
+def of_square(evidence: Evidence, site: int) -> tuple[float, float] | None:
+    """The share of the force that grows with the square of the command, of that at a reference, where force and
+    command agree; and the reference. None where a square explains nothing."""
+    axes = range(evidence.command.shape[1]) if site == ALL_SITES else (site,)
+    used, linear, squared, gained = np.flatnonzero(evidence.used > 0), [], [], 0.0
+    for axis in axes:
+        force, basis = _look(evidence, axis, True)
+        u = evidence.command[used, axis]
+        rows = np.column_stack([u, u * np.abs(u)])
+        rows -= basis @ (basis.T @ rows)
+        force = force - basis @ (basis.T @ force)
+        gain, weights = (np.linalg.lstsq(rows[:, :k], force, rcond=None)[0] for k in (1, 2))
+        linear.append(1 + float(weights[0]))
+        squared.append(float(weights[1]))
+        none, left = (float(np.sum((force - rows[:, : len(of)] @ of) ** 2)) for of in (gain, weights))
+        gained += (none - left) / max(none, 1e-300) / len(axes)
+    first, second = float(np.mean(linear)), float(np.mean(squared))
+    peak = float(np.abs(evidence.command[:, list(axes)]).max(initial=0.0))
+    whole = first + second * peak
+    if gained < LEAST_SHARE or whole <= 0:
+        return None
+    # Where no command is obeyed as it is, a gain is wrong besides.
+    agrees = (1 - first) / second if second else 0.0
+    share, reference = (1 - first, agrees) if 0 < agrees < 10 * peak else (second * peak / whole, peak)
+    return (share, reference) if share and -1 <= share <= 1 else None
+
+
 def best_on_grid(misfit: Callable[[float], float], grid: Sequence[float]) -> tuple[float, float]:
     """The grid's best value (rising, above zero), refined between its neighbours, with its misfit."""
     values = [misfit(value) for value in grid]

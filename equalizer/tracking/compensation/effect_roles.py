@@ -25,6 +25,7 @@ LEFT_ALONE = {
     "pose_dependent_inertia": "take a model identified at the place; over a vibration the inertia stays the same",
     "time_varying_grip": "the grip is not known ahead of time",
     "force_saturation": "there is no more force than that: the cap keeps it",
+    "force_nonlinearity": "the identified model has the gain at the level that it was identified at",
     "slew_limit": "there is no faster force than that",
 }
 SENSORS = "it is the sensor's: a force against it would make the handle do what the sensor gets wrong"

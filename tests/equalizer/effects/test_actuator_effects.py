@@ -13,6 +13,8 @@ STRONG = [
     ("force_saturation", {"limit": 2.6}, ALL, 0.05),
     ("force_deadband", {"width": 0.05}, ONE, 0.15),
     ("force_deadband", {"width": 0.3}, ALL, 0.15),
+    ("force_nonlinearity", {"square": 0.3, "reference": 1.0}, ONE, 0.15),
+    ("force_nonlinearity", {"square": -0.2, "reference": 3.0}, ALL, 0.3),
     ("slew_limit", {"rate": 150.0}, ONE, 0.3),
     ("amplifier_lag", {"time_constant": 2e-3}, ALL, 0.5),
     ("amplifier_lag", {"time_constant": 4e-3}, ONE, 0.5),
@@ -40,7 +42,7 @@ def test_an_actuators_effect_is_found_near_its_strength(bench, command, name, va
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("name", ["force_saturation", "slew_limit", "force_deadband"])
+@pytest.mark.parametrize("name", ["force_saturation", "slew_limit", "force_deadband", "force_nonlinearity"])
 def test_a_device_without_it_suggests_no_strength(bench, command, name, seed):
     model = bench.three_axes()
     evidence = bench.evidence(model, bench.measured(model, (), command, seed))

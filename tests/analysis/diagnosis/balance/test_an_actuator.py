@@ -56,14 +56,19 @@ def test_the_error_before_is_that_of_the_force_as_commanded(dead_band):
 @pytest.mark.parametrize("physics", [{"coulomb": 0.8}, {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}])
 def test_an_actuator_that_gives_what_is_commanded_has_neither(found, axes, physics):
     balance = found(lambda u: u, replace(axes.Physics(), **physics))
-    assert not {"force_deadband", "force_saturation"} & set(named(balance))
+    assert not {"force_deadband", "force_saturation", "force_nonlinearity"} & set(named(balance))
 
 
-def test_a_gain_that_grows_with_the_command_is_a_candidate_alone(found):
-    balance = found(lambda u: u * (1 + 0.02 * u**2))
-    law = balance.laws[0]
-    assert law.law.effect in ("actuator_cubic", "actuator_square")
-    assert not balance.named
+@pytest.mark.parametrize("square", [-0.5, 0.4])
+def test_a_gain_that_changes_with_the_command_is_recovered_with_its_size(found, square):
+    balance = found(lambda u: u * (1 - square + square * np.abs(u) / np.abs(u).max()))
+    assert set(named(balance)) == {"force_nonlinearity"}
+    assert named(balance)["force_nonlinearity"].values["square"] == pytest.approx(square, rel=0.15)
+
+
+def test_a_gain_that_grows_with_the_square_of_the_command_grows_with_its_size(found):
+    law = named(found(lambda u: u * (1 + 0.02 * u**2)))["force_nonlinearity"]
+    assert 0 < law.values["square"] <= 1
 
 
 def driven_speed(given, drag, seed=3, rate_hz=50.0, count=6000):
@@ -99,7 +104,7 @@ def of_speed(balance_of):
 
 def test_a_gain_that_falls_with_the_command_is_no_drag(of_speed):
     balance = of_speed(lambda u: u * (1 - 0.5 * np.abs(u)), 0.0)
-    assert balance.laws[0].law.effect in ("actuator_square", "actuator_cubic", "force_saturation")
+    assert named(balance)["force_nonlinearity"].values["square"] == pytest.approx(-1, abs=0.2)
     assert "quadratic_damping" not in named(balance)
 
 
