@@ -13,6 +13,7 @@ from analysis.diagnosis.balance.law import sliding
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.first_model.rectified import restored
+from analysis.diagnosis.first_model.turned_round import turned_round
 from analysis.diagnosis.first_model.unnamed_motion import with_named_motion
 from analysis.wording import listed
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -35,7 +36,7 @@ def plain_form(recordings: Sequence[Recording]) -> tuple[Recordings, tuple[str, 
     found, said = tuple(recordings), []
     steps = (
         with_named_motion, _conditions, _moving_commands, _moving_responses, _pushing_responses,
-        restored, _still, _summed,
+        restored, _still, _summed, turned_round,
     )  # fmt: skip
     for step in steps:
         found, sentence = step(found)

@@ -232,3 +232,49 @@ def test_what_an_imposed_motion_meets_is_a_force_where_nothing_says_so():
     (found,), _ = plain_form((recording,))
 
     assert found.response.quantities == ("force",)
+
+
+def turned(recording):
+    return replace(recording, command=replace(recording.command, samples=-recording.command.samples))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_a_command_that_is_counted_against_its_motion_is_turned_round(seed, friction):
+    push = smooth(2000, seed)
+    speed = speed_of(np.sign(push) * np.maximum(np.abs(push) - friction, 0.0))
+    recording = of([("u", "force", "N", push)], [("v", "velocity", "m/s", speed)])
+
+    assert plain_form((recording,)) == ((recording,), ())
+    (found,), (said,) = plain_form((turned(recording),))
+    np.testing.assert_array_equal(found.command.samples, recording.command.samples)
+    assert said.startswith("u is counted against the motion")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_loop_without_time_tells_which_way_a_force_is_counted(seed):
+    """A spring with play, pulled to and fro: rising and falling branches."""
+    way = np.concatenate([np.linspace(0, 1, 300), np.linspace(1, -1, 600), np.linspace(-1, 0, 300)])
+    pulled = 20 * way + 3 * np.sign(np.gradient(way)) + 0.1 * np.random.default_rng(seed).standard_normal(1200)
+    recording = of([("u", "force", "N", pulled)], [("x", "position", "m", way)])
+    recording = replace(recording, meta={"time": "unknown"})
+
+    assert plain_form((recording,))[1] == ()
+    (found,), _ = plain_form((turned(recording),))
+    np.testing.assert_array_equal(found.command.samples, recording.command.samples)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_command_that_moves_nothing_and_a_spring_alone_are_left_as_they_are(seed):
+    push = smooth(2000, seed)
+    for moved in (smooth(2000, seed + 100), -push):
+        recording = of([("u", "force", "N", push)], [("x", "position", "m", moved)])
+        assert plain_form((recording,)) == ((recording,), ())
+
+
+def test_of_an_imposed_motion_the_measured_force_is_turned_round():
+    push = smooth(2000, 1)
+    recording = of([("v", "velocity", "m/s", speed_of(push))], [("f", "force", "N", -push)])
+
+    (found,), _ = plain_form((recording,))
+    np.testing.assert_array_equal(found.response.samples[:, 0], push)

@@ -1,0 +1,66 @@
+"""Commands that are counted against the motion that they drive: an encoder or an amplifier wired the other way round.
+
+Mass, damping and dry friction take work out of a drive. Counted the other way round they would give it, and no law of
+the motion has the signs that physics has. So forces are balanced with both signs, mass and damping not below zero in
+either; where the turned sign leaves clearly less on held-out folds, it is the device's. A spring alone tells nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
+from analysis.diagnosis.balance.regression import regression_of
+from analysis.diagnosis.balance.structures import Structure, better
+from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.wording import listed
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray, Signal
+
+CLEARLY = 0.1
+"""Share of the folds' error power that the turned sign must take; as much as a linear law must."""
+
+
+def turned_round(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
+    """recordings: alike in channels, units and rate. And a sentence, where a force was turned round."""
+    driven = all_force_driven(recordings)
+    count = len(driven[0].command.channels)
+    try:
+        motions = motions_of(observed_parts(driven, len(driven[0].response.channels)))
+        if len(motions[0].channels) != count:
+            return recordings, ""
+        against = [axis for axis in range(count) if _against(motions, axis)]
+    except (NoMotionError, np.linalg.LinAlgError):
+        return recordings, ""
+    if not against:
+        return recordings, ""
+    names = [driven[0].command.channels[axis] for axis in against]
+    imposed = driven[0] is not recordings[0]
+    sign = np.ones(count)
+    sign[against] = -1.0
+    verb = "is" if len(names) == 1 else "are"
+    return tuple(_turned(each, imposed, sign) for each in recordings), (
+        f"{listed(names)} {verb} counted against the motion: as recorded, the device would give work instead of taking "
+        f"it. The sign was turned round; where the device is a source of work, say so by a model of your own."
+    )
+
+
+def _against(motions: Sequence[Motion], axis: int) -> bool:
+    plain, turned = (
+        regression_of([replace(each, force=sign * each.force) for each in motions], axis, (), turns=False)
+        for sign in (1.0, -1.0)
+    )
+    first, other = (Structure((), each.crossed(each.chosen(()))) for each in (plain, turned))
+    return other.error < (1 - CLEARLY) * first.error and better(first, other)
+
+
+def _turned(recording: Recording, imposed: bool, sign: FloatArray) -> Recording:
+    if imposed:
+        return replace(recording, response=_times(recording.response, sign))
+    return replace(recording, command=_times(recording.command, sign), excitation=None)
+
+
+def _times(signal: Signal, sign: FloatArray) -> Signal:
+    return replace(signal, samples=signal.samples * sign)
