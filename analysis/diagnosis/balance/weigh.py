@@ -161,13 +161,14 @@ def _weighed(
     small = f"it takes {100 * taken:.1f} % of the force, less than such recordings are sure of"
     why_not = _why_not(law, values, (gain, low, share, told), alike) or (small if taken < OF_SIGNAL else "")
     times = times_recorded(regression, laws, number)
+    possible = values is not None and times <= CANCELLED
     if not why_not and times > CANCELLED:
         why_not = f"its force would be {times:.0f} times what was recorded, and other terms would cancel it"
     chosen = ""
     if not why_not and law.effect in PLAYED_AS:
         alike = (law.effect, *(effect for effect in alike if effect != PLAYED_AS[law.effect]))
         chosen, law = law.effect, replace(law, effect=PLAYED_AS[law.effect])
-    return Weighed(number, law, values or {}, gain, low, share, alike, likely, why_not, chosen)
+    return Weighed(number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, possible)
 
 
 def _plainer(effect: str) -> tuple[str, ...]:
@@ -252,5 +253,7 @@ def _others(
         share = float((held - errors).sum()) / room
         why = "it takes too little beside what is named" if chosen.laws else "its gain is too small to be named"
         if gain > 0 and low > 0:
-            found.append(Weighed(number, regression.laws[number], values, gain, low, share, (), 0.0, why))
+            possible = times_recorded(regression, laws, number) <= CANCELLED
+            law = regression.laws[number]
+            found.append(Weighed(number, law, values, gain, low, share, (), 0.0, why, possible=possible))
     return tuple(sorted(found, key=lambda each: -each.gain))

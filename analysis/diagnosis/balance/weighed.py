@@ -36,6 +36,9 @@ class Weighed:
     stands_for: str = ""
     """The law that was chosen, where no simulation plays it and this one is fitted in its place."""
 
+    possible: bool = True
+    """Its numbers have signs and sizes that such physics can have."""
+
     @property
     def named(self) -> bool:
         return not self.why_not

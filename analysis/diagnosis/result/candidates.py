@@ -120,10 +120,13 @@ def _told_with(effect: NamedEffect) -> tuple[str, ...]:
 
 
 def _rank(weighed: Weighed) -> int:
-    """Missing physics before a linear model of a higher order, and that before what takes next to nothing."""
+    """Missing physics that is sure to gain and can have such numbers before what is not or cannot; then a linear model
+    of a higher order; and last what takes next to nothing."""
     if weighed.law.linear:
-        return 1
-    return 0 if weighed.share >= SMALL else 2
+        return 2
+    if weighed.share < SMALL:
+        return 3
+    return 0 if weighed.possible and weighed.gain_low > 0 else 1
 
 
 def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...]) -> tuple[str, ...]:
