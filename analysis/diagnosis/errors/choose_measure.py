@@ -5,6 +5,8 @@ Free simulation, from rest by the commands alone, is the strictest: nothing meas
 * a plant in closed loop that does not hold itself: the command then contains what the controller did about the very
   physics that is missing. Where positions or velocities were measured, forces are compared instead: the one that
   entered against the one that the model needs along the measured motion; where only accelerations were, windows;
+* a plant whose motion grows by itself within a window, as a levitated body or a pendulum on its head: it was recorded
+  under control, whether that shows or not, and is compared likewise;
 * a plant that integrates freely, whose slowest motion takes longer to die out than a third of the recording: any small
   error grows without end. It is simulated in windows of 1 s or longer, each from a state estimated from the measured
   motion, or, where no state can be estimated, compared by forces;
@@ -19,13 +21,14 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.data.closed_loop import in_closed_loop
+from analysis.diagnosis.data.growth import runs_away
 from analysis.diagnosis.data.measured_motion import has_motion, time_unit
 from analysis.diagnosis.data.observed import Observed, noise_in_units
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.effect_words import EFFECT_WORDS
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.windows import windows_of
+from analysis.diagnosis.errors.windows import WINDOW_S, windows_of
 from analysis.diagnosis.forces.force_views import force_views
 from analysis.diagnosis.noise.noise_floor import NoiseFloor, noise_floor
 from analysis.diagnosis.noise.rounding import rounding_step
@@ -140,6 +143,8 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
         return Choice("predicted force", IMPOSED)
     if not holds and any(in_closed_loop(record.recording) for record in records):
         return Choice("predicted force", CLOSED_LOOP) if motion else Choice("windows", CLOSED_LOOP_WINDOWS)
+    if motion and runs_away(model, WINDOW_S):
+        return Choice("predicted force", UNSTABLE)
     if not holds:
         return Choice("windows", DRIFTS)
     if any(
@@ -202,6 +207,10 @@ ASKED_MOTION = (
 CLOSED_LOOP = (
     "The command hangs on the response and the model does not hold itself, so a simulation by the command alone would "
     "drift; the force that the model needs along the measured motion is compared with the one that entered."
+)
+UNSTABLE = (
+    "By itself the model grows without end, so the device was held by a controller, and simulations say nothing; the "
+    "force that the model needs along the measured motion is compared with the one that entered."
 )
 CLOSED_LOOP_WINDOWS = (
     "The command hangs on the response and the model does not hold itself; it is simulated in short windows, each "

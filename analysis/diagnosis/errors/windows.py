@@ -28,6 +28,8 @@ _UNSEEN = 1e-9
 """Of a window's largest direction: what moves the outputs less than that is not fitted."""
 
 
+WINDOW_S = 1.0
+"""Shortest."""
 STATES = 10.0
 """Readings of a window per number of its state; principle: the state, which is fitted and does not count, then takes a
 tenth of an error at most by chance."""
@@ -42,7 +44,7 @@ class Windows:
     """Per record (windows, 2 coordinates): where each window begins."""
     unit: FloatArray
     noise: FloatArray
-    window_s: float = 1.0
+    window_s: float = WINDOW_S
     known: tuple[PlacedEffect, ...] = ()
     """What the model's own file names: it is part of every simulation."""
     least: float = 0.0

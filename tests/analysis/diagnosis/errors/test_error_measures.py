@@ -186,6 +186,15 @@ def test_the_rule_keeps_free_simulation_for_plants_that_hold_themselves(held: Re
         assert choose_measure(observed_parts([one], 1), model(stiffness=400.0)).measure == "free simulation"
 
 
+def test_the_rule_takes_forces_where_a_model_grows_within_a_window(drifting: Recording) -> None:
+    choice = choose_measure(observed_parts([drifting], 1), model(stiffness=-400.0))
+    assert choice.measure == "predicted force"
+    assert "held by a controller" in choice.why
+    felt = replace(drifting, response=replace(drifting.response, quantity="acceleration", unit="m/s^2"))
+    choice = choose_measure(observed_parts([felt], 1), model(stiffness=-400.0, quantity="acceleration"))
+    assert choice.measure == "windows"
+
+
 def test_the_rule_takes_windows_where_a_recording_begins_in_motion(drifting: Recording) -> None:
     moving = replace(drifting, response=replace(drifting.response, samples=drifting.response.samples + 0.3))
     choice = choose_measure(observed_parts([moving], 1), model(stiffness=400.0))
