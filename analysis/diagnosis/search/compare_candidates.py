@@ -13,6 +13,8 @@ from analysis.diagnosis.settings import (
     NO_SECOND_START,
     REACHES_NOISE,
     RICHER_LAW_SQUARES,
+    SAME_START,
+    SHARED_MOTION,
     WORTH_REFINING,
 )
 
@@ -27,11 +29,24 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
     """The best first. fits: as `first_fits` leaves them."""
     worth = _worth_refining(base, fits)
 
-    def refit(law: Fitted) -> Fitted:
-        return refine(context, law)
+    def refit_first(law: Fitted) -> tuple[Fitted, Sensitivity]:
+        return refined_with(context, law)
 
-    refined: list[Fitted] = list(context.guard.over(map, FITTING)(refit, worth[:1]))  # type: ignore[arg-type]
-    others = worth[1:MOST_REFINED]
+    first: list[tuple[Fitted, Sensitivity]] = list(
+        context.guard.over(map, FITTING)(refit_first, worth[:1])  # type: ignore[arg-type]
+    )
+    refined = [law for law, _ in first]
+
+    def refit(law: Fitted) -> Fitted:
+        near = first and _timeless(law) == _timeless(refined[0])
+        near = near and _apart(context, law, refined[0]) < SHARED_MOTION * (base.cost - refined[0].cost)
+        return refined_with(context, law, first[0][1] if near else None)[0]
+
+    others = [
+        law
+        for number, law in enumerate(worth[1:MOST_REFINED], 1)
+        if not any(_repeats(context, law, other) for other in worth[:number])
+    ]
     if refined and context.candidate(refined[0]).score.worst_channel <= NO_SECOND_START:
         others = [law for law in others if context.candidate(law).score.worst_channel <= REACHES_NOISE]
     rest = [law for law in fits[1 if worth else 0 :] if not any(law is other for other in others)]
@@ -41,6 +56,22 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
     return tuple(sorted(fitted_candidates, key=lambda candidate: candidate.score.mean_log_error))
 
 
+def _timeless(law: Fitted) -> bool:
+    return not any(placed.effect.of_time for placed in law.hypothesis.placed())
+
+
+def _repeats(context: SearchContext, law: Fitted, other: Fitted) -> bool:
+    """Whether a law that was started elsewhere has come to where another start of it is."""
+    return law.hypothesis.key == other.hypothesis.key and _apart(context, law, other) < SAME_START * law.cost
+
+
+def _apart(context: SearchContext, law: Fitted, other: Fitted) -> float:
+    """Mean square of what their predictions differ by, in units of the noise."""
+    apart = fitting(context.measure, law.residuals) - fitting(context.measure, other.residuals)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(apart @ apart) / max(len(apart), 1)
+
+
 def _worth_refining(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
     """fits: the best first."""
     gained = [base.cost - found.cost for found in fits]
@@ -48,23 +79,31 @@ def _worth_refining(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
 
 
 def refine(context: SearchContext, fitted: Fitted) -> Fitted:
-    """Fitted until it settles: where a drive repeats, first to one period of each segment, whose sensitivities then
-    stand for all of them."""
+    """Fitted until it settles."""
+    return refined_with(context, fitted)[0]
+
+
+def refined_with(
+    context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
+) -> tuple[Fitted, Sensitivity]:
+    """Where a drive repeats, first fitted to one period of each segment, whose sensitivities then stand for all of
+    them. known: as this gives it back, of a law that moves the device nearly alike."""
     short_form = short_recordings_of(context, fitted.hypothesis)
     if short_form is None:
-        return _settled(context, fitted)[0]
+        return _settled(context, fitted, known)
     short = short_form.context
-    near, known = _settled(short, evaluated(short.measure, short.tuning, fitted.deviations, fitted.hypothesis))
+    near, known = _settled(short, evaluated(short.measure, short.tuning, fitted.deviations, fitted.hypothesis), known)
     start = evaluated(context.measure, context.tuning, near.deviations, near.hypothesis)
     found = fit(context.measure, context.tuning, start, short_form.repeated(known), WHOLE_ROUNDS, context.map_)
     # What one period leaves open may run away on the whole.
-    return _plainest(context, found) if found.cost <= fitted.cost else _settled(context, fitted)[0]
+    return (_plainest(context, found) if found.cost <= fitted.cost else _settled(context, fitted)[0]), known
 
 
-def _settled(context: SearchContext, fitted: Fitted) -> tuple[Fitted, Sensitivity]:
+def _settled(context: SearchContext, fitted: Fitted, known: Sensitivity | None = None) -> tuple[Fitted, Sensitivity]:
     """With sensitivities recomputed; where more than noise is left, also from the calibration, because re-tuning may
     have absorbed the missing effect and ended in another minimum."""
-    here, known = _refined_from(context, fitted, None)
+    # A gain of all that there is counts as the one before: what is shared may have to be computed anew.
+    here, known = _refined_from(context, fitted, known, 1.0)
     here, known = _of_alike(context, here, known)
     if context.candidate(here).score.worst_channel <= NO_SECOND_START:
         return here, known
@@ -91,12 +130,15 @@ def _plainest(context: SearchContext, fitted: Fitted) -> Fitted:
     return best
 
 
-def _refined_from(context: SearchContext, fitted: Fitted, known: Sensitivity | None) -> tuple[Fitted, Sensitivity]:
-    """known: sensitivity at another point of the same hypothesis; None = not computed yet."""
+def _refined_from(
+    context: SearchContext, fitted: Fitted, known: Sensitivity | None, before: float = np.inf
+) -> tuple[Fitted, Sensitivity]:
+    """known: sensitivity at another point of the same hypothesis, or of one that moves the device nearly alike; None =
+    not computed yet. before: share that was gained last; infinite = one fit is enough, but for what is not computed."""
     best = fitted
     complete = known is not None
+    before = before if complete else np.inf
     there = known or sensitivity_at(context, best.deviations, best.hypothesis)
-    before = np.inf
     for _ in range(MOST_REFRESHED):
         better = fit(context.measure, context.tuning, best, there, SECOND_ROUNDS, context.map_)
         gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
