@@ -155,8 +155,8 @@ def stub(vendor, compiled_stub, tmp_path, monkeypatch):
     monkeypatch.setenv("FDSDK", str(tmp_path / "sdk"))
     monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "none.toml"))
     vendor.accept("omega.3")
-    with vendor.copied(compiled_stub, tmp_path / "sdk") as one:
-        yield one
+    with vendor.copied(compiled_stub, tmp_path / "sdk") as device:
+        yield device
 
 
 @pytest.fixture

@@ -80,7 +80,9 @@ def diagnosed(recording: Recording, given: MechanicalModel) -> Findings:
     splits = ("coulomb_friction", "stribeck_friction")
     document = replace(
         found.diagnosis,
-        effects=tuple(replace(one, share=0.9, probability=0.97, rivals=(rival,)) for one in found.diagnosis.effects),
+        effects=tuple(
+            replace(effect, share=0.9, probability=0.97, rivals=(rival,)) for effect in found.diagnosis.effects
+        ),
         next_experiment=NextExperiment("hapteq record slow.toml", splits, "slow motion"),
     )
     return replace(found, diagnosis=document, black_box=BlackBox("ARX", 12, 0.05, 0.02), remarks=("A remark.",))

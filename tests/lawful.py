@@ -36,7 +36,7 @@ def recorded(laws: tuple[Law, ...], seed: int, noise: float = 1.0, plan=PLAN) ->
         segments.append(Segment(at, at + len(wave), kind, level, period, role))
         at += len(wave) + 300
     command = np.vstack(blocks)
-    effects = [PlacedEffect(law_effect(one, Channels(("fx",), ("ax",))), (0,), law_values(one)) for one in laws]
+    effects = [PlacedEffect(law_effect(each, Channels(("fx",), ("ax",))), (0,), law_values(each)) for each in laws]
     model = device(1)
     played = simulate_mechanism(model, command, RATE_HZ, effects)
 

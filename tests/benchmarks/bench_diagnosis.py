@@ -37,7 +37,7 @@ class Counted:
     items: int = 0
 
     def __call__(self, function, *items):
-        whole = [list(one) for one in items]
+        whole = [list(item) for item in items]
         self.items += len(whole[0])
         return self.map_(function, *whole)
 
@@ -58,7 +58,7 @@ def diagnosed(case: Case, without: tuple[str, ...] = (), times: int = 1) -> Take
     found = diagnose([case.recording] * times, case.model, settings, counted, lambda what, share: None)
     taken = time.perf_counter() - wall, processor_s() - cpu
     said = found.diagnosis
-    return Taken(*taken, counted.items, f"{said.verdict} {' '.join(one.effect for one in said.effects)}")
+    return Taken(*taken, counted.items, f"{said.verdict} {' '.join(effect.effect for effect in said.effects)}")
 
 
 def lsim_s(case: Case) -> float:
@@ -101,7 +101,7 @@ def concealed(number: int) -> Case:
 
 
 def main() -> int:
-    diagnosed(draw_case(SEED, ["coulomb_friction"]), tuple(one.name for one in CATALOGUE[3:]))
+    diagnosed(draw_case(SEED, ["coulomb_friction"]), tuple(each.name for each in CATALOGUE[3:]))
     ratios, walls, last = [], [], None
     for number, effects in enumerate(EFFECTS):
         case = concealed(number)
@@ -116,7 +116,7 @@ def main() -> int:
     report(f"wall time, median: {np.median(walls):.1f} s (aim {AIMED_S:g} s)")
     good = float(np.median(ratios)) >= NEEDED
     good &= grows("samples", last, diagnosed(case, times=2), 2.0)
-    half = tuple(one.name for one in CATALOGUE[::2] if one.name not in effects)
+    half = tuple(each.name for each in CATALOGUE[::2] if each.name not in effects)
     fewer = diagnosed(case, half)
     return int(not (grows("hypotheses", fewer, last, last.tried / fewer.tried) and good))
 

@@ -99,7 +99,7 @@ def diagnosed(checkout: Path, files: list[str], out: Path) -> Taken:
         raise SystemExit(f"{checkout}: {done.stderr[-2000:]}")
     cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     found = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
-    return Taken(cpu_s, wall_s, f"{found['verdict']} {' '.join(one['effect'] for one in found['effects'])}".strip())
+    return Taken(cpu_s, wall_s, f"{found['verdict']} {' '.join(each['effect'] for each in found['effects'])}".strip())
 
 
 def compared(ours: Path, theirs: Path, folder: Path) -> float:
@@ -113,8 +113,8 @@ def compared(ours: Path, theirs: Path, folder: Path) -> float:
             taken.append(diagnosed(checkout, files, folder / f"{side}{number}"))
         ratios.append(taken[0].cpu_s / taken[1].cpu_s)
         aim = AIMS_S.get(name, THREE_AXES_S)
-        for side, one in zip(("ours", "before"), taken, strict=True):
-            report(f"{name}, {side}: {one.cpu_s:.1f} CPU s, {one.wall_s:.1f} s (aim {aim:g} s): {one.said}")
+        for side, each in zip(("ours", "before"), taken, strict=True):
+            report(f"{name}, {side}: {each.cpu_s:.1f} CPU s, {each.wall_s:.1f} s (aim {aim:g} s): {each.said}")
         report(f"{name}: {ratios[-1]:.2f} times as long as before")
     return float(np.median(ratios))
 

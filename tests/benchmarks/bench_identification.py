@@ -100,7 +100,7 @@ def peer_rows(peers: list[Peer], data: list[Path], quick: bool) -> list[Row]:
 
 
 def estimate_row(data: list[Data]) -> Row:
-    return Row("the raw estimate, taken for a model", [score_of_estimate(one) for one in data])
+    return Row("the raw estimate, taken for a model", [score_of_estimate(each) for each in data])
 
 
 def compared(ours: Row, rows: list[Row]) -> None:
@@ -126,10 +126,10 @@ def compared(ours: Row, rows: list[Row]) -> None:
 def written(experiment: Experiment, seeds: int, folder: Path) -> tuple[list[Data], list[Path]]:
     data, paths = [], []
     for seed in range(seeds):
-        one = experiment.data(seed)
+        drawn = experiment.data(seed)
         paths.append(folder / f"{experiment.sweep_hz[1]:.0f}_{experiment.order}_{seed}.npz")
-        write_data(one, paths[-1])
-        data.append(one)
+        write_data(drawn, paths[-1])
+        data.append(drawn)
     return data, paths
 
 
@@ -151,7 +151,7 @@ def narrow(peers: list[Peer], seeds: int, quick: bool, folder: Path) -> bool:
         compared(ours, peer_rows(peers, paths, quick))
     if not ours.usable:
         return False
-    measured = {what: max(getattr(one, what) for one in ours.scores) for what in ("held_out", "worst_line", "cpu_s")}
+    measured = {what: max(getattr(each, what) for each in ours.scores) for what in ("held_out", "worst_line", "cpu_s")}
     report(
         f"hapteq, worst seed: held out {percent(measured['held_out'])} (bar {percent(HELD_OUT)}), line "
         f"{percent(measured['worst_line'])} (bar {percent(WORST_LINE)}), {measured['cpu_s']:.1f} CPU s (bar {CPU_S:g})"
@@ -167,8 +167,8 @@ def wide(seeds: int, folder: Path) -> bool:
     model = ours_on(WIDE_MODEL, seeds, folder, "order 40, 5 to 450 Hz")
     if not (swept.usable and model.usable):
         return False
-    rms = max(one.rms[0] for one in swept.scores)
-    low, high = (max(one.rms[band] for one in model.scores) for band in (0, 1))
+    rms = max(each.rms[0] for each in swept.scores)
+    low, high = (max(each.rms[band] for each in model.scores) for band in (0, 1))
     report(
         f"hapteq, worst seed: rms {percent(rms)} (bar {percent(WIDE_SWEEP_RMS)}); of the wide band "
         f"{percent(low)} in 5 to 35 Hz and {percent(high)} in 35 to 450 Hz "

@@ -180,7 +180,11 @@ def example(name: str, model: MechanicalModel, **changes: float) -> tuple[Placed
 
 
 def absent(name: str, model: MechanicalModel) -> tuple[PlacedEffect, ...]:
-    return example(name, model, **{one.name: one.none for one in EFFECTS[name].parameters if one.none is not None})
+    return example(
+        name,
+        model,
+        **{parameter.name: parameter.none for parameter in EFFECTS[name].parameters if parameter.none is not None},
+    )
 
 
 @dataclass(frozen=True, slots=True)

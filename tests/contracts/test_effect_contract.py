@@ -170,7 +170,7 @@ def test_more_forces_than_can_be_played_are_refused(bench):
     model = bench.one_axis()
     names = ("coulomb_friction", "quadratic_damping", "hardening_stiffness", "asymmetric_stiffness", "constant_force",
              "cogging", "end_stop")  # fmt: skip
-    many = tuple(one for name in names for one in bench.example(name, model))
+    many = tuple(each for name in names for each in bench.example(name, model))
     with pytest.raises(ValueError, match="7 different forces act at once; at most 6 can be played"):
         simulate_mechanism(model, np.zeros((9, 1)), 1000.0, many)
 

@@ -33,21 +33,21 @@ def bench(module_at) -> ModuleType:
 def refined(bench, model, name, start, sites, seen) -> dict[str, float]:
     """By least squares of the simulated response and position, from a start; numbers move as in a diagnosis."""
     numbers = EFFECTS[name].parameters
-    unit = [abs(start[one.name]) or one.step if one.scale == "signed" else one.step for one in numbers]
+    unit = [abs(start[number.name]) or number.step if number.scale == "signed" else number.step for number in numbers]
 
     def values(point):
-        return {
-            one.name: float(np.clip(start[one.name] * np.exp(x) if one.scale == "log" else start[one.name] + x * size,
-                                    one.lower, one.upper))
-            for one, x, size in zip(numbers, point, unit, strict=True)
-        }  # fmt: skip
+        moved = {
+            number.name: start[number.name] * np.exp(x) if number.scale == "log" else start[number.name] + x * size
+            for number, x, size in zip(numbers, point, unit, strict=True)
+        }
+        return {number.name: float(np.clip(moved[number.name], number.lower, number.upper)) for number in numbers}
 
     def left(point):
         played = simulate_mechanism(model, seen.command, bench.RATE_HZ, bench.placed(name, values(point), *sites))
         response = (seen.response - played.response) / bench.NOISE_MPS2
         return np.hstack([response, (seen.position - played.position) / bench.NOISE_M]).ravel()
 
-    steps = np.array([one.step if one.scale != "linear" else 1.0 for one in numbers])
+    steps = np.array([number.step if number.scale != "linear" else 1.0 for number in numbers])
 
     def slopes(point):
         moves = steps * np.eye(len(numbers))
@@ -107,7 +107,7 @@ def test_a_loose_joint_starts_within_a_factor_of_three(bench):
 def test_where_nothing_is_missing_a_start_has_no_strength(name, bench):
     model = bench.one_axis()
     seen = bench.measured(model, (), bench.commands(1, periods=1))
-    strength = next(one.name for one in EFFECTS[name].parameters if one.none is not None)
+    strength = next(parameter.name for parameter in EFFECTS[name].parameters if parameter.none is not None)
     starts = started(bench, model, name, (0,), seen)
     assert all(start[strength] < 0.05 * bench.EXAMPLES[name][strength] for start in starts)
 

@@ -54,10 +54,10 @@ def test_the_peak_is_the_one_asked_for_and_not_far_above_the_rest(lines, axes):
 
 def test_a_seed_gives_the_same_excitation_however_many_are_asked_for(lines):
     three = multisines(lines, PERIOD, 1.0, axes=1, realisations=3, seed=3)
-    (one,) = multisines(lines, PERIOD, 1.0, axes=1, realisations=1, seed=3)
-    assert np.array_equal(three[0], one)
+    (single,) = multisines(lines, PERIOD, 1.0, axes=1, realisations=1, seed=3)
+    assert np.array_equal(three[0], single)
     assert not np.allclose(three[0], three[1])
-    assert not np.allclose(one, multisines(lines, PERIOD, 1.0, axes=1, realisations=1, seed=4)[0])
+    assert not np.allclose(single, multisines(lines, PERIOD, 1.0, axes=1, realisations=1, seed=4)[0])
 
 
 def test_three_realisations_on_three_axes_are_orthogonal_at_every_line(lines):

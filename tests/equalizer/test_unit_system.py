@@ -12,8 +12,8 @@ MOTOR = UnitSystem("A", "rad")
 
 
 def body(gain: float = 1.0) -> MechanicalModel:
-    one = np.eye(1)
-    return MechanicalModel("m", "angle", one, one, one, gain * one, one, rotational=True)
+    identity = np.eye(1)
+    return MechanicalModel("m", "angle", identity, identity, identity, gain * identity, identity, rotational=True)
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ def closed_loop(handle, considered):
 
 
 def named_right(diagnosis):
-    assert [(one.effect, one.axis) for one in diagnosis.effects] == [("coulomb_friction", "y")]
+    assert [(effect.effect, effect.axis) for effect in diagnosis.effects] == [("coulomb_friction", "y")]
     assert diagnosis.effects[0].parameters["level"].value == pytest.approx(0.15, rel=0.08)
     assert diagnosis.fit.test.after < 0.25 * diagnosis.fit.test.retuned
 

@@ -64,7 +64,7 @@ def test_what_is_missing_is_named_with_its_number(short, concealed, main):
     ((name, values),) = concealed.items()
     found = found_in(short(SEED, concealed), without=SLOW if name == "coulomb_friction" else ())
     assert found.verdict == "explained"
-    assert [(one.effect, one.axis) for one in found.effects] == [(name, "x")]
+    assert [(effect.effect, effect.axis) for effect in found.effects] == [(name, "x")]
     assert found.effects[0].parameters[main].value == pytest.approx(values[main], rel=0.01)
     assert found.fit.test.after < 1.25 * found.fit.test.noise < 0.5 * found.fit.test.retuned
 
@@ -89,7 +89,7 @@ def test_what_no_catalogue_holds_is_never_explained(short):
 def test_without_the_true_effect_no_other_one_explains(short):
     found = found_in(short(SEED, SATURATION), without=["force_saturation"])
     assert found.verdict in ("unexplained", "partly_explained")
-    assert all(one.effect != "force_saturation" for one in found.effects)
+    assert all(effect.effect != "force_saturation" for effect in found.effects)
 
 
 def test_commands_in_another_order_explain_nothing(short):
@@ -107,7 +107,7 @@ def with_command(recording: Recording, samples: np.ndarray) -> Recording:
 
 def test_the_axis_that_rubs_is_named(short):
     found = found_in(short(SEED, FRICTION, axis=2, axes=(0, 2)), without=all_but(*AMONG))
-    assert [(one.effect, one.axis) for one in found.effects] == [("coulomb_friction", "z")]
+    assert [(effect.effect, effect.axis) for effect in found.effects] == [("coulomb_friction", "z")]
 
 
 @pytest.mark.slow
@@ -119,7 +119,7 @@ def test_labelled_cases_are_named_right(shared, number):
     recording = read_recording(folder / f"open-{number:02d}.h5")
     model = read_mechanical_model(folder / f"open-{number:02d}.toml")
     found = diagnose([recording], model, DiagnosisSettings(), forked_map, quiet).diagnosis
-    named = {(one.effect, one.axis) for one in found.effects}
-    assert {name for name, _ in named} == {one["effect"] for one in truth}
-    assert {(name, axis) for name, axis in named if axis} <= {(one["effect"], one["axis"]) for one in truth}
+    named = {(effect.effect, effect.axis) for effect in found.effects}
+    assert {name for name, _ in named} == {each["effect"] for each in truth}
+    assert {(name, axis) for name, axis in named if axis} <= {(each["effect"], each["axis"]) for each in truth}
     assert found.verdict == ("explained" if truth else "parameters")

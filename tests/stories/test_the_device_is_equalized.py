@@ -91,8 +91,8 @@ def test_the_linear_device_is_flat_and_uncoupled(hand):
 @pytest.mark.parametrize("hand", [False, True], ids=["alone", "in a hand"])
 def test_whatever_the_noise(hand):
     found = [equalized(hand, seed) for seed in range(2, 8)]
-    flatness = sorted(one.flatness_db for one in found)
-    coupling = sorted(one.coupling_db for one in found)
+    flatness = sorted(each.flatness_db for each in found)
+    coupling = sorted(each.coupling_db for each in found)
     print(f"flatness median {flatness[3]:.3f} worst {flatness[-1]:.3f} dB; ", end="")  # noqa: T201
     print(f"coupling median {coupling[3]:.1f} worst {coupling[-1]:.1f} dB")  # noqa: T201
     assert flatness[-1] <= 0.1

@@ -39,7 +39,7 @@ def test_a_share_is_read_as_per_cent_with_its_interval():
 
 
 def test_a_share_has_two_digits_and_no_powers_of_ten():
-    assert [share_text(one) for one in (0.0123, 0.4, 0.994, 0.999, 1.0, 25.4)] == [
+    assert [share_text(each) for each in (0.0123, 0.4, 0.994, 0.999, 1.0, 25.4)] == [
         "1.2 %", "40 %", "99 %", "100 %", "100 %", "2540 %",
     ]  # fmt: skip
 

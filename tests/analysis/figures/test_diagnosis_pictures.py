@@ -36,7 +36,7 @@ def test_a_diagnosis_has_every_picture_and_each_is_told_in_words(friction_pictur
     for picture in friction_pictures:
         root = ElementTree.fromstring(picture_svg(picture))
         labels = root.attrib["aria-labelledby"].split()
-        told = {one.attrib["id"]: one.text for one in root.iter() if one.attrib.get("id") in labels}
+        told = {each.attrib["id"]: each.text for each in root.iter() if each.attrib.get("id") in labels}
         assert told[labels[0]] == picture.title
         assert told[labels[1]] == picture.alternative
 
@@ -53,7 +53,7 @@ def test_the_map_has_a_row_of_panels_per_level_and_a_column_per_stage():
     grid = [(level, low, output) for level in (0.5, 1.5, 3.0) for low in (4.0, 8.0) for output in ("ax", "ay", "az")]
     cells = tuple(cell(output, amplitude=level, low_hz=low) for level, low, output in grid)
     axes = draw_mismatch_map({"before": cells, "retuned": cells, "after": cells}, "fx", "N").axes[0]
-    panels = next(one for one in axes.collections if isinstance(one, PolyCollection))
+    panels = next(collection for collection in axes.collections if isinstance(collection, PolyCollection))
     assert len(panels.get_paths()) == 9
     assert around(axes) == ["as given", "re-tuned", "with what was found", "at 0.5 N", "at 1.5 N", "at 3 N"]
     assert [label.get_text() for label in axes.get_xticklabels()] == ["4", "8"] * 3
@@ -103,7 +103,7 @@ def test_what_is_significant_is_framed_and_what_is_more_than_noise_has_its_numbe
         cell(output="az", in_noise=2400.0),
     )
     axes = draw_mismatch_map({"before": cells}, "fx", "N").axes[0]
-    frames = next(one for one in axes.collections if isinstance(one, LineCollection))
+    frames = next(collection for collection in axes.collections if isinstance(collection, LineCollection))
     assert len(frames.get_segments()) == 2
     assert cells_written(axes) == ["5", "1.2", "2.4k"]
     assert [label.get_text() for label in axes.get_yticklabels()] == ["ax", "ay", "y", "az"]
@@ -118,7 +118,7 @@ def test_many_levels_are_drawn_in_groups_of_which_the_worst_is_shown():
 
 def test_each_input_has_a_map_and_all_but_the_worst_are_folded():
     pictures = mismatch_map_pictures({"before": (cell(), cell(input_="fy", in_noise=50.0))})
-    assert [(one.title[-2:], one.folded) for one in pictures] == [("fy", False), ("fx", True)]
+    assert [(picture.title[-2:], picture.folded) for picture in pictures] == [("fy", False), ("fx", True)]
     assert "1 of 1 cells differ significantly; the worst is ax at 8 to 16 Hz" in pictures[0].alternative
 
 
@@ -170,19 +170,19 @@ def test_errors_of_every_channel_stand_beside_the_noise_line(friction_found):
 
 
 def test_the_remainder_lies_on_the_noise_where_all_is_explained(friction_found):
-    for one in remainder_spectra(friction_found.courses, friction_found.floor):
-        over = one.after / one.noise
+    for each in remainder_spectra(friction_found.courses, friction_found.floor):
+        over = each.after / each.noise
         assert np.median(over) == pytest.approx(1.0, abs=0.15)
-        assert np.max(one.retuned / one.noise) > 10
+        assert np.max(each.retuned / each.noise) > 10
 
 
 def test_a_spectrum_of_white_noise_has_the_density_of_its_rms(friction_found):
     course = friction_found.courses[0]
     noise = np.random.default_rng(1).standard_normal(course.measured.shape)
     white = replace(course, measured=course.after + noise)
-    one = remainder_spectra((white,), None)[0]
-    assert one.after[-10:].mean() == pytest.approx(np.sqrt(2 / course.sample_rate_hz), rel=0.05)
-    assert np.isnan(one.noise).all()
+    spectrum = remainder_spectra((white,), None)[0]
+    assert spectrum.after[-10:].mean() == pytest.approx(np.sqrt(2 / course.sample_rate_hz), rel=0.05)
+    assert np.isnan(spectrum.noise).all()
 
 
 def test_without_held_out_data_nothing_is_drawn(friction_found):
@@ -195,7 +195,7 @@ def test_without_held_out_data_nothing_is_drawn(friction_found):
 
 def test_rivals_stand_below_the_best_with_their_errors(friction_found):
     tried = tried_explanations(friction_found.explanation.rounds[0], ("x",))
-    assert [one.words for one in tried] == ["dry friction", "a dead band of the force"]
+    assert [each.words for each in tried] == ["dry friction", "a dead band of the force"]
     assert tried[0].seen < 1.1 < tried[1].seen
     axes = draw_rivals(tried, replace(tried[1], words="re-tuned")).axes[0]
     assert written(axes.figure) == ["noise", "re-tuned"]
@@ -205,7 +205,7 @@ def test_rivals_stand_below_the_best_with_their_errors(friction_found):
 def test_the_one_that_was_chosen_stands_on_top_even_where_another_has_less_error(friction_found):
     best, worse = friction_found.explanation.rounds[0]
     tried = tried_explanations((worse, best), ("x",))
-    assert [one.words for one in tried] == ["a dead band of the force", "dry friction"]
+    assert [each.words for each in tried] == ["a dead band of the force", "dry friction"]
 
 
 def test_a_round_that_brought_nothing_is_folded_and_says_so(friction_found):

@@ -50,8 +50,8 @@ def test_the_interval_is_wilsons():
 
 def test_void_and_open_presentations_count_for_nothing(catch):
     trials = catch(0.0)
-    one = next(trial for trial in trials if trial.phase.value == "catch")
-    void = replace(one, attempt=0, answer=None, correct=None, status=TrialStatus.SPOILED)
+    shown = next(trial for trial in trials if trial.phase.value == "catch")
+    void = replace(shown, attempt=0, answer=None, correct=None, status=TrialStatus.SPOILED)
     assert catch_tallies([*trials, void]) == catch_tallies(trials)
 
 

@@ -15,7 +15,7 @@ TRIAL = Trial(
 
 def test_what_arrives_as_wanted_is_no_warning():
     found = deliveries([TRIAL, replace(TRIAL, direction_shown=2, answer=2, delivered_mps2=2.9)])
-    assert [(one.frequency_hz, one.trials) for one in found] == [(25.0, 2)]
+    assert [(each.frequency_hz, each.trials) for each in found] == [(25.0, 2)]
     assert found[0].along == pytest.approx((1.0, 2.9 / 3.0))
     assert delivery_warning(found) == ""
 
@@ -36,8 +36,8 @@ def test_what_does_not_is_named_with_its_frequency(changes, said):
 def test_the_median_counts_and_void_trials_do_not():
     odd = replace(TRIAL, delivered_mps2=0.1)
     void = replace(TRIAL, delivered_mps2=0.2, status=TrialStatus.SPOILED)
-    (one,) = deliveries([TRIAL, TRIAL, odd, void, void, void])
-    assert one.trials == 3 and one.along == (1.0, None)
+    (delivery,) = deliveries([TRIAL, TRIAL, odd, void, void, void])
+    assert delivery.trials == 3 and delivery.along == (1.0, None)
 
 
 def test_commanded_forces_have_nothing_to_compare():

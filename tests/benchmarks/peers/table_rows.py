@@ -15,16 +15,16 @@ class Row:
     assisted: bool = False
 
     def median(self, what: str) -> float:
-        return statistics.median(getattr(one, what) for one in self.scores)
+        return statistics.median(getattr(score, what) for score in self.scores)
 
     @property
     def rms(self) -> float:
-        return statistics.median(one.rms[0] for one in self.scores)
+        return statistics.median(score.rms[0] for score in self.scores)
 
     @property
     def usable(self) -> bool:
         """Stable each time: can be simulated, and so drive a device."""
-        return bool(self.scores) and not self.failures and all(one.stable for one in self.scores)
+        return bool(self.scores) and not self.failures and all(score.stable for score in self.scores)
 
 
 def report(line: str) -> None:
@@ -39,16 +39,16 @@ HEAD = f"{'':54}" + "".join(f"{name:>9}" for name in COLUMNS)
 def shown(row: Row) -> None:
     """Medians over seeds, and the worst of them; the largest pole of all, the worst line of all."""
     if row.scores:
-        held_out = [one.held_out for one in row.scores] if row.usable else [float("nan")]
+        held_out = [score.held_out for score in row.scores] if row.usable else [float("nan")]
         cells = (
             str(len(row.scores)),
             str(row.scores[0].states or "-"),
             f"{row.median('cpu_s'):.2f}",
-            f"{sum(one.stable for one in row.scores)}/{len(row.scores)}" if row.scores[0].states else "-",
-            f"{max(one.radius for one in row.scores):.5f}" if row.scores[0].states else "-",
+            f"{sum(score.stable for score in row.scores)}/{len(row.scores)}" if row.scores[0].states else "-",
+            f"{max(score.radius for score in row.scores):.5f}" if row.scores[0].states else "-",
             percent(row.rms),
-            percent(max(one.rms[0] for one in row.scores)),
-            percent(max(one.worst_line for one in row.scores)),
+            percent(max(score.rms[0] for score in row.scores)),
+            percent(max(score.worst_line for score in row.scores)),
             percent(statistics.median(held_out)),
             percent(max(held_out)),
         )

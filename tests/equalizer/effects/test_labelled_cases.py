@@ -44,7 +44,7 @@ def test_with_the_effect_that_it_names_a_case_is_explained_to_the_noise(shared, 
     retuned = fit(measure, tuning, nominal, known, 2)
     spread = "one" if truth["axis"] else "all"
     suggested = candidates([effect], gather_evidence(measure, tuning, retuned)[0])
-    hypothesis = next(one for one in suggested if one.claims[0].spread == spread)
+    hypothesis = next(each for each in suggested if each.claims[0].spread == spread)
     # From the calibration on: the re-tuned numbers have already bent themselves to what the effect does.
     found = evaluated(measure, tuning, nominal.deviations, hypothesis)
     for _ in range(2):

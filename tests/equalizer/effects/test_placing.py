@@ -47,7 +47,7 @@ def test_what_was_fitted_is_written_and_read_back_the_same(bench, effect):
         effect, (1,) if one else (0, 1, 2), values
     )
     model = replace(bench.three_axes(), effects=model_effects((fitted,), INPUTS, OUTPUTS))
-    assert [one.axis for one in model.effects] == (["y"] if one else [None])
+    assert [each.axis for each in model.effects] == (["y"] if one else [None])
     (again,) = placed_effects(parse_mechanical_model(mechanical_model_toml(model)), INPUTS, OUTPUTS)
     assert again.effect is effect
     assert again.sites == fitted.sites

@@ -45,11 +45,11 @@ def trials(frequency_hz: float = 15.0, level_n: float = 0.6, seed: int = 1) -> l
 
 
 def share_right(observer: Observer, felt: list[Felt], seed: int = 1) -> float:
-    return float(np.mean([observer.reply(one, seed).answer == one.direction_shown for one in felt]))
+    return float(np.mean([observer.reply(each, seed).answer == each.direction_shown for each in felt]))
 
 
 def share_of_1(observer: Observer, felt: list[Felt], seed: int = 1) -> float:
-    return float(np.mean([observer.reply(one, seed).answer == 1 for one in felt]))
+    return float(np.mean([observer.reply(each, seed).answer == 1 for each in felt]))
 
 
 @pytest.mark.parametrize(("frequency_hz", "threshold_n"), TYPICAL_THRESHOLDS_N)
@@ -194,8 +194,8 @@ def test_a_drift_raises_the_detection_threshold_too():
 def test_a_catch_trial_is_answered_as_any_other_trial_at_its_level(name):
     observer = observer_named(name, 1)
     felt = trials(level_n=3.0)[:200]
-    caught = [observer.reply(replace(one, phase=Phase.CATCH), 1) for one in felt]
-    assert caught == [observer.reply(one, 1) for one in felt]
+    caught = [observer.reply(replace(each, phase=Phase.CATCH), 1) for each in felt]
+    assert caught == [observer.reply(each, 1) for each in felt]
 
 
 def test_the_scripted_observer_looks_at_run_and_trial_alone():
@@ -206,7 +206,7 @@ def test_the_scripted_observer_looks_at_run_and_trial_alone():
             replace(FELT, trial=t, attempt=attempt, level_n=level_n, direction_shown=direction, trials_before=9)
             for t in range(40)
         ]
-        return [scripted.reply(one, seed).answer == direction for one in felt]
+        return [scripted.reply(each, seed).answer == direction for each in felt]
 
     script = [letter == "1" for letter in "1111110111011100111111011100111011101111"]
     assert right(1, 0, 1.0, 1) == script
@@ -216,8 +216,8 @@ def test_the_scripted_observer_looks_at_run_and_trial_alone():
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_the_same_trial_gets_the_same_reply_in_any_order_of_asking(name):
     felt = trials()[:200]
-    forward = [observer_named(name, 5).reply(one, 5) for one in felt]
-    backward = [observer_named(name, 5).reply(one, 5) for one in reversed(felt)]
+    forward = [observer_named(name, 5).reply(each, 5) for each in felt]
+    backward = [observer_named(name, 5).reply(each, 5) for each in reversed(felt)]
     assert forward == backward[::-1]
     assert all(reply.answer in (1, 2) for reply in forward)
 
@@ -225,14 +225,14 @@ def test_the_same_trial_gets_the_same_reply_in_any_order_of_asking(name):
 @pytest.mark.parametrize("change", [{"run": 1}, {"attempt": 1}])
 def test_another_key_is_other_luck(change):
     guesser = observer_named("guesser", 0)
-    here = [guesser.reply(one, 1).answer for one in trials()[:200]]
-    there = [guesser.reply(replace(one, **change), 1).answer for one in trials()[:200]]
+    here = [guesser.reply(trial, 1).answer for trial in trials()[:200]]
+    there = [guesser.reply(replace(trial, **change), 1).answer for trial in trials()[:200]]
     assert abs(np.corrcoef(here, there)[0, 1]) < 4 / np.sqrt(200)
-    assert here != [guesser.reply(one, 2).answer for one in trials()[:200]]
+    assert here != [guesser.reply(trial, 2).answer for trial in trials()[:200]]
 
 
 def test_response_times_are_those_of_people_and_say_nothing_about_the_answer():
-    replies = [observer_named("guesser", 0).reply(one, 1) for one in trials()]
+    replies = [observer_named("guesser", 0).reply(trial, 1) for trial in trials()]
     times_s = np.array([reply.response_time_s for reply in replies])
     assert np.mean((times_s > 1.2) & (times_s < 2.5)) == pytest.approx(0.95, abs=0.015)
     assert np.median(times_s) == pytest.approx(3**0.5, abs=0.03)

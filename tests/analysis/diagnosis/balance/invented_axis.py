@@ -39,7 +39,7 @@ class Physics:
     second_ratio: float = 0.05
 
     def numbers(self) -> np.ndarray:
-        return np.array([getattr(self, one.name) for one in fields(self)])
+        return np.array([getattr(self, field.name) for field in fields(self)])
 
 
 @njit

@@ -103,7 +103,7 @@ def test_every_law_along_an_imposed_motion(axes, balance_of, effect):
 def test_of_two_axes_each_has_its_own(axes, balance_of):
     rubbing = axes.recorded(axes.Physics(coulomb=1.0), seed=1)
     stiff = axes.recorded(axes.Physics(cubic=3e4), seed=2)
-    both = [np.hstack([getattr(one, side).samples for one in (rubbing, stiff)]) for side in ("command", "response")]
+    both = [np.hstack([getattr(each, side).samples for each in (rubbing, stiff)]) for side in ("command", "response")]
     first, second = balance_of(axes.recording(*both, rubbing.sample_rate_hz))
     check(first, "coulomb_friction")
     check(second, "hardening_stiffness", axis=1)

@@ -50,7 +50,7 @@ def test_every_estimator_sees_whole_courses_of_a_recording_with_a_gap(made, gapp
 def test_friction_is_named_in_spite_of_a_gap(made, gapped):
     others = tuple(effect.name for effect in CATALOGUE if effect.name not in TRIED)
     found = diagnose([gapped], made.device(1), DiagnosisSettings(without=others), map, lambda said, share: None)
-    assert [(one.effect, one.axis) for one in found.diagnosis.effects] == [("coulomb_friction", "x")]
+    assert [(effect.effect, effect.axis) for effect in found.diagnosis.effects] == [("coulomb_friction", "x")]
     assert found.diagnosis.effects[0].parameters["level"].value == pytest.approx(made.FRICTION_N, rel=0.03)
 
 

@@ -36,8 +36,8 @@ def recording(samples=5000, axes=1, rate_hz=RATE_HZ, units=("N", "m/s^2"), seed=
     )
 
 
-def with_samples(one: Recording, side: str, samples) -> Recording:
-    return replace(one, **{side: replace(getattr(one, side), samples=samples)})
+def with_samples(given: Recording, side: str, samples) -> Recording:
+    return replace(given, **{side: replace(getattr(given, side), samples=samples)})
 
 
 def refusal(check, *arguments) -> str:

@@ -78,9 +78,9 @@ def drifting() -> Recording:
     return recording(9.0 * course(12.0, 5), controlled=False)
 
 
-def found(one: Recording, *names: str):
+def found(given: Recording, *names: str):
     others = tuple(effect.name for effect in CATALOGUE if effect.name not in names)
-    return diagnose([one], model(), DiagnosisSettings(without=others), map, lambda said, share: None)
+    return diagnose([given], model(), DiagnosisSettings(without=others), map, lambda said, share: None)
 
 
 def test_a_controlled_plant_that_does_not_hold_itself_is_compared_by_forces(held: Recording) -> None:
@@ -152,11 +152,11 @@ def test_a_state_is_fitted_even_where_the_windows_begin_wrong(drifting: Recordin
 
 
 def test_what_decisions_see_does_not_hang_on_sealed_samples(held: Recording, drifting: Recording) -> None:
-    for one in (held, drifting):
-        spoiled = np.array(one.response.samples)
-        spoiled[one.segments[1].start :] += 0.5
-        other = replace(one, response=replace(one.response, samples=spoiled))
-        first, second = (measure_of([each], model()).measure for each in (one, other))
+    for item in (held, drifting):
+        spoiled = np.array(item.response.samples)
+        spoiled[item.segments[1].start :] += 0.5
+        other = replace(item, response=replace(item.response, samples=spoiled))
+        first, second = (measure_of([each], model()).measure for each in (item, other))
         second = replace(second, unit=first.unit, noise=first.noise)
         if first.name == "predicted force":
             second = replace(second, band_hz=first.band_hz)
@@ -182,8 +182,8 @@ def test_a_weaker_actuator_does_not_make_errors_smaller(held: Recording) -> None
 
 
 def test_the_rule_keeps_free_simulation_for_plants_that_hold_themselves(held: Recording, drifting: Recording) -> None:
-    for one in (held, drifting):
-        assert choose_measure(observed_parts([one], 1), model(stiffness=400.0)).measure == "free simulation"
+    for each in (held, drifting):
+        assert choose_measure(observed_parts([each], 1), model(stiffness=400.0)).measure == "free simulation"
 
 
 def test_the_rule_takes_forces_where_a_model_grows_within_a_window(drifting: Recording) -> None:
@@ -291,11 +291,11 @@ def test_a_rigid_model_is_fitted_to_the_forces_under_a_controller() -> None:
 
 
 def test_friction_is_named_beside_a_model_that_was_fitted_first(held: Recording) -> None:
-    others = tuple(one.name for one in CATALOGUE if one.name not in ("coulomb_friction", "transport_delay"))
+    others = tuple(each.name for each in CATALOGUE if each.name not in ("coulomb_friction", "transport_delay"))
     fitted = rigid_model([held], "fitted")
     assert fitted.damping[0, 0] > 1.5 * DRAG
     findings = diagnose([held], fitted, DiagnosisSettings(without=others), map, lambda said, share: None)
-    assert [one.effect for one in findings.diagnosis.effects] == ["coulomb_friction"]
+    assert [effect.effect for effect in findings.diagnosis.effects] == ["coulomb_friction"]
     assert findings.named[0].values["level"] == pytest.approx(LEVEL, rel=0.05)
 
 

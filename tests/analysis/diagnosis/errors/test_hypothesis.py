@@ -36,7 +36,7 @@ def test_a_step_never_leaves_what_is_allowed(effect):
 def test_every_axis_has_numbers_of_its_own_where_each_is_claimed():
     drag = EFFECTS["viscous_damping"]
     each = claimed(Claim(drag, "each", (0, 1)), [{p.name: v for p in drag.parameters} for v in (0.5, 0.25)])
-    assert [one.sites for one in each.placed()] == [(0,), (1,)]
+    assert [item.sites for item in each.placed()] == [(0,), (1,)]
     assert len(each.numbers) == 2 * sum(not p.fixed for p in drag.parameters)
 
 
@@ -51,7 +51,7 @@ def test_claims_are_put_together_and_taken_away_again():
     expected = together(parts[0], parts[2])
     assert less.key == expected.key and np.array_equal(less.point, expected.point)
     assert less.placed() == expected.placed()
-    assert [one.effect.name for one in whole.of_claim(1)] == ["extra_mode"]
+    assert [each.effect.name for each in whole.of_claim(1)] == ["extra_mode"]
 
 
 def test_nothing_is_the_beginning_of_all_claims():
@@ -78,13 +78,13 @@ def test_every_effect_is_suggested_at_every_axis_or_not_at_all(arena_of):
     some = CATALOGUE[::4]
     found = candidates(some, evidence_of(arena_of(rubs, axes=2)))
     order = [effect.name for effect in some]
-    named = [one.claims[0].effect.name for one in found]
+    named = [item.claims[0].effect.name for item in found]
     assert named == sorted(named, key=order.index)
-    for one in found:
-        (claim,) = one.claims
+    for each in found:
+        (claim,) = each.claims
         assert set(claim.sites) <= {0, 1}
         assert claim.spread == "one" or claim.sites == (0, 1)
-        for number, at in zip(one.numbers, one.point, strict=True):
+        for number, at in zip(each.numbers, each.point, strict=True):
             low, high = number.bounds
             assert low - 1e-9 <= at <= high + 1e-9
 

@@ -16,11 +16,11 @@ def device(coupling_n_s_per_m: float) -> MechanicalModel:
     k, c = np.array([[9000.0, -9000.0, 0.0], [-9000.0, 9800.0, -500.0], [0.0, -500.0, 500.0]]), coupling_n_s_per_m
     damping = np.array([[4.0 + c, -c, 0.0], [-c, 3.0 + c, -0.4], [0.0, -0.4, 0.4]])
     both = np.diag([1.0, 1.3])
-    one = np.eye(2)
+    identity = np.eye(2)
     return MechanicalModel(
         name="two axes", quantity="position", mass=np.kron(np.diag([0.1, 0.15, 0.02]), both),
-        damping=np.kron(damping, one), stiffness=np.kron(k, both), input=np.kron([[1.0], [0.0], [0.0]], one),
-        output=np.kron([[0.0, 1.0, 0.0]], one),
+        damping=np.kron(damping, identity), stiffness=np.kron(k, both), input=np.kron([[1.0], [0.0], [0.0]], identity),
+        output=np.kron([[0.0, 1.0, 0.0]], identity),
     )  # fmt: skip
 
 

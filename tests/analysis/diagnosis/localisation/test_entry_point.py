@@ -62,8 +62,8 @@ def test_entries_with_one_direction_are_said_to_be_alike():
     ranking = entry_point(spectra_of(directions()[:, :, :1]), entries()).ranking
     assert {ranking[0].name, *ranking[0].alike} == {"force x", "drive x"}
     assert ranking[1].p_value == 1.0
-    others = [one for one in ranking if one.name in ("force y", "sensor ax", "sensor ay")]
-    assert all(one.p_value < 1e-3 for one in others)
+    others = [each for each in ranking if each.name in ("force y", "sensor ax", "sensor ay")]
+    assert all(other.p_value < 1e-3 for other in others)
     assert others[0].score > ranking[0].score + 0.5
 
 

@@ -86,7 +86,7 @@ def test_a_floor_learned_from_clean_recordings_is_no_mismatch(device):
     bench = device(noise=0.005)
     pairs = [recorded_with_truth(bench, seed) for seed in range(4)]
     cells = [cells_of(r, Prediction(1.06 * t.response, t.position)) for r, t in pairs]
-    assert all(any(cell.significant for cell in one) for one in cells)
+    assert all(any(cell.significant for cell in each) for each in cells)
     learned = learn_floor(cells[:3])
     recording, truth = pairs[3]
     margin = Margin(learned=learned)

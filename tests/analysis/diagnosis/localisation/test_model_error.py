@@ -29,9 +29,9 @@ def drawn(share, seed):
 
 def test_an_error_that_is_usual_for_the_model_does_not_stand_out():
     found = [beyond_error(cells, model_error(cells)) for cells in (drawn(0.2, seed) for seed in range(40))]
-    assert sum(any(one.significant for one in cells) for cells in found) <= 1
-    assert all(one.beyond_noise for cells in found for one in cells)
-    rate = np.mean([one.p_value < 0.05 for cells in found for one in cells])
+    assert sum(any(each.significant for each in cells) for cells in found) <= 1
+    assert all(each.beyond_noise for cells in found for each in cells)
+    rate = np.mean([each.p_value < 0.05 for cells in found for each in cells])
     assert 0.005 < rate < 0.06  # the median of a few powers is a little large: on the safe side
 
 
@@ -39,23 +39,23 @@ def test_an_error_that_is_usual_for_the_model_does_not_stand_out():
 def test_a_mismatch_at_one_level_and_octave_stands_out(spectrum):
     cells = [cell(0.01, level, low_hz) for level in LEVELS for low_hz in OCTAVES_HZ]
     cells[7] = cell(10 * spectrum, LEVELS[1], OCTAVES_HZ[1])
-    found = [one for one in beyond_error(cells, model_error(cells)) if one.significant]
-    assert [(one.amplitude, one.band_hz[0]) for one in found] == [(1.0, 4.0)]
+    found = [each for each in beyond_error(cells, model_error(cells)) if each.significant]
+    assert [(each.amplitude, each.band_hz[0]) for each in found] == [(1.0, 4.0)]
 
 
 def test_a_missing_mode_stands_out_in_its_octave_at_all_levels():
     cells = [cell(0.6 if low_hz == 32.0 else 0.01, level, low_hz) for level in LEVELS for low_hz in OCTAVES_HZ]
-    found = [one for one in beyond_error(cells, model_error(cells)) if one.significant]
-    assert {one.band_hz[0] for one in found} == {32.0}
+    found = [each for each in beyond_error(cells, model_error(cells)) if each.significant]
+    assert {each.band_hz[0] for each in found} == {32.0}
     assert len(found) == 3
 
 
 def test_what_a_better_model_has_is_what_a_given_one_is_compared_with():
     given, completed = drawn(0.3, 1), drawn(0.003, 2)
     found = beyond_error(given, model_error(completed))
-    assert np.mean([one.significant for one in found]) > 0.8
+    assert np.mean([each.significant for each in found]) > 0.8
 
 
 def test_where_nothing_was_held_out_noise_alone_counts():
-    cells = [replace(one, p_value=1e-9) for one in drawn(0.2, 1)]
-    assert all(one.p_value == 1e-9 for one in beyond_error(cells, model_error([])))
+    cells = [replace(each, p_value=1e-9) for each in drawn(0.2, 1)]
+    assert all(each.p_value == 1e-9 for each in beyond_error(cells, model_error([])))

@@ -25,9 +25,9 @@ NAMES = ("coulomb_friction", "presliding_hysteresis")
 
 
 def bench_of(tolerance=KNOWN):
-    one = [[1.0]]
+    unit = [[1.0]]
     model = MechanicalModel(
-        "small", "acceleration", [[0.25]], [[4.0]], [[130.0]], one, one, SensorLimits(400.0, 0.0), tolerance=tolerance
+        "small", "acceleration", [[0.25]], [[4.0]], [[130.0]], unit, unit, SensorLimits(400.0, 0.0), tolerance=tolerance
     )
     return Bench(tuning_of(model, ("fx",)), RATE_HZ, Hold.ZERO_ORDER, NOISE)
 
@@ -73,17 +73,17 @@ def test_dry_friction_and_presliding_are_told_apart_by_the_proposed_recording(fr
     assert proposed is not None and proposed.splits == NAMES
     command = menu[0].experiment.commands
     played = [
-        simulate_mechanism(bench.tuning.model, command, RATE_HZ, one.hypothesis.placed()) for one in (named, rival)
+        simulate_mechanism(bench.tuning.model, command, RATE_HZ, each.hypothesis.placed()) for each in (named, rival)
     ]
-    truth, other = (np.hstack([one.response, one.position]) for one in played)
+    truth, other = (np.hstack([each.response, each.position]) for each in played)
     measured = truth + NOISE * np.random.default_rng(1).standard_normal(truth.shape)
-    cost = [float(np.sum(((measured - one) / NOISE) ** 2)) for one in (truth, other)]
+    cost = [float(np.sum(((measured - each) / NOISE) ** 2)) for each in (truth, other)]
     assert cost[1] - cost[0] > 2 * TELLING_GAIN
 
 
 def test_what_tells_most_for_its_cost_comes_first(friction):
     _, _, menu = friction
-    worth = [one.gain / one.experiment.minutes for one in menu]
+    worth = [each.gain / each.experiment.minutes for each in menu]
     assert worth == sorted(worth, reverse=True)
     assert worth[0] > 3 * worth[-1]
 
@@ -127,7 +127,7 @@ def test_a_weight_strapped_on_tells_what_no_louder_sweep_can():
     first, *others = foresee(bench, named, rival, np.diag([1e9] * size), menu)
     assert "strapped to the handle" in first.experiment.words
     assert first.gain > TELLING_GAIN
-    assert all(one.gain < first.gain / 3 for one in others)
+    assert all(other.gain < first.gain / 3 for other in others)
 
 
 def test_what_was_recorded_so_far_holds_the_rival(friction):
@@ -138,9 +138,9 @@ def test_what_was_recorded_so_far_holds_the_rival(friction):
 
 def test_nothing_louder_than_before_is_proposed():
     bench = bench_of()
-    for one in experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N):
-        assert np.abs(one.commands).max() <= LEVEL_N * (1 + 1e-9)
-        assert one.commands[0, 0] == pytest.approx(0.0, abs=1e-6)
+    for each in experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N):
+        assert np.abs(each.commands).max() <= LEVEL_N * (1 + 1e-9)
+        assert each.commands[0, 0] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_weight_is_the_same_along_every_driven_axis():

@@ -79,9 +79,9 @@ def test_a_gap_is_not_heard_as_noise():
     lost[6000:6200] = np.nan
     whole, gap = (
         noise_floor(
-            Recording("gap", Signal(slow, 1000.0, "force", "N", ("fx",)), Signal(one, 1000.0, "position", "m", ("x",)))
+            Recording("gap", Signal(slow, 1000.0, "force", "N", ("fx",)), Signal(each, 1000.0, "position", "m", ("x",)))
         )
-        for one in (heard, lost)
+        for each in (heard, lost)
     )
     assert whole.how == gap.how == "quiet band"
     assert whole.response_rms == pytest.approx(1e-3, rel=0.1)

@@ -71,7 +71,7 @@ def test_a_hum_below_what_a_sound_device_differs_by_is_named(diagnosed, clean):
         hum = PlacedEffect(BY_NAME["mains_hum"], (0,), {"amplitude": tone, "frequency": 50.02, "phase": 0.3})
         humming = diagnosed.recorded(1, (LAG, hum), seed=seed)
         settings = DiagnosisSettings(without, clean=clean)
-        found, nothing = (diagnose([one], diagnosed.device(1), settings, map, quiet) for one in (humming, sound))
+        found, nothing = (diagnose([each], diagnosed.device(1), settings, map, quiet) for each in (humming, sound))
         assert (named(found), named(nothing)) == (["mains_hum"], [])
         assert found.diagnosis.effects[0].parameters["amplitude"].value == pytest.approx(tone, rel=0.3)
 

@@ -26,13 +26,13 @@ def recording(seed: int, step: float = STEP, channels: int = 1) -> Recording:
     )
 
 
-def spoiled(one: Recording, change) -> Recording:
-    return replace(one, response=replace(one.response, samples=change(one.response.samples)))
+def spoiled(given: Recording, change) -> Recording:
+    return replace(given, response=replace(given.response, samples=change(given.response.samples)))
 
 
 def seen(new: Recording, clean: Recording, known=CATALOGUE):
     found = seen_directly([new], [clean], known)
-    return [(one.key[0][0], one.key[0][1], one.placed()[0].values) for one in found]
+    return [(each.key[0][0], each.key[0][1], each.placed()[0].values) for each in found]
 
 
 @pytest.mark.parametrize("step", [STEP, 0.05, 0.0])
@@ -78,7 +78,7 @@ def test_what_the_sound_device_does_too_is_not_seen():
 
 def test_what_may_not_be_named_is_not_seen():
     new = spoiled(recording(2), lambda y: np.clip(y, -0.9, 0.9))
-    assert seen(new, recording(1), [one for one in CATALOGUE if one.name != "sensor_clipping"]) == []
+    assert seen(new, recording(1), [each for each in CATALOGUE if each.name != "sensor_clipping"]) == []
 
 
 def test_what_is_not_known_does_not_count():

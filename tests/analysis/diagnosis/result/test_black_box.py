@@ -31,7 +31,7 @@ def compared(context, name, values):
     known = sensitivity(context.measure, context.tuning, zero, NOTHING)
     start = evaluated(context.measure, context.tuning, zero, whole)
     after = refine(context, fit(context.measure, context.tuning, start, known, 4))
-    retuned, ended = (context.confirmed(context.candidate(one)) for one in (bare, after))
+    retuned, ended = (context.confirmed(context.candidate(each)) for each in (bare, after))
     found = Explanation(retuned, retuned, ended, (), ())
     physics = errors_of(context.whole, found).test.after
     return black_box(context.whole, retuned, len(whole.point), physics), errors_of(context.whole, found).test

@@ -16,7 +16,7 @@ def test_what_stands_alone_is_likely_but_not_certain(standing_at):
 
 def test_the_better_one_is_the_likelier_one(standing_at):
     names = ("force_gain", "added_mass", "coulomb_friction")
-    chances = probabilities([standing_at(*one) for one in zip((1.0, 1.0005, 1.5), names, strict=True)], 1.0)
+    chances = probabilities([standing_at(*each) for each in zip((1.0, 1.0005, 1.5), names, strict=True)], 1.0)
     assert chances[0] > chances[1] > chances[2]
     assert chances[2] < 1e-6
     assert sum(chances) == pytest.approx(1 - ELSEWHERE_LEAST)

@@ -31,9 +31,9 @@ def signature(diagnosed):
     return of
 
 
-def law_at_the_dots(one):
-    order = np.argsort(one.law_at)
-    return np.interp(one.measured_at, one.law_at[order], one.law[order])
+def law_at_the_dots(curve):
+    order = np.argsort(curve.law_at)
+    return np.interp(curve.measured_at, curve.law_at[order], curve.law[order])
 
 
 @pytest.mark.parametrize(

@@ -116,9 +116,9 @@ def test_what_stands_in_a_class_is_no_candidate_beside_it(with_friction):
     assert found.effects[0].class_ == ()  # it only refines the named law, and is no candidate either
     assert found.candidates == ()
     apart = replace(balance, laws=(replace(weighed, alike=()),), others=(_rival(weighed),))
-    assert [one.effect for one in with_balances(named, (apart,), recording.command.channels).candidates] == [
-        "stribeck_friction"
-    ]
+    assert [
+        candidate.effect for candidate in with_balances(named, (apart,), recording.command.channels).candidates
+    ] == ["stribeck_friction"]
 
 
 def test_a_law_that_leaves_a_remainder_explains_less_than_all(with_friction):

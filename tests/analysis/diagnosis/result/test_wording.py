@@ -46,7 +46,7 @@ def test_an_effect_is_named_with_its_place_number_and_signature():
     )
 
 
-@pytest.mark.parametrize("name", EFFECT_NAMES, ids=lambda one: one.name)
+@pytest.mark.parametrize("name", EFFECT_NAMES, ids=lambda each: each.name)
 def test_every_effect_of_the_vocabulary_has_a_name_that_people_use_and_reads_out_its_main_number(name):
     assert name.name in EFFECT_WORDS
     assert "_" not in noun_of(name.name)
@@ -70,7 +70,7 @@ def test_nouns_are_told_apart():
     assert len(set(nouns)) == len(nouns)
 
 
-@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda one: one.name)
+@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda each: each.name)
 def test_a_signature_of_the_catalogue_ends_the_sentence_that_names_it(effect):
     assert not effect.signature.endswith(".")
     assert effect.signature[:1].islower()

@@ -41,7 +41,7 @@ def evidence() -> Evidence:
 def test_its_rate_is_nearly_found(evidence, ppm):
     drifted = replace(evidence, response=read_other_times(evidence.response, 1 + 1e-6 * ppm, 0.0, 0.0))
     starts = clock_drift_by_trial(CATALOGUE, drifted)
-    assert {one.claims[0].effect.name for one in starts} == {"clock_drift"}
+    assert {start.claims[0].effect.name for start in starts} == {"clock_drift"}
     # To a fraction of the period by which it is off at the end.
     assert starts[0].placed()[0].values["ppm"] == pytest.approx(ppm, abs=600)
 
@@ -52,4 +52,4 @@ def test_a_clock_that_runs_right_is_not_suggested(evidence):
 
 def test_nor_is_what_may_not_be_named(evidence):
     drifted = replace(evidence, response=read_other_times(evidence.response, 1.003, 0.0, 0.0))
-    assert clock_drift_by_trial([one for one in CATALOGUE if one.name != "clock_drift"], drifted) == ()
+    assert clock_drift_by_trial([each for each in CATALOGUE if each.name != "clock_drift"], drifted) == ()

@@ -23,7 +23,7 @@ def found_in(recording, model, among=AMONG):
 
 
 def named(found):
-    return [(one.effect, one.axis) for one in found.diagnosis.effects]
+    return [(effect.effect, effect.axis) for effect in found.diagnosis.effects]
 
 
 def level(found):
@@ -111,8 +111,8 @@ def test_a_constant_force_is_mirrored_with_its_axis(diagnosed):
         position=turned(pulled.position, -1.0),
     )
     forces = []
-    for one in (pulled, mirrored):
-        other = found_in(one, diagnosed.device(1))
+    for each in (pulled, mirrored):
+        other = found_in(each, diagnosed.device(1))
         assert named(other) == [("constant_force", "x")]
         forces.append(other.named[0].values["force"])
     assert forces == pytest.approx([0.3, -0.3], rel=0.01)

@@ -31,15 +31,15 @@ def candidate(context, base, *claims):
 def explained_by(context, *rivals):
     """rivals: of the one round, the named one first; all as good as it."""
     base = context.candidate(retuned_alone(context))
-    found = [candidate(context, base, one) for one in rivals]
-    found = [replace(one, score=found[0].score) for one in found]
+    found = [candidate(context, base, rival) for rival in rivals]
+    found = [replace(each, score=found[0].score) for each in found]
     return Explanation(
         context.confirmed(base), context.confirmed(base), context.confirmed(found[0]), (tuple(found),), (found[0],)
     )
 
 
 def names(found):
-    return [one.effect.name for one in found.after.fitted.hypothesis.claims]
+    return [each.effect.name for each in found.after.fitted.hypothesis.claims]
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def test_of_two_the_one_that_is_open_goes_whichever_came_first(rubbing, order):
     ends = [rubbing.confirmed(each) for each in (base, base, both)]
     left = identified(rubbing, Explanation(*ends, ((one,), (both,)), (one, both)), always)
     assert (names(left), left.undetermined) == (["coulomb_friction"], ("viscous_damping",))
-    assert [one.fitted.hypothesis.key for one in left.steps] == [left.rounds[0][0].fitted.hypothesis.key]
+    assert [step.fitted.hypothesis.key for step in left.steps] == [left.rounds[0][0].fitted.hypothesis.key]
 
 
 def test_one_number_that_is_fixed_is_enough(rubbing):

@@ -37,7 +37,7 @@ def searched(real, effects, repeats=True):
     """The recording before a search has found anything: context, explanation, floors."""
     recording = real.recorded(2, effects)
     if not repeats:
-        recording = replace(recording, segments=tuple(replace(one, period=0) for one in recording.segments))
+        recording = replace(recording, segments=tuple(replace(segment, period=0) for segment in recording.segments))
     chosen = measure_of([recording], real.device(2))
     context = SearchContext(chosen.measure.shortened(), chosen.measure, tuning_of(real.device(2), ("fx", "fy")), map)
     given = context.candidate(evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
@@ -76,7 +76,7 @@ def test_its_numbers_come_with_errors(told):
 
 def test_two_courses_of_one_play_agree_in_their_band_powers_but_not_sample_by_sample(loose):
     context = loose[0]
-    apart = tuple(replace(one, values={**one.values, "gap": GAP_M * (1 + 1e-9)}) for one in LOOSE)
+    apart = tuple(replace(each, values={**each.values, "gap": GAP_M * (1 + 1e-9)}) for each in LOOSE)
     courses = [context.whole.residuals(context.tuning.model, effects) for effects in (LOOSE, apart)]
     power = BandPower(context.whole)
     off = power.misfits(power.predicted(courses[0]) - power.predicted(courses[1]))
@@ -100,7 +100,7 @@ def test_a_device_that_repeats_is_left_alone(diagnosed):
 
 
 def test_without_play_in_the_catalogue_nothing_is_named(loose):
-    assert rattling(*loose, [one for one in CATALOGUE if one.name != "backlash"]) is None
+    assert rattling(*loose, [each for each in CATALOGUE if each.name != "backlash"]) is None
 
 
 def test_where_nothing_repeats_peaks_give_rattle_away(diagnosed):
@@ -110,7 +110,7 @@ def test_where_nothing_repeats_peaks_give_rattle_away(diagnosed):
 
 def test_the_whole_diagnosis_says_what_was_compared(diagnosed):
     kept = ("backlash", "loose_joint", "extra_mode")
-    others = tuple(one.name for one in CATALOGUE if one.name not in kept)
+    others = tuple(each.name for each in CATALOGUE if each.name not in kept)
     recording = diagnosed.recorded(2, LOOSE)
     found = diagnose([recording], diagnosed.device(2), DiagnosisSettings(others), map, lambda said, share: None)
     (effect,) = found.diagnosis.effects

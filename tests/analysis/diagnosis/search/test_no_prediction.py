@@ -53,7 +53,7 @@ def test_a_silenced_channel_is_no_answer_though_another_gains_more_by_it(arena_o
     context = arena_of()
     none = np.zeros(len(context.tuning.names))
     lag = evaluated(context.whole, context.tuning, none, claimed(Claim(LAG, "one", (0,)), [{"bandwidth": 0.01}]))
-    wrenched = replace(lag, residuals=tuple(one * [1.1, 1e6] for one in lag.residuals))
+    wrenched = replace(lag, residuals=tuple(residual * [1.1, 1e6] for residual in lag.residuals))
     assert predicts_nothing(context.whole, wrenched, lag)
 
 
@@ -65,5 +65,5 @@ def test_a_low_pass_that_is_there_silences_nothing(arena_of):
 def _silences(measure, tuning, bandwidth):
     lag = claimed(Claim(LAG, "one", (0,)), [{"bandwidth": bandwidth}])
     return predicts_nothing(
-        measure, *(evaluated(measure, tuning, np.zeros(len(tuning.names)), one) for one in (NOTHING, lag))
+        measure, *(evaluated(measure, tuning, np.zeros(len(tuning.names)), each) for each in (NOTHING, lag))
     )

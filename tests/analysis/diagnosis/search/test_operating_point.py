@@ -14,8 +14,8 @@ RATE_HZ, STIFFNESS = 200.0, 50.0
 
 
 def model(quantity="position", stiffness=STIFFNESS):
-    one = np.eye(1)
-    return MechanicalModel("m", quantity, 0.5 * one, 4.0 * one, stiffness * one, one, one)
+    identity = np.eye(1)
+    return MechanicalModel("m", quantity, 0.5 * identity, 4.0 * identity, stiffness * identity, identity, identity)
 
 
 def recording(weight=0.0, seed=1):
@@ -36,10 +36,10 @@ def recording(weight=0.0, seed=1):
 
 
 def test_the_constant_that_keeps_the_mean_position_is_found_and_said():
-    one = recording(weight=20.0)
-    (moved,) = about_operating_point((one,), model()) or ()
-    assert np.allclose(moved.command.samples - one.command.samples, 20.0, rtol=0.05)
-    look = look_of((one,), model(), (), "auto", about_mean=True)
+    weighed = recording(weight=20.0)
+    (moved,) = about_operating_point((weighed,), model()) or ()
+    assert np.allclose(moved.command.samples - weighed.command.samples, 20.0, rtol=0.05)
+    look = look_of((weighed,), model(), (), "auto", about_mean=True)
     assert ABOUT_MEAN in look.chosen.remarks
 
 

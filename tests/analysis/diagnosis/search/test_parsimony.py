@@ -10,7 +10,7 @@ from analysis.diagnosis.search.same_within_errors import excess, inseparable
 
 
 def first_of(*fitted_candidates):
-    ranked = sorted(fitted_candidates, key=lambda one: one.score.mean_log_error)
+    ranked = sorted(fitted_candidates, key=lambda fitted_candidate: fitted_candidate.score.mean_log_error)
     return plainest_first(ranked)[0].fitted.hypothesis.claims[-1].effect.name
 
 

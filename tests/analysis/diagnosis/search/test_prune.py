@@ -29,15 +29,15 @@ def claim(name, **values):
 def one_after_the_other(context, *claims):
     """An explanation as a search leaves it that added these in this order."""
     base, steps, whole = context.candidate(retuned_alone(context)), [], None
-    for one in claims:
-        whole = one if whole is None else together(whole, one)
+    for each in claims:
+        whole = each if whole is None else together(whole, each)
         steps.append(context.candidate(evaluated(context.measure, context.tuning, base.fitted.deviations, whole)))
-    ends = (context.confirmed(one) for one in (base, base, steps[-1]))
-    return Explanation(*ends, tuple((one,) for one in steps), tuple(steps))
+    ends = (context.confirmed(item) for item in (base, base, steps[-1]))
+    return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
 
 
 def names(found):
-    return [one.effect.name for one in found.after.fitted.hypothesis.claims]
+    return [each.effect.name for each in found.after.fitted.hypothesis.claims]
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_a_stopgap_goes_once_the_true_law_has_its_numbers(rubbing):
     assert names(left) == ["coulomb_friction"]
     assert len(left.rounds) == len(left.steps) == 1
     # What it was compared with stays to be told.
-    assert [one.fitted.hypothesis.claims[-1].effect.name for one in left.rounds[0]] == [
+    assert [each.fitted.hypothesis.claims[-1].effect.name for each in left.rounds[0]] == [
         "coulomb_friction",
         "constant_force",
     ]
@@ -105,8 +105,10 @@ def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(arena_of, d
     context = arena_of((placed("transport_delay", delay=late),))
     base = retuned_alone(context)
     starts = [
-        one.placed()[-1].values["delay"]
-        for one in candidates([EFFECTS["transport_delay"]], gather_evidence(context.measure, context.tuning, base)[0])
+        candidate.placed()[-1].values["delay"]
+        for candidate in candidates(
+            [EFFECTS["transport_delay"]], gather_evidence(context.measure, context.tuning, base)[0]
+        )
     ]
     assert any(start < 1 / diagnosed.RATE_HZ for start in starts)
     assert any(start > 1 / diagnosed.RATE_HZ for start in starts)

@@ -126,4 +126,4 @@ def test_a_period_that_the_record_ends_in_stands_for_none(lagging):
     cut = [getattr(record, name)[:ends] for name in ("command", "measured", "fit", "choose", "test")]
     context = replace(lagging, measure=lagging.measure.with_records((Observed(record.recording, *cut),)))
     short = short_recordings_of(context, NOTHING)
-    assert short is None or short.stands_in.max() < sum(one.fit.sum() for one in short.context.measure.records)
+    assert short is None or short.stands_in.max() < sum(each.fit.sum() for each in short.context.measure.records)

@@ -56,4 +56,4 @@ def test_answers_are_said_in_words():
 def test_every_claim_of_a_control_is_known():
     from study.evaluation.challenge.controls import CONTROLS
 
-    assert {one.claim for one in CONTROLS} == set(CLAIMS)
+    assert {control.claim for control in CONTROLS} == set(CLAIMS)

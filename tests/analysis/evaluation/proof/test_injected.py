@@ -12,20 +12,20 @@ def outcome(effects=("sensor_lag",), named=("sensor_lag",), rivals=(), change=3.
     label = {
         "recording": "rig",
         "effects": list(effects),
-        "places": [PLACES[one] for one in effects],
+        "places": [PLACES[effect] for effect in effects],
         "strength": 0.5,
         "values": {"bandwidth": 80.0},
         "change": change,
     }
     said = [
-        {"effect": one, "place": PLACES[one], "rivals": [{"effect": other, "inseparable": True} for other in rivals]}
-        for one in named
+        {"effect": each, "place": PLACES[each], "rivals": [{"effect": other, "inseparable": True} for other in rivals]}
+        for each in named
     ]
     return outcome_of(label, {"seconds": 2.0, "diagnosis": {"verdict": "partly_explained", "effects": said}})
 
 
 def by_name(outcomes):
-    return {one.name: one for one in injected_figures(outcomes)}
+    return {injected_figure.name: injected_figure for injected_figure in injected_figures(outcomes)}
 
 
 @pytest.mark.parametrize(

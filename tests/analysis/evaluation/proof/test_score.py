@@ -72,7 +72,7 @@ ALL = (RIGHT, WRONG, IN_SET, UNSEEN, GUESSED, ALARM, CLEAN, OUTSIDE, TAKEN_IN, W
 
 
 def figure(outcomes, name):
-    return next(one for one in score(outcomes).figures if one.name == name)
+    return next(each for each in score(outcomes).figures if each.name == name)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_shares_count_what_their_names_say(name, hits, of):
 
 
 def test_every_answer_that_is_not_as_it_should_be_is_listed():
-    assert {id(one) for one in score(ALL).misses} == {
+    assert {id(miss) for miss in score(ALL).misses} == {
         id(o) for o in (WRONG, IN_SET, GUESSED, ALARM, TAKEN_IN, PARTLY, PAIR, BROKEN)
     }
 
@@ -118,7 +118,7 @@ def test_a_right_name_on_another_axis_is_a_miss_where_there_are_several():
 
 def test_what_hangs_together_is_resampled_together():
     whole = [[True] * 10, [False] * 10] * 10
-    found, alone = pooled("together", whole), share("alone", [one for group in whole for one in group], bool)
+    found, alone = pooled("together", whole), share("alone", [each for group in whole for each in group], bool)
     assert found.value == alone.value == 0.5
     assert found.high - found.low > 2 * (alone.high - alone.low)
     assert pooled("none", [[], []]).value is None
@@ -170,7 +170,7 @@ def test_larger_effects_come_later():
 def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
     whole = score(ALL)
     pictures = proof_pictures(ALL, whole.calibration)
-    assert [one.name for one in pictures] == ["detection", "detection-by-size", "confusion", "reliability"]
+    assert [picture.name for picture in pictures] == ["detection", "detection-by-size", "confusion", "reliability"]
     both = ("sensor_lag", "logger_offset")
     followed = (
         FollowUp(5, "sensor_lag", both, "a sweep from 1 to 450 Hz", ("sensor_lag",), "a slow sinusoid", both),

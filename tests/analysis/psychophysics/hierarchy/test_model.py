@@ -113,8 +113,8 @@ def test_the_marginal_likelihood_is_the_integral(answers):
 
     chosen = answers.run < 3
     parts = ("run", "level_db", "side", "right", "wrong")
-    one = replace(answers, subjects=answers.subjects[:1], **{name: getattr(answers, name)[chosen] for name in parts})
-    objective = Objective(one, Family.WEIBULL, Prior())
+    alone = replace(answers, subjects=answers.subjects[:1], **{name: getattr(answers, name)[chosen] for name in parts})
+    objective = Objective(alone, Family.WEIBULL, Prior())
     numbers = objective.begin
     value = objective.marginal.at(numbers)[0][0]
     rng, n = np.random.default_rng(5), 20_000
@@ -126,7 +126,7 @@ def test_the_marginal_likelihood_is_the_integral(answers):
     )
     b = numbers[k + 2] + np.exp(numbers[k + 3]) * rng.standard_normal(n)
     c = np.exp(numbers[k + 4]) * rng.standard_normal(n)
-    likelihood, lapse = TrialLikelihood(one, Family.WEIBULL), float(expit(numbers[k + 5]))
+    likelihood, lapse = TrialLikelihood(alone, Family.WEIBULL), float(expit(numbers[k + 5]))
     values = [
         likelihood.at(np.array([[*row, slope, bias]]), lapse).value[0]
         for row, slope, bias in zip(theta[:4000], b, c, strict=False)

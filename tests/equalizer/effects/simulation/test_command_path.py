@@ -17,9 +17,9 @@ JUMP = np.ones(40)
 
 
 def free_mass(**actuator) -> MechanicalModel:
-    nothing, one = np.zeros((1, 1)), np.eye(1)
+    nothing, identity = np.zeros((1, 1)), np.eye(1)
     return MechanicalModel(
-        "m", "acceleration", 2 * one, nothing, nothing, one, one, actuator=ActuatorLimits(**actuator)
+        "m", "acceleration", 2 * identity, nothing, nothing, identity, identity, actuator=ActuatorLimits(**actuator)
     )
 
 

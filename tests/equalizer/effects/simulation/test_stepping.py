@@ -114,8 +114,10 @@ def free_masses(axes: int, damping: float = 0.0) -> MechanicalModel:
 
 
 def springs(damping: float) -> MechanicalModel:
-    one = np.eye(1)
-    return MechanicalModel("spring", "acceleration", 0.3 * one, damping * one, 120.0 * one, one, one)
+    identity = np.eye(1)
+    return MechanicalModel(
+        "spring", "acceleration", 0.3 * identity, damping * identity, 120.0 * identity, identity, identity
+    )
 
 
 CRITICAL = 2 * np.sqrt(0.3 * 120.0)

@@ -85,9 +85,9 @@ def test_the_interval_covers_the_truth_and_is_no_wider_than_it_must_be():
     found = [
         coupling_onset(response_of(0.25 * LINES / 12.0, LINES, 0.03, seed), OnsetRule(draws=100)) for seed in range(30)
     ]
-    covered = [one.interval_hz[0] <= 12.0 <= one.interval_hz[1] for one in found]
-    spread = np.std([one.frequency_hz for one in found])
-    width = np.mean([one.interval_hz[1] - one.interval_hz[0] for one in found])
+    covered = [each.interval_hz[0] <= 12.0 <= each.interval_hz[1] for each in found]
+    spread = np.std([each.frequency_hz for each in found])
+    width = np.mean([each.interval_hz[1] - each.interval_hz[0] for each in found])
     assert sum(covered) >= 25
     assert 0.7 < width / (2 * 1.96 * spread) < 1.5
 

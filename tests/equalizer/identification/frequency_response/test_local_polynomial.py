@@ -17,7 +17,7 @@ def pairs(plants, synthetic):
 def test_the_error_falls_by_the_factor_of_seventeen_lines_and_a_parabola(pairs, plants, synthetic):
     truth = plants.omega_like()
     for estimate, smooth in pairs:
-        before, after = (synthetic.rms_error(one, truth) for one in (estimate, smooth))
+        before, after = (synthetic.rms_error(each, truth) for each in (estimate, smooth))
         assert after < 0.0045
         assert before / after == pytest.approx(2.74, rel=0.1)
 
@@ -25,7 +25,7 @@ def test_the_error_falls_by_the_factor_of_seventeen_lines_and_a_parabola(pairs, 
 def test_the_peak_at_eleven_hertz_is_not_cut_beyond_the_noise(pairs, plants):
     """Averaged over the seeds, what is left is bias."""
     peak = [smooth.within(10.5, 11.5) for _, smooth in pairs]
-    left = np.mean([one.response for one in peak], axis=0) - plants.omega_like().response(peak[0].frequency_hz)
+    left = np.mean([each.response for each in peak], axis=0) - plants.omega_like().response(peak[0].frequency_hz)
     noise = peak[0].noise_variance / len(pairs)
     assert np.mean(np.abs(left) ** 2 / noise) < 1.3
 

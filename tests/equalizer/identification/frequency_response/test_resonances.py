@@ -17,7 +17,7 @@ def found(plants, synthetic):
 
 
 def nearest(resonances, frequency_hz):
-    return min(resonances, key=lambda one: abs(one.frequency_hz - frequency_hz))
+    return min(resonances, key=lambda resonance: abs(resonance.frequency_hz - frequency_hz))
 
 
 def test_a_mode_on_a_slope_is_fitted_exactly_without_noise():
@@ -44,10 +44,10 @@ def test_noise_does_not_bias_the_damping():
 )
 def test_the_modes_of_the_synthetic_device_are_found(found, frequency_hz, damping):
     for resonances in found:
-        one = nearest(resonances, frequency_hz)
-        assert one.frequency_hz == pytest.approx(frequency_hz, rel=3e-3)
-        assert one.damping_ratio == pytest.approx(damping, rel=0.04)
-        assert one.width_hz == pytest.approx(2 * one.damping_ratio * one.frequency_hz)
+        found_there = nearest(resonances, frequency_hz)
+        assert found_there.frequency_hz == pytest.approx(frequency_hz, rel=3e-3)
+        assert found_there.damping_ratio == pytest.approx(damping, rel=0.04)
+        assert found_there.width_hz == pytest.approx(2 * found_there.damping_ratio * found_there.frequency_hz)
 
 
 def test_what_couples_is_told_from_what_is_only_loud(found):
@@ -58,11 +58,11 @@ def test_what_couples_is_told_from_what_is_only_loud(found):
 def test_intervals_are_as_wide_as_the_estimates_spread(found):
     for frequency_hz in (11.0, 22.5, 84.0):
         ones = [nearest(resonances, frequency_hz) for resonances in found]
-        spread = np.std([one.frequency_hz for one in ones], ddof=1)
-        half = np.mean([np.diff(one.frequency_interval_hz)[0] for one in ones]) / 2
+        spread = np.std([each.frequency_hz for each in ones], ddof=1)
+        half = np.mean([np.diff(each.frequency_interval_hz)[0] for each in ones]) / 2
         assert 0.8 < half / spread < 6.0
-        assert all(one.frequency_interval_hz[0] < one.frequency_hz < one.frequency_interval_hz[1] for one in ones)
-        assert all(one.damping_interval[0] < one.damping_ratio < one.damping_interval[1] for one in ones)
+        assert all(each.frequency_interval_hz[0] < each.frequency_hz < each.frequency_interval_hz[1] for each in ones)
+        assert all(each.damping_interval[0] < each.damping_ratio < each.damping_interval[1] for each in ones)
 
 
 def test_nothing_is_found_where_there_is_only_a_slope(plants, synthetic):

@@ -72,7 +72,7 @@ def test_a_smooth_estimate_of_one_period_is_at_least_as_noisy_as_the_rest_before
     samples = recording.response.samples.copy()
     samples[: synthetic.REST] = np.random.default_rng(3).standard_normal((synthetic.REST, 3)) * plants.SENSOR_RMS
     noisy = replace(recording, response=replace(recording.response, samples=samples))
-    without, with_rest = (transfer_estimate((one,)).within(5.0, 35.0) for one in (recording, noisy))
+    without, with_rest = (transfer_estimate((each,)).within(5.0, 35.0) for each in (recording, noisy))
     assert np.median(with_rest.noise_variance) > 20 * np.median(without.noise_variance)
 
 

@@ -97,7 +97,7 @@ def test_two_estimates_together_are_better_than_each(plants, measuring, centre, 
     alone, beside = identify(response, settings), identify(other, settings)
     both = identify((response, other), settings)
     assert both.lines == alone.lines + beside.lines
-    errors = [measuring.errors_of(one.model, centre, GRID)[0] for one in (both, alone, beside)]
+    errors = [measuring.errors_of(each.model, centre, GRID)[0] for each in (both, alone, beside)]
     assert errors[0] < min(errors[1:])
 
 

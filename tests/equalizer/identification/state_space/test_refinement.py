@@ -49,8 +49,8 @@ def test_a_general_optimizer_finds_nothing_cheaper(plant, lines):
         return np.concatenate([errors.real.ravel(), errors.imag.ravel()])
 
     ours = lines.cost(found.response(lines.z))
-    for one in (found, fitted(start, lines)):
-        numbers = np.concatenate([part.ravel() for part in (one.form.a, one.form.b, one.form.C, one.B, one.D)])
+    for each in (found, fitted(start, lines)):
+        numbers = np.concatenate([part.ravel() for part in (each.form.a, each.form.b, each.form.C, each.B, each.D)])
         theirs = 2 * least_squares(residuals, numbers, x_scale="jac", max_nfev=60).cost
         assert ours <= theirs * (1 + 1e-5)
 

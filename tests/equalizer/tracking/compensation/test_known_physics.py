@@ -28,9 +28,11 @@ FORCES, ACCELERATIONS = ("fx", "fy", "fz"), ("ax", "ay", "az")
 
 
 def physics(*effects: ModelEffect) -> MechanicalModel:
-    one = np.eye(3)
+    identity = np.eye(3)
     sensor, actuator = SensorLimits(bandwidth_hz=500), ActuatorLimits(delay_s=0.001, bandwidth_hz=600)
-    return MechanicalModel("device", "acceleration", 0.28 * one, one, one, one, one, sensor, actuator, effects)
+    return MechanicalModel(
+        "device", "acceleration", 0.28 * identity, identity, identity, identity, identity, sensor, actuator, effects
+    )
 
 
 def friction(level, axis=None) -> ModelEffect:
@@ -105,7 +107,7 @@ def test_from_recordings_freed_of_friction_a_linear_model_is_identified(rubbing,
     device, known = rubbing.rubbing(plants.modes_of(), 0.1), physics(friction(0.1))
     recordings = driven_together(plants, device)
     as_recorded = identified(recordings)
-    freed = identified([without_effects(one, known, (4.5, 37)) for one in recordings])
+    freed = identified([without_effects(recording, known, (4.5, 37)) for recording in recordings])
     forces = compensate(inverse(freed, wanted), wanted, freed, known, None).forces
     assert error(device, inverse(as_recorded, wanted), wanted) > 0.07
     assert error(device, forces, wanted) < 0.03
@@ -132,7 +134,7 @@ def test_every_effect_of_the_vocabulary_is_used_or_says_why_not(frictionless, wa
         ModelEffect(name.name, None, {part.name: 0.01 for part in name.parameters}) for name in EFFECT_NAMES
     )
     done = compensate(inverse(frictionless, wanted), wanted, frictionless, physics(*effects), None)
-    assert {one.kind for one in done.used} == {*LAWS, "force_deadband"}
+    assert {each.kind for each in done.used} == {*LAWS, "force_deadband"}
     assert len(done.used) + len(done.not_used) == len(EFFECT_NAMES)
     assert all(reason for _, reason in done.not_used)
 

@@ -52,9 +52,9 @@ class Workspaces:
             quality(self.plant(x, bend).response(LINES_HZ) @ at(self.place_m(x)).inverse(LINES_HZ)) for x in OFF_GRID
         ]
         return Quality(
-            max(one.flatness_db for one in found),
-            max(one.coupling_db for one in found),
-            max(one.axis_error_deg for one in found),
+            max(each.flatness_db for each in found),
+            max(each.coupling_db for each in found),
+            max(each.axis_error_deg for each in found),
         )
 
 

@@ -108,6 +108,6 @@ def test_centre_and_hand_over_five_seeds(workspaces, plants):
         found = []
         for seed in range(1, 6):
             model = workspaces.identified(plant, 10 * seed + hand, order=26)
-            one = quality(truth @ ours(model, LINES).response)
-            found.append((one.flatness_db, one.coupling_db, one.axis_error_deg))
+            reached = quality(truth @ ours(model, LINES).response)
+            found.append((reached.flatness_db, reached.coupling_db, reached.axis_error_deg))
         assert (np.max(found, axis=0) <= limits).all(), (name, found)

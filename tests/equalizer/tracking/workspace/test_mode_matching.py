@@ -15,7 +15,7 @@ def mode(natural_hz, shape, share=0.5, factor=1.0):
 
 def test_modes_keep_their_partners_when_all_move_past_where_others_were():
     ones = [mode(11.0, 0), mode(13.2, 1), mode(22.5, 2)]
-    others = [mode(1.2 * one.natural_hz, k, factor=0.8j) for k, one in enumerate(ones)]
+    others = [mode(1.2 * each.natural_hz, k, factor=0.8j) for k, each in enumerate(ones)]
     assert matched_modes(ones, others, BAND) == ((0, 0), (1, 1), (2, 2))
 
 

@@ -57,13 +57,13 @@ def test_forces_are_blended_not_models(model):
     strong = moved(model, 0.02, C=3 * np.eye(2))
     at = blended_at(WorkspaceModels((model, strong)), (0.01, 0.0, 0.0))
     asked = at.inverse(np.array([10.0]), weight=0.0)[0]
-    parts = [blended_at(WorkspaceModels((one,)), (0, 0, 0)).inverse(np.array([10.0]), 0.0)[0] for one in at.models]
+    parts = [blended_at(WorkspaceModels((each,)), (0, 0, 0)).inverse(np.array([10.0]), 0.0)[0] for each in at.models]
     np.testing.assert_allclose(asked, (parts[0] + parts[1]) / 2)
-    np.testing.assert_allclose(at.forces(lambda one: one.C), 2 * np.eye(2))
+    np.testing.assert_allclose(at.forces(lambda each: each.C), 2 * np.eye(2))
 
 
 def test_a_model_that_does_not_count_is_not_asked(model):
     at = blended_at(WorkspaceModels((model, moved(model, 0.02))), (0.0, 0.0, 0.0))
     asked = []
-    at.forces(lambda one: asked.append(one) or np.zeros(1))
+    at.forces(lambda each: asked.append(each) or np.zeros(1))
     assert asked == [model]

@@ -108,9 +108,9 @@ def test_compiled_and_stepped_rigs_are_driven_bit_for_bit_alike(rigs):
         results.append((first, second, rigs.written(bare)))
     (first, second, forces), (other_first, other_second, other_forces) = results
     assert (forces == other_forces[: len(forces)]).all()
-    for one, other in ((first, other_first), (second, other_second)):
+    for each, other in ((first, other_first), (second, other_second)):
         for name in ("command", "response", "position", "excitation"):
-            assert (getattr(one, name).samples == getattr(other, name).samples).all()
+            assert (getattr(each, name).samples == getattr(other, name).samples).all()
 
 
 def test_sleeping_in_other_portions_changes_nothing(rigs):

@@ -74,7 +74,7 @@ def test_the_right_name_is_left_by_the_recording_that_was_proposed(followed):
     _, outcome, menu, (found,), seen = followed
     assert outcome.returned == ("sensor_gain", "force_gain")
     assert (found.proposed, found.after_proposed, found.resolved) == (menu[0].words, ("sensor_gain",), True)
-    assert found.drawn in [one.words for one in menu]
+    assert found.drawn in [each.words for each in menu]
     assert found.after_drawn
     assert (seen[0], seen[-1]) == ((0, 2), (2, 2))
 
@@ -130,4 +130,9 @@ def test_shares_count_all_starts_and_those_for_which_something_is_proposed():
         FollowUp(3, "logger_offset", both, "a sweep", ("sensor_lag",), "another", ("logger_offset",)),
         FollowUp(4, "extra_mode", ("extra_mode", "body_on_actuator"), "", (), "another", ("extra_mode",)),
     ]
-    assert [(one.hits, one.of) for one in follow_up_figures(found)] == [(1, 4), (2, 4), (1, 3), (1, 3)]
+    assert [(follow_up_figure.hits, follow_up_figure.of) for follow_up_figure in follow_up_figures(found)] == [
+        (1, 4),
+        (2, 4),
+        (1, 3),
+        (1, 3),
+    ]

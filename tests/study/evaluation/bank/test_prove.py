@@ -35,7 +35,7 @@ def test_a_bank_is_sealed_answered_and_revealed(proof):
     done, seen = proof
     assert len(done.outcomes) == len(to_draw(PLAN))
     assert seen[-1] == ("diagnosing", len(done.outcomes), len(done.outcomes))
-    assert [one.verdict for one in done.outcomes if one.verdict == "failed"] == []
+    assert [outcome.verdict for outcome in done.outcomes if outcome.verdict == "failed"] == []
     assert len(done.engines) == 1
 
 
@@ -58,7 +58,7 @@ def test_what_the_diagnosis_is_given_tells_neither_number_nor_seed(proof):
 def test_the_process_that_answers_never_loads_the_challenge(proof):
     folder = proof[0].folder
     answers = [json.loads(path.read_text()) for path in folder.open.glob(f"*/{ANSWER}")]
-    assert [one["knows_the_challenge"] for one in answers] == [False] * len(answers)
+    assert [answer["knows_the_challenge"] for answer in answers] == [False] * len(answers)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_the_same_command_goes_on_without_doing_anything_twice(proof):
     again = prove(folder.path, PLAN, Wishes(), lambda what, done, of: seen.append((what, done, of)))
     assert {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")} == before
     assert again.seal == proof[0].seal
-    assert [one.number for one in again.outcomes] == [one.number for one in proof[0].outcomes]
+    assert [outcome.number for outcome in again.outcomes] == [outcome.number for outcome in proof[0].outcomes]
 
 
 def test_a_proof_leaves_a_document_a_row_per_case_and_a_small_table(proof, tmp_path):

@@ -9,10 +9,10 @@ from study.evaluation.challenge.controls import CONTROLS
 
 
 def test_noise_alone_and_a_clean_device_name_nothing_and_are_asked_once(tmp_path):
-    quick = [one for one in CONTROLS if one.name in ("a silent recording", "strength zero")]
+    quick = [control for control in CONTROLS if control.name in ("a silent recording", "strength zero")]
     seen = []
     first = run_controls(tmp_path, 51_502, 1, lambda done, of: seen.append((done, of)), quick)
-    assert [(one.name, one.held) for one in first] == [(f"{one.name}, seed 51502", True) for one in quick]
+    assert [(each.name, each.held) for each in first] == [(f"{each.name}, seed 51502", True) for each in quick]
     assert seen == [(0, 2), (1, 2), (2, 2)]
     again = run_controls(tmp_path, 51_502, 1, lambda done, of: seen.append((done, of)), quick)
     assert again == first and seen[-1] == (2, 2)
@@ -29,4 +29,4 @@ def test_a_case_whose_process_died_is_asked_again(tmp_path):
 @pytest.mark.timeout(0)
 def test_every_control_holds(tmp_path):
     found = run_controls(tmp_path, 51_502, 2, lambda done, of: None)
-    assert [one for one in found if not one.held] == []
+    assert [each for each in found if not each.held] == []

@@ -11,7 +11,7 @@ SHORT = Rig((0,), 1000, 3)
 
 @pytest.fixture(scope="module")
 def asked():
-    return {one.name: one.draw(50_031, SHORT) for one in CONTROLS}
+    return {control.name: control.draw(50_031, SHORT) for control in CONTROLS}
 
 
 def test_shuffling_keeps_the_command_and_each_sample(asked):

@@ -18,20 +18,20 @@ def bank():
 
 
 def test_six_hundred_draws_hold_what_the_protocol_asks_for(bank):
-    kinds = Counter(one.kind for one in bank)
+    kinds = Counter(each.kind for each in bank)
     assert len(bank) == 600
     assert kinds["nothing"] >= 150
     assert kinds["outside"] + kinds["without"] >= 120
-    assert Counter((one.kind, one.bank) for one in bank) == {key: WHOLE_TURNS * n for key, n in COUNTS.items()}
+    assert Counter((each.kind, each.bank) for each in bank) == {key: WHOLE_TURNS * n for key, n in COUNTS.items()}
 
 
 def test_every_effect_takes_its_turn_as_what_is_missing_and_as_what_must_not_be_named(bank):
     for kind, names in (("single", EFFECTS), ("without", EFFECTS), ("outside", DECOYS)):
-        assert {one.effects[0] for one in bank if one.kind == kind and one.bank == "main"} == set(names)
+        assert {each.effects[0] for each in bank if each.kind == kind and each.bank == "main"} == set(names)
 
 
 def test_a_part_of_a_bank_is_a_fair_sample_of_it(bank):
-    first = Counter(one.kind for one in bank[:40])
+    first = Counter(each.kind for each in bank[:40])
     assert first == Counter(kind for kind, _ in TURN)
 
 
@@ -41,23 +41,25 @@ def test_the_same_number_is_drawn_alike_whatever_comes_after(bank):
 
 
 def test_strengths_spread_from_invisible_to_strong(bank):
-    drawn = [one.strengths[0] for one in bank if one.kind == "single"]
+    drawn = [each.strengths[0] for each in bank if each.kind == "single"]
     assert min(drawn) < 0.05 and max(drawn) > 0.95
     assert abs(np.mean(drawn) - 0.5) < 0.05
 
 
 def test_what_a_device_can_have_only_one_of_is_never_paired(bank):
-    pairs = [set(one.effects) for one in bank if one.kind == "pair"]
+    pairs = [set(each.effects) for each in bank if each.kind == "pair"]
     assert not any(pair <= row for pair in pairs for row in ONE_ROW)
 
 
 def test_most_rigs_have_one_axis_and_some_have_three(bank):
-    axes = Counter(len(one.rig.axes) for one in bank)
+    axes = Counter(len(each.rig.axes) for each in bank)
     assert axes[1] > 300 and axes[2] > 50 and axes[3] > 60
 
 
 def test_a_hand_is_concealed_from_calibrated_models_alone(bank):
-    assert all(one.concealed == "calibrated" and 0 in one.rig.axes for one in bank if "hand_impedance" in one.effects)
+    assert all(
+        each.concealed == "calibrated" and 0 in each.rig.axes for each in bank if "hand_impedance" in each.effects
+    )
 
 
 def test_a_small_rig_records_its_axes_alone():
@@ -73,8 +75,8 @@ def test_a_small_rig_records_its_axes_alone():
 def test_extras_change_the_readings_by_less_than_the_noise_and_are_the_same_for_the_same_seed():
     rig = Rig((0,), 1000, 3, 1.0)
     bare, first, again = (
-        draw_case(50_012, (), "calibrated", None, "", one).recording.position.samples
-        for one in (Rig((0,), 1000, 3), rig, rig)
+        draw_case(50_012, (), "calibrated", None, "", each).recording.position.samples
+        for each in (Rig((0,), 1000, 3), rig, rig)
     )
     assert np.array_equal(first, again)
     assert 0.0 < np.std(first - bare) < 1e-5

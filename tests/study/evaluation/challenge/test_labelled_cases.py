@@ -56,7 +56,7 @@ def test_where_nothing_is_missing_only_noise_is_left():
 
 def test_the_labelled_saturation_explains_its_case():
     recording, model, (truth,) = opened("open-07")
-    (effect,) = (one for one in ACTUATOR if one.name == truth["effect"])
+    (effect,) = (each for each in ACTUATOR if each.name == truth["effect"])
     plan = DrivePlan(recording.command.samples, recording.segments)
     bench, _ = retuned(model, recording.response.samples, plan)
     axis = "xyz".index(truth["axis"])

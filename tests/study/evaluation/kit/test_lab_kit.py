@@ -22,10 +22,10 @@ def test_every_right_answer_is_a_name_of_the_vocabulary():
 def test_nothing_is_changed_twice_as_often_and_the_order_is_drawn(tmp_path: Path) -> None:
     labels = draw_labels(tmp_path / "one.csv", 2, seed=1)
     other = draw_labels(tmp_path / "other.csv", 2, seed=2)
-    assert [one.recording for one in labels] == [f"rec_{n:02d}" for n in range(1, 15)]
-    assert [one.change for one in labels].count(NOTHING) == 4
-    assert [one.change for one in labels] != [one.change for one in other]
-    assert len({one.salt for one in labels}) == 14
+    assert [label.recording for label in labels] == [f"rec_{n:02d}" for n in range(1, 15)]
+    assert [label.change for label in labels].count(NOTHING) == 4
+    assert [label.change for label in labels] != [each.change for each in other]
+    assert len({label.salt for label in labels}) == 14
     assert read_labels(tmp_path / "one.csv") == labels
 
 

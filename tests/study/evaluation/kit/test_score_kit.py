@@ -22,7 +22,7 @@ def diagnosis(effect: str = "", rivals: tuple[str, ...] = (), value: float = 0.0
     known = EFFECTS_BY_NAME.get(effect)
     errors = Errors(0.5, 0.4, 0.1 if effect else 0.4, 0.05)
     estimate = Estimate(value, "kg", (0.9 * value, 1.1 * value))
-    beside = tuple(Rival(one, 0.3, True, "as good") for one in rivals)
+    beside = tuple(Rival(rival, 0.3, True, "as good") for rival in rivals)
     named = (
         ()
         if known is None
@@ -34,9 +34,9 @@ def diagnosis(effect: str = "", rivals: tuple[str, ...] = (), value: float = 0.0
 
 
 def answered(folder: Path, said: dict[str, Diagnosis]) -> Path:
-    for name, one in said.items():
+    for name, each in said.items():
         (folder / name).mkdir(parents=True)
-        write_diagnosis(folder / name / "diagnosis.json", one)
+        write_diagnosis(folder / name / "diagnosis.json", each)
     return folder
 
 
@@ -50,7 +50,7 @@ def test_what_was_sealed_is_scored(tmp_path: Path) -> None:
     seal_labels(table)
     said = {"rec_01": diagnosis("added_mass"), "rec_02": diagnosis(), "rec_03": diagnosis("sensor_gain")}
     score = score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv")
-    assert [one.right for one in score.rows] == [True, True, False, False]
+    assert [row.right for row in score.rows] == [True, True, False, False]
     assert score.rows[0].inside is True
     lines = score_lines(score)
     assert lines[0].startswith("changes named: 1 of 3, 33 %")
@@ -72,9 +72,9 @@ def test_leaving_out_a_diagnosis_raises_no_figure(tmp_path: Path) -> None:
     }
     whole = score_kit(table, answered(tmp_path / "all", bad), tmp_path / "all.csv").figures
     for name in ("rec_01", "rec_02", "rec_03"):
-        kept = {other: one for other, one in bad.items() if other != name}
+        kept = {other: each for other, each in bad.items() if other != name}
         fewer = score_kit(table, answered(tmp_path / f"no_{name}", kept), tmp_path / f"no_{name}.csv").figures
-        assert [one.name for one in fewer] == [one.name for one in whole]
+        assert [each.name for each in fewer] == [each.name for each in whole]
         assert all((less.value or 0.0) <= (more.value or 0.0) for less, more in zip(fewer, whole, strict=True))
 
 
@@ -83,7 +83,7 @@ def test_a_missing_number_counts_as_outside_its_interval(tmp_path: Path) -> None
     seal_labels(table)
     said = {"rec_02": diagnosis(), "rec_03": diagnosis("sensor_misalignment", value=8.0)}
     score = score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv")
-    assert [one.inside for one in score.rows] == [False, None, True, None]
+    assert [row.inside for row in score.rows] == [False, None, True, None]
 
 
 def test_a_rival_that_cannot_be_told_apart_counts(tmp_path: Path) -> None:

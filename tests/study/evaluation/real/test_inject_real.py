@@ -119,8 +119,8 @@ def test_the_labels_say_what_was_put_in_and_the_clean_half_stays(carrier, tmp_pa
     folder = opened(tmp_path / "bank", 4, False)
     names = seal_injections(folder, (carrier,), 8, 4)
     labels = [json.loads(folder.label(number).read_text()) for number in range(8)]
-    assert [one["name"] for one in labels] == list(names)
-    assert {bool(one["effects"]) for one in labels} == {True, False}
+    assert [each["name"] for each in labels] == list(names)
+    assert {bool(each["effects"]) for each in labels} == {True, False}
     readings, commands = carrier.recording.response.samples, carrier.recording.command.samples
     for label in labels:
         place = folder.open / label["name"]

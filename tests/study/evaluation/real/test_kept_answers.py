@@ -81,7 +81,7 @@ def refusal(plan: RealPlan) -> StudyError:
 def test_an_answer_says_all_that_it_was_made_from(answered: RealPlan) -> None:
     origin = json.loads(kept(answered).read_text())["provenance"]
     names = ["run.npz", "run.toml", "axis.model.toml", "later.npz", "later.toml"]
-    assert [one["file"] for one in origin["parents"]] == names
+    assert [each["file"] for each in origin["parents"]] == names
     assert origin["settings"] == {"seconds": 20.0}
 
 

@@ -108,7 +108,7 @@ def test_one_recording_is_answered_and_the_others_are_said(folder: Path, tmp_pat
     assert axis.numbers[0].name == "mass" and axis.numbers[0].holds_nominal
     assert axis.objections == ("It is simulated.",)
     assert torn.verdict == "refused" and "run.npz" in torn.answer
-    assert [one.where for one in done.results.troubles] == ["nobody_knows"]
+    assert [trouble.where for trouble in done.results.troubles] == ["nobody_knows"]
     page = done.page.read_text()
     assert "It is simulated." in page and "nobody_knows" in page
     assert done.table.read_text().splitlines()[1].startswith(f"axis,run,{axis.verdict},sensor_offset")
@@ -133,7 +133,7 @@ def test_a_recording_at_which_the_program_crashes_is_said_and_the_others_are_ans
         diagnose_folder(RealPlan(folder, tmp_path / "strict"), silent)
     monkeypatch.delenv("HAPTEQ_STRICT")
     done = diagnose_folder(RealPlan(folder, tmp_path / "out"), silent)
-    assert [one.verdict for one in done.results.answers] == ["refused", "refused"]
+    assert [answer.verdict for answer in done.results.answers] == ["refused", "refused"]
     assert "crashed at this recording (ZeroDivisionError: a fault of the program)" in done.results.answers[0].answer
     assert "ZeroDivisionError" in done.page.read_text()
 
@@ -170,7 +170,7 @@ def test_faults_are_injected_under_a_seal_and_counted(folder: Path, tmp_path: Pa
     sealed = sorted((tmp_path / "out" / "injected" / "sealed").glob("*.json"))
     assert len(sealed) == 2
     assert len((tmp_path / "out" / "injected" / "labels.sha256").read_text().splitlines()) == 2
-    assert not any(one.failed for one in done.results.injected)
+    assert not any(each.failed for each in done.results.injected)
     assert "Faults injected into real recordings" in done.page.read_text()
     assert any(line.startswith("Injected: ") for line in real_lines(done))
 
@@ -179,7 +179,7 @@ def test_every_folder_of_public_recordings_is_understood(shared: Path) -> None:
     if not (shared / "recordings").is_dir():
         pytest.skip("the public recordings are not beside this checkout")
     found = read_real_folder(shared / "recordings")
-    by_name = {one.name: one for one in found.recordings}
+    by_name = {recording.name: recording for recording in found.recordings}
     # Folders that no shipped map describes are named as such, and stop none of the others.
     without_map = {trouble.where for trouble in found.troubles}
     assert all("no map is for its files" in trouble.why for trouble in found.troubles)
@@ -190,9 +190,9 @@ def test_every_folder_of_public_recordings_is_understood(shared: Path) -> None:
     }  # fmt: skip
     on_a_body = by_name["vibration_actuator_noise_condition2_noise"]
     assert on_a_body.before is not None and on_a_body.before.files[0].name == "condition1_noise.npz"
-    assert [one.files[0].stem for one in on_a_body.tests] == ["condition2_clip"]
-    assert [one.name for one in by_name["silverbox"].tests] == ["silverbox_growing_noise", "silverbox_schroeder"]
-    assert all(one.found.source.map.diagnosis.objections for one in found.recordings)
+    assert [test.files[0].stem for test in on_a_body.tests] == ["condition2_clip"]
+    assert [test.name for test in by_name["silverbox"].tests] == ["silverbox_growing_noise", "silverbox_schroeder"]
+    assert all(recording.found.source.map.diagnosis.objections for recording in found.recordings)
     assert by_name["haptic_paddle_torque"].model().rotational
 
 
@@ -206,7 +206,7 @@ def test_the_figures_of_the_public_recordings_are_reached(shared: Path, tmp_path
     for name in ("emps", "haptic_paddle", "vibration_actuator"):
         (few / name).symlink_to(shared / "recordings" / name)
     done = diagnose_folder(RealPlan(few, tmp_path / "out"), silent)
-    answers = {one.recording: one for one in done.results.answers}
+    answers = {answer.recording: answer for answer in done.results.answers}
     axis, lever = answers["emps"], answers["haptic_paddle_torque"]
     assert axis.held_out.after <= 0.28 * axis.held_out.retuned
     assert axis.numbers[0].value == pytest.approx(95.1, rel=0.01)
@@ -215,4 +215,4 @@ def test_the_figures_of_the_public_recordings_are_reached(shared: Path, tmp_path
     pair = answers["vibration_actuator_noise_condition2_noise"].pair
     assert pair.with_effects <= 0.8 * pair.gain
     assert "body_on_actuator" in pair.returned
-    assert not any(one.verdict == "explained" for one in answers.values())
+    assert not any(answer.verdict == "explained" for answer in answers.values())

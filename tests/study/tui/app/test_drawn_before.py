@@ -26,7 +26,7 @@ def test_of_screens_that_are_gone_nothing_drawn_is_kept():
                 await pilot.pause()
                 forget_drawn_before(app)
                 gc.collect()
-                kept.append(sum(isinstance(one, StylesCache | FooterKey) for one in gc.get_objects()))
+                kept.append(sum(isinstance(get_object, StylesCache | FooterKey) for get_object in gc.get_objects()))
 
     asyncio.run(story())
     assert kept[1] == kept[-1]

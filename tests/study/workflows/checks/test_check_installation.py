@@ -66,7 +66,9 @@ def distribution(tmp_path, monkeypatch):
         folder = tmp_path / "site" / f"{name}-1.0.dist-info"
         folder.mkdir(parents=True)
         lines = ["Metadata-Version: 2.1", f"Name: {name}", "Version: 1.0", f"Requires-Python: {python}"]
-        (folder / "METADATA").write_text("\n".join([*lines, *(f"Requires-Dist: {one}" for one in requires), ""]))
+        (folder / "METADATA").write_text(
+            "\n".join([*lines, *(f"Requires-Dist: {require}" for require in requires), ""])
+        )
         (folder / "top_level.txt").write_text(top_level)
         monkeypatch.syspath_prepend(tmp_path / "site")
         importlib.invalidate_caches()

@@ -67,11 +67,11 @@ def test_a_file_that_is_no_effect_is_refused(tmp_path, text, said):
 def test_at_other_axes_all_letters_turn_along(model_file, tmp_path):
     entry = write_entry(model_file, tmp_path / "drag.py")
     turned = replace(entry, law=law_of("-2.0*vx*y + 0.1*fz + 0*t", "force", "x"))
-    assert [one.law.text for one in effects_of(turned, Channels())] == [
+    assert [each.law.text for each in effects_of(turned, Channels())] == [
         "-2.0*vx*y + 0.1*fz + 0*t", "-2.0*vy*z + 0.1*fx + 0*t", "-2.0*vz*x + 0.1*fy + 0*t"
     ]  # fmt: skip
     only = replace(entry, law=law_of("-2.0*vy**3", "force", "y"))
-    assert [one.law.text for one in effects_of(only, Channels(("u",), ("a",)))] == ["-2.0*vx**3"]
+    assert [each.law.text for each in effects_of(only, Channels(("u",), ("a",)))] == ["-2.0*vx**3"]
 
 
 def recording(*laws) -> Recording:

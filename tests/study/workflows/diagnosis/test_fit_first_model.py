@@ -70,7 +70,7 @@ def fitted(folder: Path, recording: Recording, structure: str = "auto") -> First
 
 
 def inside(done: FirstModel, name: str, truth: float) -> bool:
-    (number,) = [one for one in done.choice.fit.numbers if one.name == name]
+    (number,) = [each for each in done.choice.fit.numbers if each.name == name]
     return number.half is not None and abs(number.value - truth) <= number.half
 
 
@@ -84,7 +84,7 @@ def test_mass_damping_and_stiffness_come_back_within_their_intervals(tmp_path, s
 
 def test_the_intervals_are_no_wider_than_a_tenth_where_there_is_hardly_noise(tmp_path):
     done = fitted(tmp_path, recorded(device(0.4, 6.0, 900.0)), "mass-spring")
-    assert all(one.half is not None and one.half < 0.1 * one.value for one in done.choice.fit.numbers)
+    assert all(number.half is not None and number.half < 0.1 * number.value for number in done.choice.fit.numbers)
 
 
 def test_coupled_axes_give_symmetric_matrices(tmp_path):
@@ -107,7 +107,7 @@ def test_coupled_axes_give_symmetric_matrices(tmp_path):
 def test_auto_takes_the_structure_that_is_there(tmp_path, model, structure):
     done = fitted(tmp_path, recorded(model))
     assert done.choice.fit.kind == structure
-    assert {"massless", "motor", "mass-spring"} <= {one.kind for one in done.choice.tried}
+    assert {"massless", "motor", "mass-spring"} <= {each.kind for each in done.choice.tried}
 
 
 def test_a_motion_beside_the_force_of_another_recording_is_not_explained(tmp_path):

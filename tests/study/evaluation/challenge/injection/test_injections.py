@@ -30,14 +30,14 @@ def injected(effect: str, strength: float = 0.7, channels: int = 3):
     return inject(recording(channels), effect, strength, np.random.default_rng(2))
 
 
-@pytest.mark.parametrize("effect", [one.effect for one in INJECTIONS])
+@pytest.mark.parametrize("effect", [injection.effect for injection in INJECTIONS])
 def test_a_stronger_fault_changes_more(effect):
     weak, strong = injected(effect, 0.2), injected(effect, 0.9)
     assert 0 < weak.change.max() < strong.change.max()
     assert np.isfinite(strong.recording.response.samples).all()
 
 
-@pytest.mark.parametrize("effect", [one.effect for one in INJECTIONS])
+@pytest.mark.parametrize("effect", [injection.effect for injection in INJECTIONS])
 def test_the_command_stays_as_it_is(effect):
     assert np.array_equal(injected(effect).recording.command.samples, recording().command.samples)
 
@@ -77,7 +77,7 @@ def swinging() -> Recording:
     )
 
 
-@pytest.mark.parametrize("effect", [one.effect for one in FORCE_INJECTIONS])
+@pytest.mark.parametrize("effect", [force_injection.effect for force_injection in FORCE_INJECTIONS])
 def test_a_fault_of_mechanism_or_actuator_changes_the_command_alone_and_more_the_stronger(effect):
     weak, strong = (inject(swinging(), effect, strength, np.random.default_rng(2)) for strength in (0.2, 0.9))
     assert 0 < weak.change.max() < strong.change.max()

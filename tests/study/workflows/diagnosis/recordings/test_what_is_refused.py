@@ -58,7 +58,7 @@ def test_a_position_that_not_all_recordings_have_is_left_out_and_it_is_said(file
     write_recording(tmp_path / "blind.h5", replace(made.recorded(1, seed=8), position=None))
     sources = (files / "rec.h5", tmp_path / "blind.h5")
     engine = asked_of_engine(plan(files, tmp_path / "out", sources=sources), findings)
-    assert all(one.position is None for one in engine.recordings)
+    assert all(recording.position is None for recording in engine.recordings)
     assert "the position was left out" in read_input(sources, seed=1).remarks[0]
 
 
