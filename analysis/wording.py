@@ -75,6 +75,12 @@ def capital(sentence: str) -> str:
     return sentence[:1].upper() + sentence[1:]
 
 
+def begun(sentence: str) -> str:
+    """With a capital, unless the name of a file or an effect comes first: that stays as it is."""
+    named = any(mark in sentence.partition(" ")[0] for mark in "./\\_")
+    return sentence if named else capital(sentence)
+
+
 def ended(sentence: str) -> str:
     return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."
 

@@ -3,20 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from analysis.diagnosis.data.command_gaps import across_gaps
-from analysis.diagnosis.data.force_driven import all_force_driven
-from analysis.diagnosis.data.found_segments import with_found_segments
-from analysis.diagnosis.data.input_checks import (
-    FEW_CYCLES,
-    NothingToDiagnose,
-    require_alike,
-    require_different,
-    require_model_of,
-    require_something,
-)
+from analysis.diagnosis.data.input_checks import require_alike, require_model_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.first_model.fitted_first import FirstModel, first_model_of, fitted_model
-from analysis.diagnosis.first_model.plain_form import plain_form
+from analysis.diagnosis.prepare_recordings import prepared, same_position
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -46,9 +36,11 @@ def diagnose_values(
     names = settings.names or tuple(f"recording {number}" for number in range(1, len(given) + 1))
     clean_names = tuple(f"clean recording {number}" for number in range(1, len(settings.clean) + 1))
     require_alike((*given, *settings.clean), (*names, *clean_names))
-    found, remarks = _prepared(given, names, model is None and not settings.clean)
-    clean, _ = _prepared(settings.clean, clean_names, False) if settings.clean else ((), ())
-    settings = replace(settings, names=names, clean=clean)
+    ready = prepared(given, names, model is None and not settings.clean)
+    clean = prepared(settings.clean, clean_names, False).recordings if settings.clean else ()
+    every = same_position((*ready.recordings, *clean))
+    found, remarks = every.recordings[: len(given)], (*ready.remarks, *every.remarks)
+    settings = replace(settings, names=names, clean=every.recordings[len(given) :])
     if model is None:
         first = _first_model(found, settings, progress)
         model, remarks = first.model, (*remarks, *first.remarks)
@@ -57,26 +49,6 @@ def diagnose_values(
         require_model_of(model, found)
     findings = diagnose(found, model, settings, map_, progress)
     return replace(findings, remarks=(*remarks, *findings.remarks))
-
-
-def _prepared(
-    recordings: Sequence[Recording], names: tuple[str, ...], plain: bool
-) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """In the form that errors are measured in, and what must be known of that. plain: one motion per force, as a force
-    balance needs it, and few cycles are a remark. Raises NothingToDiagnose."""
-    parts = [with_found_segments(each) for each in recordings]
-    read, repeats = tuple(each for each, _ in parts), tuple(text for _, text in parts if text)
-    formed, said = plain_form(read) if plain else (read, ())
-    driven, gaps = across_gaps(all_force_driven(formed), names)
-    few: tuple[str, ...] = ()
-    try:
-        require_different(driven, names)
-        require_something(driven, names)
-    except NothingToDiagnose as refusal:
-        if not plain or not all(FEW_CYCLES in problem for problem in refusal.problems):
-            raise
-        few = refusal.problems
-    return driven, (*repeats, *said, *gaps, *few)
 
 
 def _first_model(recordings: Sequence[Recording], settings: DiagnosisSettings, progress: Progress) -> FirstModel:

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from analysis.diagnosis.balance.weigh import Balance
-from analysis.diagnosis.data.command_gaps import across_gaps
 from analysis.diagnosis.data.force_driven import all_force_driven
-from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of, require_something
+from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.played_errors import PlayedError, played_error
 from analysis.diagnosis.first_model.fitted_first import FirstModel
 from analysis.diagnosis.first_model.plain_form import plain_form
+from analysis.diagnosis.prepare_recordings import prepared, same_position
 from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, named_sentences
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.reference.learn_model_error import NothingLearned
@@ -27,15 +27,9 @@ from study.errors import StudyError
 from study.evaluation.real.real_folder import RealRecording
 from study.importing.build_recording import build_recording
 from study.importing.map_library import FoundMap
-from study.workflows.diagnosis.diagnosis_input import (
-    DiagnosisInput,
-    nothing_to_diagnose,
-)
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, nothing_to_diagnose
 from study.workflows.diagnosis.fitted_first import first_model_of, fitted_model
 from study.workflows.forked_map import forked_map
-
-SHORT = "too short"
-"""What is said of a recording that holds too few cycles: of a real one, for which there is no other, it is a remark."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,26 +111,22 @@ def _read(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: 
     on_progress("importing", 0.0)
     if why := wanted.found.source.map.diagnosis.skip:
         raise nothing_to_diagnose((why,))
-    driven, formed = _formed(wanted, imported(wanted.found))
-    (recording,), gaps = across_gaps(driven, (wanted.name,))
-    remarks: tuple[str, ...] = ()
+    # Of a real recording, for which there is no other, few cycles are a remark.
     try:
-        require_something((recording,), (wanted.name,))
+        ready = prepared((imported(wanted.found),), (wanted.name,), _is_plain(wanted), short=True)
     except NothingToDiagnose as refusal:
-        if not all(SHORT in problem for problem in refusal.problems):
-            raise nothing_to_diagnose(refusal.problems) from refusal
-        remarks = tuple(f"{problem}." for problem in refusal.problems)
-    before = None if wanted.before is None else imported(wanted.before)
+        raise nothing_to_diagnose(refusal.problems) from refusal
+    before = () if wanted.before is None else (imported(wanted.before),)
+    every = same_position((*ready.recordings, *before))
+    recording = every.recordings[0]
     first = _model(wanted, recording, bounds, on_progress)
-    return _Read(recording, first.model, first.balances, (*formed, *gaps, *remarks, *first.remarks), before)
+    remarks = (*ready.remarks, *every.remarks, *first.remarks)
+    return _Read(recording, first.model, first.balances, remarks, every.recordings[1] if before else None)
 
 
-def _formed(wanted: RealRecording, recording: Recording) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """In the form in which forces can be balanced, where no model says what its commands and responses are."""
-    if wanted.before is not None or wanted.model() is not None:
-        return (recording,), ()
-    formed, said = plain_form((recording,))
-    return all_force_driven(formed), said
+def _is_plain(wanted: RealRecording) -> bool:
+    """Where no model says what its commands and responses are, in the form in which forces can be balanced."""
+    return wanted.before is None and wanted.model() is None
 
 
 def _model(
@@ -188,7 +178,9 @@ def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherT
     """Nothing is fitted to it but, where the map says so, its volume."""
     title, free = test.source.map.title, test.source.map.diagnosis.volume_free
     try:
-        (recording,), _ = _formed(wanted, imported(test))
+        recording = imported(test)
+        if _is_plain(wanted):
+            (recording,) = all_force_driven(plain_form((recording,))[0])
         retuned, after = (played_error(recording, model, "all") for model in (retuned_model(found), found.improved))
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         said = problem.happened if isinstance(problem, StudyError) else f"{problem}."

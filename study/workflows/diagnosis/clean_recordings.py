@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_alike
+from analysis.diagnosis.prepare_recordings import same_position
 from study.errors import StudyError
-from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, nothing_to_diagnose, read_input, same_position
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, nothing_to_diagnose, read_input
 
 NOT_ALIKE = "Give clean recordings of the same device, with the same channels, units and rate, or leave --clean out."
 
@@ -37,7 +38,8 @@ def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[P
     except NothingToDiagnose as refusal:
         raise nothing_to_diagnose(refusal.problems, NOT_ALIKE) from refusal
     number = len(found.recordings)
-    every = same_position(replace(found, recordings=(*found.recordings, *beside.recordings)))
+    every = same_position((*found.recordings, *beside.recordings))
     return WithClean(
-        replace(every, recordings=every.recordings[:number]), replace(beside, recordings=every.recordings[number:])
+        replace(found, recordings=every.recordings[:number], remarks=(*found.remarks, *every.remarks)),
+        replace(beside, recordings=every.recordings[number:]),
     )

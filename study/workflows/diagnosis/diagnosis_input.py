@@ -1,33 +1,21 @@
 """What a diagnosis starts from: recordings or a session's trials, and the model that they are compared with."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
-import numpy as np
-
-from analysis.diagnosis.data.command_gaps import across_gaps
 from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
-from analysis.diagnosis.data.force_driven import all_force_driven
-from analysis.diagnosis.data.found_segments import with_found_segments
-from analysis.diagnosis.data.input_checks import (
-    FEW_CYCLES,
-    NothingToDiagnose,
-    require_alike,
-    require_different,
-    require_model_of,
-    require_something,
-)
-from analysis.diagnosis.first_model.plain_form import plain_form
-from analysis.wording import listed
+from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_alike, require_model_of
+from analysis.diagnosis.prepare_recordings import comparable, prepared
+from analysis.wording import begun
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.workflows.recording.recording_from import recording_from
 
-STILL = 1e-9
-"""Of its value: what changes by less is the rounding of numbers."""
+Checked = TypeVar("Checked")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,39 +48,26 @@ def read_input(
         from study.workflows.diagnosis.session_as_recordings import session_recordings
 
         session = session_recordings(folders[0], seed)
-        found = DiagnosisInput(
-            (session.recording,), (session.name,), session.parents, session.remarks, session.simulated,
+        kept = _refusing(lambda: comparable((session.recording,), (session.name,), plain))
+        return DiagnosisInput(
+            kept.recordings, (session.name,), session.parents, (*session.remarks, *kept.remarks), session.simulated,
             session.spring_n_per_m,
         )  # fmt: skip
-    else:
-        taken = [recording_from(source) for source in sources]
-        read = tuple(recording for recording, _ in taken)
-        _require_alike(read, _names(sources))
-        read, stated = _as_forces(read, constants)
-        read, repeats = _with_segments(read, sources)
-        formed, said = plain_form(read) if plain else (read, ())
-        driven, gaps = across_gaps(all_force_driven(formed), _names(sources))
-        found = DiagnosisInput(
-            driven,
-            _names(sources),
-            tuple(sources),
-            (*_notes(taken), *stated, *repeats, *said, *gaps),
-            constants=constants,
-        )
-    said = _few_cycles(found, plain)
-    return _moving_position(same_position(replace(found, remarks=(*found.remarks, *said))))
+    taken = [recording_from(source) for source in sources]
+    read, names = tuple(recording for recording, _ in taken), _names(sources)
+    _refusing(lambda: require_alike(read, names))
+    forces, stated = _as_forces(read, constants)
+    ready = _refusing(lambda: prepared(forces, names, plain))
+    remarks = (*_notes(taken), *stated, *ready.remarks)
+    return DiagnosisInput(ready.recordings, names, tuple(sources), remarks, constants=constants)
 
 
-def _few_cycles(found: DiagnosisInput, plain: bool) -> tuple[str, ...]:
-    """A remark where no model is given, as of a real recording, for which there is no other. Raises StudyError."""
+def _refusing(checked: Callable[[], Checked]) -> Checked:
+    """What it returns. Raises StudyError where it finds nothing to diagnose."""
     try:
-        require_different(found.recordings, found.names)
-        require_something(found.recordings, found.names)
+        return checked()
     except NothingToDiagnose as refusal:
-        if not plain or not all(FEW_CYCLES in problem for problem in refusal.problems):
-            raise nothing_to_diagnose(refusal.problems) from refusal
-        return tuple(f"{_begun(problem)}." for problem in refusal.problems)
-    return ()
+        raise nothing_to_diagnose(refusal.problems) from refusal
 
 
 def _as_forces(
@@ -105,7 +80,7 @@ def _as_forces(
         found = [with_force_constant(recording, constants) for recording in recordings]
     except NoForceConstant as refusal:
         raise WrongUseError(
-            "The force constant cannot be used", f"{_begun(str(refusal))}.", "Leave --force-constant out, or mend it.",
+            "The force constant cannot be used", f"{begun(str(refusal))}.", "Leave --force-constant out, or mend it.",
             saved="Nothing was written.",
         ) from refusal  # fmt: skip
     return tuple(recording for recording, _ in found), (found[0][1],)
@@ -113,24 +88,6 @@ def _as_forces(
 
 def _notes(taken: Sequence[tuple[Recording, tuple[str, ...]]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(note for _, notes in taken for note in notes))
-
-
-def _with_segments(
-    recordings: Sequence[Recording], sources: Sequence[Path]
-) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """Of parts that repeat, where a recording has none of its own; and what was found."""
-    found = [with_found_segments(recording) for recording in recordings]
-    told = [(source.stem, said) for source, (_, said) in zip(sources, found, strict=True) if said]
-    said = tuple(said if len(sources) == 1 else f"{name}: {said}" for name, said in told)
-    return tuple(recording for recording, _ in found), said
-
-
-def _require_alike(recordings: Sequence[Recording], names: Sequence[str]) -> None:
-    """Before any form is found for all of them. Raises StudyError."""
-    try:
-        require_alike(recordings, names)
-    except NothingToDiagnose as refusal:
-        raise nothing_to_diagnose(refusal.problems) from refusal
 
 
 def given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
@@ -156,13 +113,7 @@ def nothing_to_diagnose(problems: Sequence[str], do_now: str = "Correct them, or
 
 
 def _sentences(problems: Sequence[str]) -> str:
-    return " ".join(f"{_begun(problem).rstrip('.')}." for problem in problems)
-
-
-def _begun(sentence: str) -> str:
-    """With a capital, unless the name of a file or an effect comes first: that stays as it is."""
-    named = any(mark in sentence.partition(" ")[0] for mark in "./\\_")
-    return sentence if named else sentence[:1].upper() + sentence[1:]
+    return " ".join(f"{begun(problem).rstrip('.')}." for problem in problems)
 
 
 def _names(sources: Sequence[Path]) -> tuple[str, ...]:
@@ -171,37 +122,3 @@ def _names(sources: Sequence[Path]) -> tuple[str, ...]:
     if len(set(names)) == len(names):
         return names
     return tuple(f"{source.parent.name}/{source.name} ({number})" for number, source in enumerate(sources, start=1))
-
-
-def same_position(found: DiagnosisInput) -> DiagnosisInput:
-    """Compared where every recording has it in the same channels; where not, it is left out, and that is said."""
-    kinds = {
-        None if each.position is None else (each.position.channels, each.position.units) for each in found.recordings
-    }
-    if len(kinds) < 2:
-        return found
-    said = "Only some recordings hold the same position channels: the position was left out of the comparison."
-    return replace(
-        found,
-        recordings=tuple(replace(each, position=None) for each in found.recordings),
-        remarks=(*found.remarks, said),
-    )
-
-
-def _moving_position(found: DiagnosisInput) -> DiagnosisInput:
-    """What stands still throughout says nothing, and its errors cannot be counted in units of anything."""
-    positions = [each.position for each in found.recordings if each.position is not None]
-    if not positions:
-        return found
-    courses = np.vstack([each.samples for each in positions])
-    known = np.where(np.isfinite(courses), courses, np.nanmedian(courses, axis=0))
-    still = np.ptp(known, axis=0) <= STILL * np.abs(known).max(axis=0)
-    dead = [name for name, stands in zip(positions[0].channels, still, strict=True) if stands]
-    if not dead:
-        return found
-    said = f"Position {listed(dead)} never changes: the position was left out of the comparison."
-    return replace(
-        found,
-        recordings=tuple(replace(each, position=None) for each in found.recordings),
-        remarks=(*found.remarks, said),
-    )

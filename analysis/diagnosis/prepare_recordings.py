@@ -1,0 +1,86 @@
+"""Recordings in the form in which they are compared with a model: the same for files, real recordings and values.
+
+In this order: segments are found where a recording states none, commands and responses are brought into the form that
+a force balance needs (only where no model says what they are), motions become force-driven, gaps in commands are left
+out; then what cannot be compared is refused, and positions that say nothing are left out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.data.command_gaps import across_gaps
+from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.data.found_segments import with_found_segments
+from analysis.diagnosis.data.input_checks import FEW_CYCLES, NothingToDiagnose, require_different, require_something
+from analysis.diagnosis.first_model.plain_form import plain_form
+from analysis.wording import begun, listed
+from equalizer.signals.recording import Recording
+
+STILL = 1e-9
+"""Of its value: what changes by less is the rounding of numbers."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedRecordings:
+    recordings: tuple[Recording, ...]
+    remarks: tuple[str, ...] = ()
+    """What must be known of them: one sentence each."""
+
+
+def prepared(
+    recordings: Sequence[Recording], names: Sequence[str], plain: bool, short: bool | None = None
+) -> PreparedRecordings:
+    """recordings: alike, in the order of names. plain: one motion for each force, as a force balance needs it. short:
+    few cycles are a remark and no refusal; None: as plain. Raises NothingToDiagnose."""
+    found = [with_found_segments(each) for each in recordings]
+    told = [(name.rsplit(".", 1)[0], text) for name, (_, text) in zip(names, found, strict=True) if text]
+    repeats = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in told)
+    read = tuple(each for each, _ in found)
+    formed, said = plain_form(read) if plain else (read, ())
+    driven, gaps = across_gaps(all_force_driven(formed), names)
+    kept = comparable(driven, names, plain if short is None else short)
+    return PreparedRecordings(kept.recordings, (*repeats, *said, *gaps, *kept.remarks))
+
+
+def comparable(recordings: Sequence[Recording], names: Sequence[str], short: bool) -> PreparedRecordings:
+    """The last two steps alone, of what has its form: a session's trials. Raises NothingToDiagnose."""
+    few: tuple[str, ...] = ()
+    try:
+        require_different(recordings, names)
+        require_something(recordings, names)
+    except NothingToDiagnose as refusal:
+        if not short or not all(FEW_CYCLES in problem for problem in refusal.problems):
+            raise
+        few = tuple(f"{begun(problem)}." for problem in refusal.problems)
+    alike = same_position(recordings)
+    moving = _moving_position(alike.recordings)
+    return PreparedRecordings(moving.recordings, (*few, *alike.remarks, *moving.remarks))
+
+
+def same_position(recordings: Sequence[Recording]) -> PreparedRecordings:
+    """Compared where every recording has it in the same channels; where not, it is left out, and that is said."""
+    kinds = {None if each.position is None else (each.position.channels, each.position.units) for each in recordings}
+    if len(kinds) < 2:
+        return PreparedRecordings(tuple(recordings))
+    return _without_position(recordings, "Only some recordings hold the same position channels")
+
+
+def _moving_position(recordings: Sequence[Recording]) -> PreparedRecordings:
+    """What stands still throughout says nothing, and its errors cannot be counted in units of anything."""
+    positions = [each.position for each in recordings if each.position is not None]
+    if not positions:
+        return PreparedRecordings(tuple(recordings))
+    samples = np.vstack([each.samples for each in positions])
+    known = np.where(np.isfinite(samples), samples, np.nanmedian(samples, axis=0))
+    still = np.ptp(known, axis=0) <= STILL * np.abs(known).max(axis=0)
+    dead = [name for name, stands in zip(positions[0].channels, still, strict=True) if stands]
+    if not dead:
+        return PreparedRecordings(tuple(recordings))
+    return _without_position(recordings, f"Position {listed(dead)} never changes")
+
+
+def _without_position(recordings: Sequence[Recording], why: str) -> PreparedRecordings:
+    left = tuple(replace(each, position=None) for each in recordings)
+    return PreparedRecordings(left, (f"{why}: the position was left out of the comparison.",))
