@@ -11,8 +11,8 @@ from study.cli.results import JsonOption
 from study.cli.seed import checked_seed
 
 if TYPE_CHECKING:
-    from study.evaluation.bank.prove import Wishes
     from study.evaluation.bank.seal_cases import BankPlan
+    from study.evaluation.bank.sealed_bank import Wishes
 
 Found = TypeVar("Found")
 
@@ -38,9 +38,9 @@ def prove(
     Writes proof.json, proof.csv and report.html. Interrupted, the same command goes on.
     """
     from study.evaluation.bank.proof_summary import proof_lines, summary
-    from study.evaluation.bank.prove import Wishes
     from study.evaluation.bank.prove import prove as proved
     from study.evaluation.bank.seal_cases import BankPlan
+    from study.evaluation.bank.sealed_bank import Wishes
     from study.evaluation.bank.write_proof import write_proof, write_table
 
     plan, wishes = BankPlan(seed, cases, brief), Wishes(workers, keep, controls)

@@ -13,8 +13,9 @@ from study.errors import LeftError, StudyError
 from study.evaluation.bank.proof_folder import ANSWER, RECORDING, ProofFolder, opened
 from study.evaluation.bank.proof_seals import answer_at
 from study.evaluation.bank.proof_summary import proof_lines, summary
-from study.evaluation.bank.prove import Wishes, prove, reveal_cases
+from study.evaluation.bank.prove import prove, reveal_cases
 from study.evaluation.bank.seal_cases import BankPlan, to_draw
+from study.evaluation.bank.sealed_bank import Wishes
 from study.evaluation.bank.write_proof import commit, write_proof, write_table
 from study.evaluation.challenge.draw_bank import draw
 from study.store.disk.file_errors import UnusableFileError

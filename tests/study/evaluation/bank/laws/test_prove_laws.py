@@ -10,8 +10,8 @@ from study.evaluation.bank.laws.seal_laws import fresh_file, fresh_motions, seal
 from study.evaluation.bank.laws.write_laws import law_lines, write_laws
 from study.evaluation.bank.proof_folder import SETTINGS, opened
 from study.evaluation.bank.proof_seals import label_at
-from study.evaluation.bank.prove import Wishes
 from study.evaluation.bank.seal_cases import BankPlan
+from study.evaluation.bank.sealed_bank import Wishes
 
 SEED = 30_313
 """Its first device has a law."""
