@@ -68,6 +68,13 @@ def before_others() -> AbstractContextManager[object]:
     return real_time_class()
 
 
+def loop_priority() -> DeviceFinding:
+    """Whether this account's loops may go before other programs."""
+    from study.devices.drive.real_time_class import real_time_finding
+
+    return real_time_finding()
+
+
 def examine_device(name: str) -> tuple[DeviceFinding, ...]:
     """What a look at a real device's driver finds, with zero force; nothing for the others. Raises nothing."""
     if name not in REAL:

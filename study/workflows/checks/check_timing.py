@@ -11,7 +11,7 @@ import numpy as np
 from equalizer.signals.signal import Signal
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault, Health
-from study.devices.opening import before_others
+from study.devices.opening import before_others, loop_priority
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.timing_verdict import (
     Lateness,
@@ -61,7 +61,8 @@ def check_computer(
 ) -> tuple[DeviceFinding, ...]:
     """Before a sitting: takes `SITTING_S`, and commands nothing. load_per_processor: None where it is not known."""
     late_s = wake_at_every_tick(clock, rate_hz, SITTING_S, lambda done_s: True)
-    return judge_lateness(lateness_of(np.array(late_s), rate_hz), simulated), judge_load(load_per_processor)
+    lateness = judge_lateness(lateness_of(np.array(late_s), rate_hz), simulated)
+    return (lateness, judge_load(load_per_processor), *(() if simulated else (loop_priority(),)))
 
 
 def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Callable[[float], bool]) -> list[float]:

@@ -12,6 +12,7 @@ from study.devices.device import Fault
 from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
+from study.session.views.views import DeviceFinding
 from study.workflows.checks.check_timing import check_computer, check_timing
 
 
@@ -162,3 +163,10 @@ def test_an_interruption_while_a_real_loop_is_timed_lets_go_at_once(rigs, settin
             check_timing(device, RealClock(), 60.0, interrupt)
         assert time.monotonic() - started_s < 30.0
         assert device.health().peak_command_n == 0.0
+
+
+def test_before_a_sitting_on_a_real_device_it_is_said_whether_its_loop_may_go_first(monkeypatch):
+    refused = DeviceFinding("Priority", "other programs may delay the loop", fine=False, advice="ask", warning=True)
+    monkeypatch.setattr("study.workflows.checks.check_timing.loop_priority", lambda: refused)
+    assert refused in check_computer(VirtualClock(), 1000.0, False, 0.1)
+    assert refused not in check_computer(VirtualClock(), 1000.0, True, 0.1)
