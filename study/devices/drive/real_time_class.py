@@ -1,8 +1,8 @@
 """The loop's thread before all others of the computer, and its memory kept from being swapped, where the system allows.
 
 What is not allowed is said, with the cure, and everything goes on without it. Below the priority of interrupt threads
-(50 on Linux): the device's own USB must go first. A loop that hangs starves nothing: Linux leaves the ordinary threads
-5 % of every second.
+(50 on Linux): the device's own USB must go first. A loop that hangs starves nothing, as Linux comes: it leaves the
+ordinary threads 5 % of every second. Where that was switched off, the finding says so.
 """
 
 import contextlib
@@ -13,6 +13,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from study.session.views.views import DeviceFinding
@@ -23,6 +24,18 @@ SWITCH_S = 0.0005
 
 PRESENT_WHEN_TOUCHED = 1 | 4
 """MCL_CURRENT | MCL_ONFAULT: what is mapped now, page by page as it is used; reserved room is not filled."""
+
+FUTURE_TOO = 2
+"""MCL_FUTURE: what is mapped later as well. Under a limit, memory that is asked for beyond it would be refused then,
+and the program with it: only where there is no limit."""
+
+RT_RUNTIME = Path("/proc/sys/kernel/sched_rt_runtime_us")
+"""What Linux lets real-time threads have of each second, in µs; -1: all."""
+
+STARVING_ADVICE = (
+    "This computer lets such a loop take a whole core for itself (kernel.sched_rt_runtime_us is -1): while it hangs, "
+    "what would stop it may never run. As administrator: sysctl -w kernel.sched_rt_runtime_us=950000"
+)
 
 TIME_CRITICAL = 15
 """THREAD_PRIORITY_TIME_CRITICAL of Windows."""
@@ -41,17 +54,47 @@ class Granted:
     """How to get what was not granted; empty where all was."""
 
 
+class _Users:
+    """Switch interval, memory lock and timer belong to the whole program: the first user changes them, the last to end
+    gives them back, in whatever order they end."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._count = 0
+        self._undos: list[Callable[[], object]] = []
+        self._switch_s = 0.0
+
+    def enter(self) -> Granted:
+        with self._lock:
+            granted, undo = _asked_for()  # each anew: the class is a thread's, and memory was mapped since
+            if self._count == 0:
+                self._switch_s = sys.getswitchinterval()
+                sys.setswitchinterval(min(SWITCH_S, self._switch_s))
+            self._count += 1
+            self._undos.append(undo)
+            return granted
+
+    def leave(self) -> None:
+        with self._lock:
+            self._count -= 1
+            if self._count == 0:
+                while self._undos:
+                    self._undos.pop()()
+                sys.setswitchinterval(self._switch_s)
+
+
+_USERS = _Users()
+
+
 @contextlib.contextmanager
 def real_time_class() -> Iterator[Granted]:
-    """For the calling thread until it ends, and for the program's memory as long as this lasts. Raises nothing."""
-    switch_s = sys.getswitchinterval()
-    sys.setswitchinterval(min(SWITCH_S, switch_s))
-    granted, undo = _asked_for()
+    """For the calling thread until it ends, and for the program's memory until the last that asked for it ends. Raises
+    nothing."""
+    granted = _USERS.enter()
     try:
         yield granted
     finally:
-        undo()
-        sys.setswitchinterval(switch_s)
+        _USERS.leave()
 
 
 def real_time_finding() -> DeviceFinding:
@@ -66,12 +109,23 @@ def real_time_finding() -> DeviceFinding:
     thread.start()
     thread.join()
     (granted,) = found
-    told = (
+    told = [
         "the loop goes before all other programs" if granted.scheduled else "other programs may delay the loop",
         "its memory stays" if granted.locked else "its memory may be swapped",
-    )
-    fine = granted.scheduled and granted.locked
-    return DeviceFinding("Priority", "; ".join(told), fine, granted.advice, warning=not fine)
+    ]
+    starving = granted.scheduled and _may_starve_others()
+    if starving:
+        told.append("a loop that hangs may starve them")
+    fine = granted.scheduled and granted.locked and not starving
+    advice = " ".join(filter(None, (granted.advice, STARVING_ADVICE if starving else "")))
+    return DeviceFinding("Priority", "; ".join(told), fine, advice, warning=not fine)
+
+
+def _may_starve_others() -> bool:
+    try:
+        return RT_RUNTIME.read_text("ascii").strip() == "-1"
+    except (OSError, ValueError):  # another system, or a kernel that shows none
+        return False
 
 
 def _asked_for() -> tuple[Granted, Callable[[], None]]:
@@ -93,11 +147,17 @@ def _of_linux(library: Any) -> tuple[Granted, Callable[[], None]]:
     except (OSError, AttributeError):  # AttributeError: a Python built without it
         scheduled = False
     try:
-        locked = library.mlockall(PRESENT_WHEN_TOUCHED) == 0
+        locked = library.mlockall(PRESENT_WHEN_TOUCHED | (FUTURE_TOO if _memory_without_limit() else 0)) == 0
     except AttributeError:
         locked = False
     advice = "" if scheduled and locked else LINUX_ADVICE
     return Granted(scheduled, locked, advice), library.munlockall if locked else lambda: None
+
+
+def _memory_without_limit() -> bool:
+    import resource  # not on Windows
+
+    return resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
 
 
 def _of_windows(windows: Any) -> tuple[Granted, Callable[[], None]]:

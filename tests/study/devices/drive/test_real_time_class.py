@@ -11,7 +11,14 @@ import pytest
 
 from study.devices.clock import RealClock
 from study.devices.drive import real_time_class as module
-from study.devices.drive.real_time_class import LINUX_ADVICE, PRIORITY, SWITCH_S, real_time_class, real_time_finding
+from study.devices.drive.real_time_class import (
+    LINUX_ADVICE,
+    PRIORITY,
+    STARVING_ADVICE,
+    SWITCH_S,
+    real_time_class,
+    real_time_finding,
+)
 from study.devices.safe import SafeDevice
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what Linux grants is asked of Linux")
@@ -22,14 +29,24 @@ class Library:
 
     def __init__(self, allowed: bool) -> None:
         self.allowed, self.locked = allowed, False
+        self.flags: list[int] = []
 
     def mlockall(self, flags: int) -> int:
-        assert flags == 5
-        self.locked = self.allowed
+        self.flags.append(flags)
+        self.locked = self.locked or self.allowed
         return 0 if self.allowed else -1
 
     def munlockall(self) -> None:
         self.locked = False
+
+
+@pytest.fixture(autouse=True)
+def as_linux_comes(monkeypatch, tmp_path):
+    """What Linux leaves to ordinary threads: the file that says so."""
+    path = tmp_path / "sched_rt_runtime_us"
+    path.write_text("950000\n")
+    monkeypatch.setattr(module, "RT_RUNTIME", path)
+    return path
 
 
 @pytest.fixture
@@ -78,6 +95,54 @@ def test_what_is_refused_is_a_warning_with_its_cure_and_hinders_nothing(allow, s
 def test_with_all_granted_it_is_fine(allow):
     allow(True, True)
     assert real_time_finding().fine and real_time_finding().advice == ""
+
+
+@linux
+@pytest.mark.parametrize("first_begun_ends_first", [True, False])
+def test_two_that_overlap_keep_it_until_the_later_end(allow, first_begun_ends_first):
+    library, _ = allow(True, True)
+    before_s = sys.getswitchinterval()
+    begun = [real_time_class(), real_time_class()]
+    for each in begun:
+        each.__enter__()
+    earlier, later = begun if first_begun_ends_first else reversed(begun)
+    earlier.__exit__(None, None, None)
+    assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_S)
+    later.__exit__(None, None, None)
+    assert not library.locked and sys.getswitchinterval() == pytest.approx(before_s)
+
+
+@linux
+@pytest.mark.parametrize("granted_again", [True, False])
+def test_a_look_at_the_priority_takes_nothing_from_a_loop_that_runs(allow, granted_again):
+    library, _ = allow(True, True)
+    with real_time_class():
+        library.allowed = granted_again
+        assert real_time_finding().fine == granted_again
+        assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_S)
+    assert not library.locked
+
+
+@linux
+@pytest.mark.parametrize(("limit", "flags"), [(-1, 1 | 2 | 4), (2**20, 1 | 4)], ids=["without limit", "limited"])
+def test_memory_of_later_is_locked_only_where_no_limit_could_refuse_it(allow, monkeypatch, limit, flags):
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr(resource, "getrlimit", lambda which: {resource.RLIMIT_MEMLOCK: (limit, -1)}[which])
+    library, _ = allow(True, True)
+    with real_time_class():
+        assert library.flags == [flags]
+
+
+@linux
+@pytest.mark.parametrize("scheduled", [True, False])
+def test_a_computer_that_leaves_other_threads_nothing_is_a_warning(allow, as_linux_comes, scheduled):
+    allow(scheduled, True)
+    as_linux_comes.write_text("-1\n")
+    finding = real_time_finding()
+    assert finding.warning and not finding.wrong
+    assert (STARVING_ADVICE in finding.advice) == scheduled  # a loop of the ordinary kind starves nothing
+    as_linux_comes.unlink()
+    assert real_time_finding().fine == scheduled
 
 
 @linux
