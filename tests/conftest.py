@@ -25,6 +25,7 @@ settings.load_profile("repeatable")
 os.environ["TZ"] = "UTC"
 time.tzset()
 
+FSYNC = os.fsync
 # For people a crashing effect is left out and the run goes on; a test must see it.
 os.environ["HAPTEQ_STRICT"] = "1"
 
@@ -37,6 +38,12 @@ def power_stays_on() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(os, "fsync", os.fstat)  # refuses a closed descriptor alike
         yield
+
+
+@pytest.fixture
+def synchronising_disk(monkeypatch) -> None:
+    """Files reach the disk after all."""
+    monkeypatch.setattr(os, "fsync", FSYNC)
 
 
 @pytest.fixture

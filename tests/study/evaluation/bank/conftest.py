@@ -9,7 +9,7 @@ import pytest
 
 @pytest.fixture(scope="session", autouse=True)
 def drawn_once() -> Iterator[None]:
-    """Under whatever name. That a draw repeats from its seed: `challenge/test_draw_case.py`."""
+    """For all names: `test_seal_cases.py`. That a draw repeats from its seed: `challenge/test_draw_case.py`."""
     from study.evaluation.bank import seal_cases
 
     draws = seal_cases.case_of

@@ -47,7 +47,7 @@ class Watched:
 
 
 @pytest.fixture
-def watched(monkeypatch) -> Watched:
+def watched(monkeypatch, synchronising_disk) -> Watched:
     notes = Watched()
     real_open, real_append, real_fsync = conduct_session.open_device, EventLog.append, os.fsync
 
