@@ -55,7 +55,7 @@ def identified(context: SearchContext, found: Explanation, time_left: TimeBudget
     that is as good and whose numbers are determined."""
     if not found.steps:
         return found
-    found = _profiled(context, found)
+    found = _profiled(context, found, time_left)
     left_open = [number for number, is_open in enumerate(_open(context, found)) if is_open]
     if not left_open:
         return found
@@ -63,7 +63,7 @@ def identified(context: SearchContext, found: Explanation, time_left: TimeBudget
     name = found.after.fitted.hypothesis.claims[worst].effect.name
     known = (*found.undetermined, name)
     if len(found.steps) == 1 or (worst < len(found.steps) - 1 and not time_left()):
-        found = (_instead(context, found) if len(found.steps) == 1 else None) or _nothing(found)
+        found = (_instead(context, found, time_left) if len(found.steps) == 1 else None) or _nothing(found)
         return replace(found, undetermined=known)
     fewer = without_effect(context, found, worst)
     rounds = tuple(
@@ -73,7 +73,7 @@ def identified(context: SearchContext, found: Explanation, time_left: TimeBudget
     return identified(context, replace(fewer, rounds=rounds, undetermined=known), time_left)
 
 
-def _instead(context: SearchContext, found: Explanation) -> Explanation | None:
+def _instead(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation | None:
     """The next explanation that is as good and whose numbers are determined."""
     best = found.rounds[0][0]
     others = tuple(candidate for candidate in found.rounds[0] if candidate.newest != best.newest)
@@ -81,7 +81,7 @@ def _instead(context: SearchContext, found: Explanation) -> Explanation | None:
     for other in sorted(as_good.values(), key=lambda candidate: candidate.score.mean_log_error)[:REPLACEMENTS_TRIED]:
         rest = tuple(candidate for candidate in others if candidate is not other)
         instead = replace(found, after=context.confirmed(other), rounds=((other, *rest),), steps=(other,), errors=None)
-        instead = _profiled(context, instead)
+        instead = _profiled(context, instead, time_left)
         if not any(_open(context, instead)):
             return instead
     return None
@@ -91,13 +91,15 @@ def _nothing(found: Explanation) -> Explanation:
     return replace(found, after=found.retuned, steps=())
 
 
-def _profiled(context: SearchContext, found: Explanation) -> Explanation:
+def _profiled(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
     """With the standard errors of the final fit; those of an effect's only number from its profile, where the
-    linearised interval holds none, and the profile tells it from none."""
+    linearised interval holds none, and the profile tells it from none. The profile of an effect before the last fits
+    those after it anew, which is left out where no time is left."""
     errors = final_errors(context, found).copy()
     first = len(context.tuning.names)
     for effect, own in enumerate(_could_be_none(found, errors[first:])):
-        if found.statistic is not None or len(own) != 1:
+        refits = effect < len(found.steps) - 1
+        if found.statistic is not None or len(own) != 1 or (refits and not time_left()):
             continue
         number, place, at, error = own[0]
         reach, away = _reach(number, at, error)

@@ -72,31 +72,64 @@ def test_two_that_are_needed_stay(rubbing_and_pushed):
     assert pruned(rubbing_and_pushed, found, always).steps is found.steps
 
 
-def test_out_of_time_nothing_is_fitted_again(rubbing):
+@pytest.fixture
+def no_fit(monkeypatch):
+    def refused(*_):
+        raise AssertionError("fitted again")
+
+    monkeypatch.setattr("analysis.diagnosis.search.without_effect.refine", refused)
+
+
+def test_two_that_are_needed_are_compared_while_there_is_time(rubbing_and_pushed, no_fit):
+    found = one_after_the_other(
+        rubbing_and_pushed, claim("constant_force", force=0.2), claim("coulomb_friction", level=FRICTION_N)
+    )
+    with pytest.raises(AssertionError, match="fitted again"):
+        pruned(rubbing_and_pushed, found, always)
+
+
+def test_out_of_time_nothing_is_fitted_again(rubbing_and_pushed, no_fit):
+    found = one_after_the_other(
+        rubbing_and_pushed, claim("constant_force", force=0.2), claim("coulomb_friction", level=FRICTION_N)
+    )
+    assert names(pruned(rubbing_and_pushed, found, lambda: False)) == ["constant_force", "coulomb_friction"]
+
+
+def test_out_of_time_no_profile_is_fitted_and_what_may_be_none_is_not_named(rubbing, no_fit):
+    """A constant force of 0.1 N that is not there, and whose interval holds zero by less than twice."""
     found = one_after_the_other(
         rubbing, claim("constant_force", force=0.1), claim("coulomb_friction", level=FRICTION_N)
     )
-    assert names(pruned(rubbing, found, lambda: False)) == ["constant_force", "coulomb_friction"]
+    left = pruned(rubbing, found, lambda: False)
+    assert (names(left), left.undetermined) == ([], ("constant_force",))
+
+
+@pytest.fixture(scope="module")
+def rubbing_and_pushed_a_little(arena_of):
+    return arena_of((placed("coulomb_friction", level=FRICTION_N), placed("constant_force", force=0.01)))
 
 
 @pytest.mark.parametrize(("second", "kept"), [(2.0, 1), (1.02, 2)])
-def test_a_little_more_is_not_named_where_more_than_noise_is_left_with_it(rubbing, standing_at, second, kept):
+def test_a_little_more_is_not_named_where_more_than_noise_is_left_with_it(
+    rubbing_and_pushed_a_little, standing_at, second, kept
+):
     """A share of one in twenty, once with a remainder beside and once down to the noise."""
-    alone = one_after_the_other(rubbing, claim("coulomb_friction", level=FRICTION_N))
-    friction = alone.steps[0].fitted.hypothesis
-    both = together(friction, claim("amplifier_lag", time_constant=1e-4))
+    whole = one_after_the_other(
+        rubbing_and_pushed_a_little,
+        claim("coulomb_friction", level=FRICTION_N),
+        claim("constant_force", force=0.01),
+    )
     levels = (200.0, second * 200 ** (LAST_EFFECT_SHARE / 2), second)
     base, first, last = (standing_at(level).score for level in levels)
-    steps = (replace(alone.steps[0], score=first), replace(alone.steps[0], score=last))
-    steps = (steps[0], replace(steps[1], fitted=replace(steps[1].fitted, hypothesis=both)))
+    steps = (replace(whole.steps[0], score=first), replace(whole.steps[1], score=last))
     found = replace(
-        alone,
-        retuned=replace(alone.retuned, score=base),
-        after=replace(steps[1], score=last),
+        whole,
+        retuned=replace(whole.retuned, score=base),
+        after=replace(whole.after, score=last),
         steps=steps,
         rounds=((steps[0],), (steps[1],)),
     )
-    assert len(pruned(rubbing, found, lambda: False).steps) == kept
+    assert len(pruned(rubbing_and_pushed_a_little, found, lambda: False).steps) == kept
 
 
 def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(arena_of, diagnosed):
