@@ -6,10 +6,13 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from pathlib import Path
 
+from study.errors import StudyError
 from study.workflows.files.validate import Validation, validate_file
 
 PATIENCE_S = 60.0
 """A recording of an hour takes seconds."""
+START_S = 300.0
+"""Imports alone; a machine that swaps takes a minute."""
 
 
 def validate_files(paths: Sequence[Path], patience_s: float = PATIENCE_S) -> Iterator[Validation]:
@@ -42,7 +45,16 @@ def _worker() -> ProcessPoolExecutor:
     # Spawned: a forked child would inherit HDF5's locks.
     worker = ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
     # How long it takes to start is the machine's affair, and no fault of a file.
-    worker.submit(_ready).result()
+    try:
+        worker.submit(_ready).result(timeout=START_S)
+    except (BrokenProcessPool, TimeoutError) as trouble:
+        _kill(worker)
+        raise StudyError(
+            "Files cannot be validated",
+            "The process that reads them does not start.",
+            "Close other programs, and validate again.",
+            saved="Nothing was written.",
+        ) from trouble
     return worker
 
 

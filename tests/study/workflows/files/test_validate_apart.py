@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from study.errors import StudyError
 from study.workflows.files import validate_apart
 from study.workflows.files.validate import Validation, validate_file
 from study.workflows.files.validate_apart import validate_files
@@ -35,3 +36,24 @@ def test_a_crash_and_a_hang_are_problems_of_their_files_alone(tmp_path, monkeypa
     assert "does not end within 15 s" in found[2].problems[0]
     for other in (found[0], found[3]):
         assert other == validate_file(other.path)
+
+
+def die_at_the_start() -> None:
+    os._exit(1)
+
+
+def hang_at_the_start() -> None:
+    time.sleep(600)
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("start", [die_at_the_start, hang_at_the_start])
+def test_a_worker_that_does_not_start_is_no_fault_of_a_file(tmp_path, monkeypatch, start):
+    path = tmp_path / "sound.toml"
+    path.write_text("x = 1\n")
+    monkeypatch.setattr(validate_apart, "_ready", start)
+    monkeypatch.setattr(validate_apart, "START_S", 10.0)
+    with pytest.raises(StudyError) as refused:
+        list(validate_files([path]))
+    assert refused.value.title == "Files cannot be validated"
+    assert "does not start" in refused.value.happened
