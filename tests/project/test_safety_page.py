@@ -24,12 +24,24 @@ def hazards() -> list[list[str]]:
 
 @cache
 def existing() -> dict[str, list[str]]:
-    """Names of tests, and their decorators as they are written."""
+    """Names of tests, and the decorators and marks that hold for them, aliases resolved."""
     found: dict[str, list[str]] = {}
     for path in (ROOT / "tests").rglob("test_*.py"):
-        for node in ast.parse(path.read_text("utf-8")).body:
+        body = ast.parse(path.read_text("utf-8")).body
+        assigned = {
+            node.targets[0].id: node.value
+            for node in body
+            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+        }
+        of_all = assigned.get("pytestmark", ast.List([]))
+        marks = of_all.elts if isinstance(of_all, ast.List | ast.Tuple) else [of_all]
+        for node in body:
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
-                found[node.name] = [ast.unparse(each) for each in node.decorator_list]
+                # An alias such as `linux = pytest.mark.skipif(...)` counts as what it stands for.
+                own = [
+                    assigned.get(each.id, each) if isinstance(each, ast.Name) else each for each in node.decorator_list
+                ]
+                found[node.name] = [ast.unparse(each) for each in (*own, *marks)]
     return found
 
 
