@@ -2,7 +2,6 @@
 
 import ctypes
 import re
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -17,39 +16,7 @@ from study.cli.main import main
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.trajectory_file import write_trajectory
 from study.workflows.equalizer.controller.export_controller import ControllerPlan, export_controller
-
-STRICT = ("-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
-DOCS = Path(__file__).parents[4] / "docs"
-STAND_INS = Path(__file__).parent / "stand_ins"
-CHANNELS = ("fx", "fy", "fz"), ("ax", "ay", "az")
-
-
-def write_model(path: Path, band_hz=(5.0, 35.0), order=8, size=3) -> Path:
-    draw = np.random.default_rng(7).standard_normal
-    A, B, C = draw((order, order)), draw((order, size)), draw((size, order))
-    A *= 0.97 / np.abs(np.linalg.eigvals(A)).max()
-    names = [tuple(channels[:size]) for channels in CHANNELS]
-    model = IdentifiedModel(A, B, C, draw((size, size)), 1000.0, band_hz, "N", "m/s^2", *names)
-    write_identified_model(path, model)
-    return path
-
-
-def build(vendor, folder: Path, source: str, *options: str) -> Path:
-    out = folder / "built"
-    command = [*vendor.compiler(), "-std=c11", *STRICT, *options, "-o", str(out), str(folder / source), "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stderr
-    return out
-
-
-def run(program: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([str(program), *words], capture_output=True, text=True, timeout=60, check=False)
-
-
-@pytest.fixture(scope="module")
-def exported(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("controller")
-    return export_controller(ControllerPlan(write_model(folder / "model.h5"), folder / "out"))
+from tests.study.workflows.equalizer.controller.build import CHANNELS, build, compiled_cpp, run, write_model
 
 
 @pytest.mark.parametrize(
@@ -82,33 +49,10 @@ def test_the_check_notices_a_number_that_is_wrong_in_its_seventh_digit(vendor, e
     assert done.returncode == 1, done.stdout
 
 
-def test_the_example_runs_and_ends_by_itself(vendor, exported):
-    done = run(build(vendor, exported.plan.out, "example_loop.c"), "0.05")
-    assert done.returncode == 0
-    assert done.stdout.startswith("50 ticks, largest force on an axis ")
-    assert "limited 0 times" in done.stdout
-
-
 def test_the_header_is_cpp_too(vendor, exported, tmp_path):
     source = tmp_path / "twice.cpp"
     source.write_text('#include "hapteq_controller.h"\n#include "hapteq_controller.h"\nint main() {}\n')
-    compile_cpp(vendor, source, exported.plan.out)
-
-
-@pytest.mark.parametrize("mentioned", ["chai3d.h", "rclcpp/rclcpp.hpp"])
-def test_the_snippets_of_the_page_compile(vendor, exported, tmp_path, mentioned):
-    codes = re.findall(r"```cpp\n(.*?)```", (DOCS / "controller.md").read_text("utf-8"), re.DOTALL)
-    (code,) = [code for code in codes if mentioned in code]
-    source = tmp_path / "snippet.cpp"
-    source.write_text(code)
-    compile_cpp(vendor, source, exported.plan.out, STAND_INS)
-
-
-def compile_cpp(vendor, source: Path, *folders: Path) -> None:
-    where = [f"-I{folder}" for folder in folders]
-    command = [*vendor.cpp_compiler(), "-std=c++17", *STRICT, *where, "-c", "-o", str(source) + ".o", str(source)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stderr
+    assert compiled_cpp(vendor, source, exported.plan.out)[1] == ""
 
 
 BRIDGE = """
