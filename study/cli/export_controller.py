@@ -33,9 +33,12 @@ def export_controller(
         export_controller,
         exported_lines,
         exported_summary,
+        exported_warnings,
     )
 
     settings = controller_settings(weight, preview / 1000, cap)
     exported = export_controller(ControllerPlan(model, out, transient, settings))
+    for warning in exported_warnings(exported):
+        typer.echo(f"Note: {warning}", err=True)
     found = exported_summary(exported)
     typer.echo(json.dumps(found, indent=2) if as_json else "\n".join(exported_lines(exported)))

@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
 
+from study.devices.admission import HAND_STIMULUS_CAP_N as HAND_STIMULUS_CAP_N
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceSettings
 from study.devices.force_dimension.models import MODELS
@@ -19,6 +20,9 @@ SIMULATED = "simulated"
 
 REAL = tuple(MODELS)
 """Devices that move: they need the vendor's library, and real time."""
+
+STRONGEST_N = max(model.max_force_n for model in MODELS.values())
+"""What the strongest of them can give: more is a mistake, whatever it was meant for."""
 
 DEVICES = (SIMULATED, *REAL)
 """What a study or a recording may be made on."""

@@ -5,11 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from equalizer.tracking.lqr.tracking_problem import TrackingError
 from equalizer.tracking.lqr.turning import play
 from equalizer.tracking.realtime.realtime_controller import RealtimeController
 
 OF_CAP = 0.9
 """The largest force of a case: the cap is no part of what is compared."""
+
+NO_FORCE = 1e-12
+"""Of the cap: what a comparison allows as a difference. A way whose largest force is below it is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,17 +38,23 @@ class ControllerCases:
 
 
 def controller_cases(controller: RealtimeController, seed: int = 1) -> ControllerCases:
-    """As many ticks as the transient has rows and some after its end."""
+    """As many ticks as the transient has rows and some after its end.
+
+    Raises TrackingError where a way gives no force at all: nothing could be compared.
+    """
     draw, p = np.random.default_rng(seed), controller.problem.outputs
     ticks = len(controller.transient) + 50
     rotations = np.cumsum(draw.standard_normal((ticks, p, p)), axis=0)
-    rotations *= OF_CAP * controller.cap_n / _longest(play(controller.transient, rotations).forces)
+    rotations *= _to_cap(play(controller.transient, rotations).forces, controller.cap_n, "transient")
     wanted = draw.standard_normal((ticks, p))
-    wanted *= OF_CAP * controller.cap_n / _longest(controller.streamed(wanted)[1].forces)
+    wanted *= _to_cap(controller.streamed(wanted)[1].forces, controller.cap_n, "stream")
     bands, tracked = controller.streamed(wanted)
     transient_forces = play(controller.transient, rotations).forces
     return ControllerCases(rotations, transient_forces, wanted, bands.low, bands.high, tracked.forces)
 
 
-def _longest(forces: FloatArray) -> float:
-    return float(np.linalg.norm(forces, axis=1).max())
+def _to_cap(forces: FloatArray, cap_n: float, way: str) -> float:
+    longest = float(np.linalg.norm(forces, axis=1).max())
+    if not longest >= NO_FORCE * cap_n:
+        raise TrackingError(f"the {way} comes to no force: there is nothing to play")
+    return OF_CAP * cap_n / longest

@@ -10,6 +10,7 @@ from equalizer.tracking.feedforward.trajectory import TRAJECTORY, TableError, re
 from equalizer.tracking.lqr.tracking_problem import TrackingError
 from equalizer.tracking.realtime.controller_cases import controller_cases
 from equalizer.tracking.realtime.realtime_controller import RealtimeController, RealtimeSettings, realtime_controller
+from study.devices.opening import HAND_STIMULUS_CAP_N, STRONGEST_N
 from study.errors import StudyError
 from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import write_text
@@ -48,15 +49,18 @@ class ExportedController:
 def export_controller(plan: ControllerPlan) -> ExportedController:
     """Computes and writes. Raises StudyError; nothing is written then."""
     require_free(plan.out, title=TITLE, kind="controllers")
+    if plan.settings.cap_n > STRONGEST_N:
+        raise _refused(f"The cap is {plan.settings.cap_n:g} N; the strongest device gives {STRONGEST_N:g} N.", TRY)
     model = read_identified_model(plan.model)
     try:
         _require_plain(model)
         wanted = None if plan.transient is None else _wanted(plan.transient, model)
         controller = realtime_controller(model, wanted, plan.settings)
+        cases = controller_cases(controller)
     except (TrackingError, TableError) as problem:
         raise _refused(_sentence(problem), "Correct what it says, or choose another model.") from problem
     exported = ExportedController(plan, model, controller)
-    sources = (header_text(controller, _origin(plan, model)), example_text(), check_text(controller_cases(controller)))
+    sources = (header_text(controller, _origin(plan, model)), example_text(), check_text(cases))
     plan.out.mkdir()
     for path, text in zip(exported.files, sources, strict=True):
         write_text(path, text)
@@ -87,6 +91,16 @@ def exported_summary(exported: ExportedController) -> dict[str, Any]:
         "stream_error_without_limit": controller.loss.full_error,
         "cap_n": controller.cap_n,
     }
+
+
+def exported_warnings(exported: ExportedController) -> tuple[str, ...]:
+    cap_n = exported.controller.cap_n
+    if cap_n <= HAND_STIMULUS_CAP_N:
+        return ()
+    return (
+        f"Its cap of {cap_n:g} N is above the {HAND_STIMULUS_CAP_N:g} N that hapteq plays with a hand on the handle, "
+        "and no safety layer comes along: docs/controller.md.",
+    )
 
 
 def exported_lines(exported: ExportedController) -> tuple[str, ...]:

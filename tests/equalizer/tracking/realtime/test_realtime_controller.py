@@ -57,6 +57,14 @@ def test_cases_stay_below_the_cap_and_come_near_to_it(controller):
     assert not cases.transient_forces[-40:].any()  # after the last row
 
 
+def test_a_transient_of_nothing_is_refused_and_a_faint_one_is_not(device_model):
+    faint = realtime_controller(device_model, 1e-9 * tap(device_model), RealtimeSettings(preview_s=0.05))
+    assert np.isfinite(controller_cases(faint).rotations).all()
+    silent = realtime_controller(device_model, np.zeros((40, 3)), RealtimeSettings(preview_s=0.05))
+    with pytest.raises(TrackingError, match="the transient comes to no force"):
+        controller_cases(silent)
+
+
 @pytest.mark.parametrize("wrong", [{"preview_s": -0.1}, {"preview_s": np.nan}, {"cap_n": 0.0}, {"cap_n": np.inf}])
 def test_settings_that_no_loop_can_run_are_refused(wrong):
     with pytest.raises(TrackingError):

@@ -1,6 +1,7 @@
 """The exported C, compiled as strictly as a user may, against Python; and what a user is told."""
 
 import ctypes
+import json
 import re
 from pathlib import Path
 
@@ -147,6 +148,15 @@ def test_the_command_writes_three_files_and_says_what_they_do(tmp_path, capsys):
     assert "#define HAPTEQ_CAP_N 2.0\n" in header and "knock.csv" in header and "model.h5 (SHA-256 " in header
 
 
+@pytest.mark.parametrize(("cap", "warned"), [("3", False), ("3.5", True), ("20", True)])
+def test_a_cap_above_what_a_hand_is_given_is_written_with_a_warning(tmp_path, capsys, cap, warned):
+    words = ["export-controller", str(write_model(tmp_path / "model.h5")), "--out", str(tmp_path / "out")]
+    assert main([*words, "--preview", "20", "--cap", cap, "--json"]) == 0
+    said = capsys.readouterr()
+    assert ("above the 3 N that hapteq plays with a hand on the handle" in said.err) == warned
+    assert json.loads(said.out)["cap_n"] == float(cap)
+
+
 def test_numbers_are_written_to_their_last_bit(exported):
     header = (exported.plan.out / "hapteq_controller.h").read_text()
     table = header.partition("double hapteq_gain[3][8] = ")[2].partition(";")[0]
@@ -164,6 +174,8 @@ def test_numbers_are_written_to_their_last_bit(exported):
         ("long", "5001 rows"),
         ("preview", "2 s is the longest"),
         ("no weight", "no stationary gains"),
+        ("silent", "The transient comes to no force"),
+        ("strong", "the strongest device gives 20 N"),
     ],
 )
 def test_what_cannot_be_exported_is_said_and_nothing_is_written(tmp_path, capsys, change, says):
@@ -171,14 +183,16 @@ def test_what_cannot_be_exported_is_said_and_nothing_is_written(tmp_path, capsys
     out, words = tmp_path / "out", []
     if change == "there already":
         out.mkdir()
-    if change in ("forces", "rate", "long"):
+    if change in ("forces", "rate", "long", "silent"):
         kind = ("force", "N", CHANNELS[0]) if change == "forces" else ("acceleration", "m/s^2", CHANNELS[1])
         rate_hz = 500.0 if change == "rate" else 1000.0
-        samples = np.ones((5001 if change == "long" else 20, 3))
+        samples = np.full((5001 if change == "long" else 20, 3), 0.0 if change == "silent" else 1.0)
         write_trajectory(tmp_path / "table.csv", Trajectory(Signal(samples, rate_hz, *kind)))
         words = ["--transient", str(tmp_path / "table.csv")]
     if change == "preview":
         words = ["--preview", "3000"]
+    if change == "strong":
+        words = ["--cap", "20.5"]
     if change == "no weight":
         no_feedthrough(tmp_path / "delayed.h5")
         model, words = tmp_path / "delayed.h5", ["--weight", "0"]
