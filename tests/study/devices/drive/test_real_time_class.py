@@ -21,6 +21,9 @@ from study.devices.drive.real_time_class import (
 )
 from study.devices.safe import SafeDevice
 
+FIFO, RESET_ON_FORK = 1, 0x40000000
+"""As Linux has them, for systems without."""
+
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what Linux grants is asked of Linux")
 
 
@@ -55,32 +58,35 @@ def allow(monkeypatch):
     asked: list[tuple[int, int]] = []
 
     def settle(scheduled: bool, locked: bool) -> tuple[Library, list[tuple[int, int]]]:
-        def sched(thread: int, policy: int, parameters: os.sched_param) -> None:
+        def sched(thread: int, policy: int, parameters: SimpleNamespace) -> None:
             if not scheduled:
                 raise PermissionError(1, "not permitted")
             asked.append((policy, parameters.sched_priority))
 
         library = Library(locked)
         monkeypatch.setattr(module.platform, "system", lambda: "Linux")
-        monkeypatch.setattr(module.os, "sched_setscheduler", sched)
+        monkeypatch.setattr(module.os, "sched_setscheduler", sched, raising=False)
+        monkeypatch.setattr(
+            module.os, "sched_param", lambda level: SimpleNamespace(sched_priority=level), raising=False
+        )
+        monkeypatch.setattr(module.os, "SCHED_FIFO", FIFO, raising=False)
+        monkeypatch.setattr(module.os, "SCHED_RESET_ON_FORK", RESET_ON_FORK, raising=False)
         monkeypatch.setattr(module.ctypes, "CDLL", lambda name, use_errno: library)
         return library, asked
 
     return settle
 
 
-@linux
 def test_what_is_granted_lasts_as_long_as_the_loop_and_is_taken_back(allow):
     library, asked = allow(True, True)
     before_s = sys.getswitchinterval()
     with real_time_class() as granted:
         assert (granted.scheduled, granted.locked, granted.advice) == (True, True, "")
         assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_S)
-    assert asked == [(os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, PRIORITY)]
+    assert asked == [(FIFO | RESET_ON_FORK, PRIORITY)]
     assert not library.locked and sys.getswitchinterval() == pytest.approx(before_s)
 
 
-@linux
 @pytest.mark.parametrize(("scheduled", "locked"), [(False, False), (True, False), (False, True)])
 def test_what_is_refused_is_a_warning_with_its_cure_and_hinders_nothing(allow, scheduled, locked):
     allow(scheduled, locked)
@@ -91,13 +97,11 @@ def test_what_is_refused_is_a_warning_with_its_cure_and_hinders_nothing(allow, s
     assert ("swapped" in finding.value) == (not locked)
 
 
-@linux
 def test_with_all_granted_it_is_fine(allow):
     allow(True, True)
     assert real_time_finding().fine and real_time_finding().advice == ""
 
 
-@linux
 @pytest.mark.parametrize("first_begun_ends_first", [True, False])
 def test_two_that_overlap_keep_it_until_the_later_end(allow, first_begun_ends_first):
     library, _ = allow(True, True)
@@ -112,7 +116,6 @@ def test_two_that_overlap_keep_it_until_the_later_end(allow, first_begun_ends_fi
     assert not library.locked and sys.getswitchinterval() == pytest.approx(before_s)
 
 
-@linux
 @pytest.mark.parametrize("granted_again", [True, False])
 def test_a_look_at_the_priority_takes_nothing_from_a_loop_that_runs(allow, granted_again):
     library, _ = allow(True, True)
@@ -123,7 +126,6 @@ def test_a_look_at_the_priority_takes_nothing_from_a_loop_that_runs(allow, grant
     assert not library.locked
 
 
-@linux
 @pytest.mark.parametrize(("limit", "flags"), [(-1, 1 | 2 | 4), (2**20, 1 | 4)], ids=["without limit", "limited"])
 def test_memory_of_later_is_locked_only_where_no_limit_could_refuse_it(allow, monkeypatch, limit, flags):
     resource = pytest.importorskip("resource")
@@ -133,7 +135,6 @@ def test_memory_of_later_is_locked_only_where_no_limit_could_refuse_it(allow, mo
         assert library.flags == [flags]
 
 
-@linux
 @pytest.mark.parametrize("scheduled", [True, False])
 def test_a_computer_that_leaves_other_threads_nothing_is_a_warning(allow, as_linux_comes, scheduled):
     allow(scheduled, True)
@@ -145,7 +146,6 @@ def test_a_computer_that_leaves_other_threads_nothing_is_a_warning(allow, as_lin
     assert real_time_finding().fine == scheduled
 
 
-@linux
 def test_an_error_within_takes_all_back_too(allow):
     library, _ = allow(True, True)
     with pytest.raises(OSError, match="usb"), real_time_class():
