@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from textual._styles_cache import StylesCache
 from textual.app import App
 from textual.screen import Screen
+from textual.widgets import Footer
 
 from study.session.views.views import Reply as TrialReply
 from study.tui.engine.from_engine import Ask, Call, Close, Feedback, FromEngine, LookUpdate, Opened, Preparing, Trouble
 from study.tui.engine.to_engine import Reply, ToEngine
 from study.tui.keys.answer_keys import AnswerKeys
-from study.tui.screens.preparing import PreparingScreen
-
-if TYPE_CHECKING:
-    from study.tui.screens.trial import TrialScreen
-from textual._styles_cache import StylesCache
-from textual.widgets import Footer
-
 from study.tui.screens.await_return import AwaitReturnScreen
 from study.tui.screens.demo import DemoScreen
 from study.tui.screens.device_check import DeviceCheckScreen
@@ -30,7 +25,9 @@ from study.tui.screens.instructions import InstructionsScreen
 from study.tui.screens.pause import PauseScreen
 from study.tui.screens.playing import PlayingScreen
 from study.tui.screens.practice_over import PracticeOverScreen
+from study.tui.screens.preparing import PreparingScreen
 from study.tui.screens.rest import RestScreen
+from study.tui.screens.trial import TrialScreen
 from study.tui.trial_replies import LEAVING
 
 SCREENS: dict[Call, Callable[[Any], Screen[Any]]] = {
@@ -139,23 +136,17 @@ class SittingScreens:
             trial = self._trial if self._trial is not None else await self._trial_screen()
             trial.arm(ask.shown)
             return
-        from study.tui.app.sitting_screens import screen_for
-
         self._shown = screen_for(ask, self._keys)
         await self._app.push_screen(self._shown, partial(self._dismissed, ask.number))
         # Typed ahead, before what is asked here can have been read.
         self._forget_earlier()
 
     async def _trial_screen(self) -> TrialScreen:
-        from study.tui.screens.trial import TrialScreen
-
         self._trial = TrialScreen(self._keys)
         await self._app.push_screen(self._trial)
         return self._trial
 
     def _look(self, update: LookUpdate) -> None:
-        from study.tui.screens.handle import HandleScreen
-
         if update.number == self._number and isinstance(self._shown, HandleScreen):
             self._shown.update_view(update.view)
 
