@@ -178,8 +178,12 @@ class SafeDevice:
 
     def _start(self, begin: Callable[[], None]) -> None:
         def begin_both() -> None:
-            begin()
-            self._runner.prepare()
+            try:
+                begin()
+                self._runner.prepare()
+            except BaseException:  # its ticks would fall due, of a stimulus that the caller believes was never begun
+                self._governor.abandon(Fault.NONE)
+                raise
 
         started = self._drive.start(begin_both)
         self._must_be_there()

@@ -1,5 +1,6 @@
 """The safe device as its callers see it: what is refused, interrupted, closed or lost."""
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -166,3 +167,24 @@ def test_a_reading_of_the_wrong_shape_counts_as_a_lost_device(rigs, clock):
     with pytest.raises(DeviceError, match="shape"):
         device.play(rigs.sine().loop)
     device.close()
+
+
+@pytest.mark.parametrize("way", ["hold", "play"])
+def test_a_stimulus_whose_preparation_fails_never_begins_and_the_next_one_does(rigs, clock, way):
+    wrong: list[BaseException] = [ValueError("no such stretch"), KeyboardInterrupt()]
+
+    def prepare(rows, repeats, wait) -> None:
+        if wrong:
+            raise wrong.pop(0)
+
+    rig = replace(rigs.compiled_rig(), prepare=prepare)
+    with contextlib.closing(SafeDevice(rig, rigs.SETTINGS, clock)) as device:
+        given = rigs.sine(2.0) if way == "hold" else rigs.sine(2.0).loop
+        for kind in (ValueError, KeyboardInterrupt):
+            with pytest.raises(kind):
+                getattr(device, way)(given)
+            clock.sleep(1.0)
+            assert device.fault() is Fault.NONE and not rigs.written(rig).any()
+        device.hold(rigs.sine(2.0))
+        feel(device, clock, 0.5)
+        assert device.release().health.ticks > 400 and rigs.written(rig).any()
