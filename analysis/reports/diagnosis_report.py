@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import NamedEffect
+from analysis.diagnosis.localisation.localisation_words import localisation_sentences
 from analysis.diagnosis.result.ceiling_wording import (
     black_box_beats,
     black_box_sentence,
@@ -10,7 +11,6 @@ from analysis.diagnosis.result.ceiling_wording import (
     confirmation_sentence,
 )
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.localisation_words import localisation_sentences
 from analysis.diagnosis.result.plausibility import implausible_sentences
 from analysis.diagnosis.result.retuned_numbers import doubtful_sentences, retuned_sentence
 from analysis.diagnosis.result.wording import (

@@ -31,7 +31,6 @@ CATALOGUES = {
 LONG_FILES: set[str] = set()
 SMALL_BESIDE_THEIR_IMPORTER = {
     "analysis/diagnosis/discovery/along.py",
-    "analysis/diagnosis/result/error_table.py",
     "study/devices/rigs_by_name.py",
     "study/tui/app/everywhere.py",
     "study/tui/app/load_screens.py",

@@ -1,6 +1,6 @@
 """Where a mismatch sits: in which state of motion, through which component it enters, and of what kind it is."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -10,7 +10,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import Fitted, gather_evidence
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.forces.transfer import axis_transfer
-from analysis.diagnosis.localisation.distortion import Distortions, distortion
+from analysis.diagnosis.localisation.distortion import Distortions
 from analysis.diagnosis.localisation.entry_point import Entry, EntryPoint, entry_point
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, Prediction
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
@@ -18,11 +18,11 @@ from analysis.diagnosis.localisation.residual_spectra import residual_spectra
 from analysis.diagnosis.localisation.tied_states import tied_errors, tied_forces
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from equalizer.effects.placing import axis_letter
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-Cells = Mapping[str, tuple[MismatchCell, ...]]
 _DERIVATIVES: Mapping[str, Literal[0, 1, 2]] = {
     "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2,
 }  # fmt: skip
@@ -39,21 +39,11 @@ class Localisation:
     distortions: Distortions = field(default_factory=lambda: Distortions((), ()))
 
 
-def localised(
-    measure: ErrorMeasure, tuning: Tuning, stages: Mapping[str, Fitted], floors: tuple[NoiseFloor, ...], cells: Cells
-) -> Localisation:
-    """Of the first recording, which stands for the device. stages: see `Explanation.stages`."""
-    left = any(cell.beyond_noise for cell in cells["retuned"])
-    entry = _entry(measure, tuning, stages["retuned"], floors[0]) if left else None
-    # What is the same fit is looked at once.
-    looked = {id(fitted): (fitted, cells[stage]) for stage, fitted in stages.items()}
-    found = {fit: _states(measure, tuning, *of_fit, entry) for fit, of_fit in looked.items()}
-    states = {stage: found[id(fitted)] for stage, fitted in stages.items()}
-    return Localisation(states, entry, distortion(measure.records[0].recording, floors[0]))
-
-
-def _entry(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, floor: NoiseFloor) -> EntryPoint | None:
-    if measure.name != "free simulation":
+def entered(
+    measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, floor: NoiseFloor, cells: Sequence[MismatchCell]
+) -> EntryPoint | None:
+    """Of the first recording, which stands for the device. cells: of this fit, the re-tuned model's."""
+    if measure.name != "free simulation" or not any(cell.beyond_noise for cell in cells):
         return None
     record = measure.records[0]
     recording, p = record.recording, record.recording.response.samples.shape[1]
@@ -68,16 +58,18 @@ def _entry(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, floor: NoiseFl
     return entry_point(spectra, entries, kinds.pop() if len(kinds) == 1 else None)
 
 
-def _states(
+def tied_states(
     measure: ErrorMeasure,
     tuning: Tuning,
     fitted: Fitted,
-    cells: tuple[MismatchCell, ...],
+    cells: Sequence[MismatchCell],
     entry: EntryPoint | None,
+    known: Sequence[Evidence] = (),
 ) -> tuple[StateMismatch, ...]:
+    """Significant ones, of the first recording. cells: of this fit. known: its evidence, where that is known."""
     if not any(cell.beyond_noise for cell in cells):
         return ()
-    recording, evidence = measure.records[0].recording, gather_evidence(measure, tuning, fitted)[0]
+    recording, evidence = measure.records[0].recording, (known or gather_evidence(measure, tuning, fitted))[0]
     best = entry.ranking[0] if entry is not None and entry.ranking else None
     if best is not None and best.place == "sensor":
         channels = recording.response.channels if best.axis is None else (best.axis,)

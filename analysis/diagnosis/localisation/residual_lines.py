@@ -9,7 +9,7 @@ import numpy as np
 from analysis.diagnosis.data.detection_lines import detection_lines, held_samples
 from analysis.diagnosis.data.frequency_cells import Band, driving_inputs, octaves_between, within
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
-from analysis.diagnosis.noise.periods import Periods, look_spectra, settled_periods, spectra
+from analysis.diagnosis.noise.periods import Periods, mean_spectrum, settled_periods, spectra
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.recording import Recording, Segment
@@ -70,6 +70,7 @@ def residual_lines(recording: Recording, seen: Observation, used: Mask) -> list[
     """used: (n,), the samples that count. Segments without a whole period or window of them are left out."""
     whole = used & np.isfinite(seen.measured).all(axis=1) & np.isfinite(seen.predicted).all(axis=1)
     periods = {period.index: period for period in settled_periods(recording)}
+    left = seen.measured - seen.predicted
     found: list[ResidualLines] = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
         if segment.kind == "rest":
@@ -77,20 +78,20 @@ def residual_lines(recording: Recording, seen: Observation, used: Mask) -> list[
         if index in periods:
             starts = tuple(s for s in periods[index].starts if whole[s : s + segment.period].all())
             if starts:
-                found += _of_periods(recording, seen, Periods(index, segment, starts, periods[index].settled))
+                found += _of_periods(recording, seen, left, Periods(index, segment, starts, periods[index].settled))
         else:
-            found += _of_windows(recording, seen, segment, whole)
+            found += _of_windows(recording, seen, left, (segment, whole))
     return found
 
 
-def _of_periods(recording: Recording, seen: Observation, periods: Periods) -> list[ResidualLines]:
-    excitation = look_spectra(instrument_of(recording), periods).mean(axis=0)
+def _of_periods(recording: Recording, seen: Observation, left: FloatArray, periods: Periods) -> list[ResidualLines]:
+    excitation = mean_spectrum(instrument_of(recording), periods)
     driven = detection_lines(excitation, held_samples(instrument_of(recording)))
     if driven is None:
         return []
     lines_hz = periods.frequency_hz(recording.sample_rate_hz)
-    response = np.abs(look_spectra(seen.measured, periods).mean(axis=0)) ** 2
-    residual = np.abs(look_spectra(seen.measured - seen.predicted, periods).mean(axis=0)) ** 2
+    response = np.abs(mean_spectrum(seen.measured, periods)) ** 2
+    residual = np.abs(mean_spectrum(left, periods)) ** 2
     noise = _noise_power(seen, lines_hz, periods.looks) / periods.length
     inputs = "+".join(driving_inputs(np.sum(np.abs(excitation) ** 2, axis=0), recording.command.channels))
     lowest, highest = (float(line) for line in lines_hz[driven.driven][[0, -1]])
@@ -105,7 +106,10 @@ def _of_periods(recording: Recording, seen: Observation, periods: Periods) -> li
     return found
 
 
-def _of_windows(recording: Recording, seen: Observation, segment: Segment, whole: Mask) -> list[ResidualLines]:
+def _of_windows(
+    recording: Recording, seen: Observation, left: FloatArray, where_used: tuple[Segment, Mask]
+) -> list[ResidualLines]:
+    segment, whole = where_used
     length = min(round(_WINDOW_S * recording.sample_rate_hz), segment.stop - segment.start)
     starts = [
         s for s in range(segment.start, segment.stop - length + 1, max(length // 2, 1)) if whole[s : s + length].all()
@@ -116,7 +120,7 @@ def _of_windows(recording: Recording, seen: Observation, segment: Segment, whole
     lines_hz: FloatArray = np.arange(1.0, (length + 1) // 2) * (recording.sample_rate_hz / length)
     excitation = np.sum(_window_power(instrument_of(recording), starts, length), axis=2)
     response = _window_power(seen.measured, starts, length)
-    residual = _window_power(seen.measured - seen.predicted, starts, length)
+    residual = _window_power(left, starts, length)
     noise = np.broadcast_to(_noise_power(seen, lines_hz, 1) / length, response.shape)
     inputs = "+".join(driving_inputs(command.var(axis=0), recording.command.channels))
     by_band = [(band, within(lines_hz, band)) for band in octaves_between(2 * float(lines_hz[0]), float(lines_hz[-1]))]

@@ -68,6 +68,11 @@ def look_spectra(samples: FloatArray, periods: Periods) -> ComplexArray:
     return spectra(look_samples(samples, periods))
 
 
+def mean_spectrum(samples: FloatArray, periods: Periods) -> ComplexArray:
+    """(lines, channels): that of the mean period."""
+    return np.asarray(spectra(look_samples(samples, periods).mean(axis=0, keepdims=True))[0])
+
+
 def spectra(looks: FloatArray) -> ComplexArray:
     """(looks, length, channels) to (looks, lines, channels)."""
     length = looks.shape[1]

@@ -6,10 +6,10 @@ import numpy as np
 
 from analysis.diagnosis.effect_words import numbers_text
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.localisation.localisation_words import localisation_sentences
 from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, HeldOutStretch, OwnNumber, RealAnswer
 from analysis.diagnosis.result.candidate_wording import candidate_sentences
 from analysis.diagnosis.result.findings import Course, Findings
-from analysis.diagnosis.result.localisation_words import localisation_sentences
 from analysis.diagnosis.result.wording import (
     answer_of,
     device_of,

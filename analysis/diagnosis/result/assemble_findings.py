@@ -8,21 +8,18 @@ import numpy as np
 
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.hypothesis import without_claim
-from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
-from analysis.diagnosis.localisation.localisation import Localisation, localised
+from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, maps_of, whole_mismatch
 from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
 from analysis.diagnosis.next_experiment.proposed_experiment import Proposal, proposed_experiment
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.reference.learn_model_error import learned_sentence
-from analysis.diagnosis.result.black_box import black_box
 from analysis.diagnosis.result.error_table import channel_errors, errors_of
-from analysis.diagnosis.result.findings import BlackBox, Course, Findings, Signature
+from analysis.diagnosis.result.findings import Course, Findings
+from analysis.diagnosis.result.looks import looks_of
 from analysis.diagnosis.result.named_effects import Said, named_effects, said_of
-from analysis.diagnosis.result.signature_curves import Names, signature_of
 from analysis.diagnosis.result.unconfirmed import with_gains
 from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
 from analysis.diagnosis.search.explain import Explanation
@@ -32,7 +29,6 @@ from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE
 from analysis.diagnosis.types import Mask
-from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter, model_effects
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -52,9 +48,9 @@ def assembled(
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels, errors = channel_names(recording, len(measure.noise)), _errors(searched)
     maps, courses = maps_of(measure, found.stages, floors, learned, context.map_), _courses(measure, found, names)
-    local = _localised(context, found, floors, maps)
+    looked = looks_of(searched, floors[0], maps)
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
-    document = _document(searched, errors, (maps, local), proposal)
+    document = _document(searched, errors, (maps, looked.local), proposal)
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
     return Findings(
         diagnosis=document,
@@ -62,17 +58,17 @@ def assembled(
         given=tuning.model,
         improved=replace(tuning.tuned(fitted.deviations), effects=effects),
         named=placed,
-        evidence=gather_evidence(measure, tuning, found.retuned.fitted),
+        evidence=looked.evidence,
         courses=courses,
         noise_rms=dict(zip(channels, measure.noise.tolist(), strict=True)),
         channel_errors=channel_errors(found, channels),
         mismatch=maps.rows,
         is_timed=recording.is_timed,
-        signatures=_signatures(context, found, said),
-        black_box=context.guard.part("the black box", "its fit", partial(_black_box, measure, found, document), None),
+        signatures=looked.signatures,
+        black_box=looked.black_box,
         remarks=_remarks(learned_sentence(learned, channels), courses, tuning, floors),
         maps=maps.cells,
-        local=local,
+        local=looked.local,
         floor=floors[0],
         tuning=tuning,
         axes=tuple(axis_letter(name, said.inputs) for name in said.inputs),
@@ -80,19 +76,6 @@ def assembled(
         split_s=_split_s(measure),
         own_errors=errors[: len(tuning.names)] * tuning.deviation,
     )
-
-
-def _localised(context: SearchContext, found: Explanation, floors: tuple[NoiseFloor, ...], maps: Maps) -> Localisation:
-    looked = partial(localised, context.whole, context.tuning, found.stages, floors, maps.cells)
-    nowhere = Localisation(dict.fromkeys(found.stages, ()))
-    return context.guard.part("the look at where it sits", "its work", looked, nowhere)
-
-
-def _black_box(measure: ErrorMeasure, found: Explanation, document: Diagnosis) -> BlackBox | None:
-    if found.statistic is not None:
-        return None
-    numbers = max(len(found.after.fitted.hypothesis.point), 1)
-    return black_box(measure, found.retuned, numbers, document.fit.test.after)
 
 
 def _remarks(
@@ -208,34 +191,6 @@ def _units(recording: Recording) -> tuple[str, ...]:
 def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
-
-
-def _signatures(context: SearchContext, found: Explanation, said: Said) -> tuple[Signature, ...]:
-    drawn = partial(_drawn, context, found, said)
-    none: tuple[Signature, ...] = ()
-    return context.guard.part("the curves of effects", "their making", drawn, none)
-
-
-def _drawn(context: SearchContext, found: Explanation, said: Said) -> tuple[Signature, ...]:
-    """Each named effect's, against the final model without it alone."""
-    measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
-    names = Names(
-        tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.system
-    )
-    hold, drawn = measure.records[0].recording.hold, []
-    for number in range(len(fitted.hypothesis.claims)):
-        others = without_claim(fitted.hypothesis, number)
-        bare = gather_evidence(measure, tuning, evaluated(measure, tuning, fitted.deviations, others))
-        own = fitted.hypothesis.of_claim(number)
-        drawn.append(
-            signature_of(bare[0], max(own, key=lambda placed: _strength(placed.values)), others.placed(), names, hold)
-        )
-    return tuple(drawn)
-
-
-def _strength(values: Values) -> float:
-    """By the main number, which comes first."""
-    return abs(next(iter(values.values())))
 
 
 # Where play does not explain how strong the response is. Its course does not count: no simulation predicts blows.

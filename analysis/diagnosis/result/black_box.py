@@ -5,6 +5,9 @@ most of what is left (orthogonal least squares; Chen, Billings and Luo 1989), as
 has numbers.
 """
 
+from collections.abc import Sequence
+from itertools import combinations
+
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
@@ -17,7 +20,7 @@ from equalizer.signals.signal import FloatArray
 SEEN = 20_000
 """Samples that terms are chosen by, evenly taken from those to fit; all that are fitted to weigh in the end."""
 _SEEN_AT_ALL = 1e-6
-"""Rms of a term on the samples to fit; over all samples it is about 1."""
+"""Rms of a term on the samples that terms are chosen by; over all samples it is about 1."""
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -31,16 +34,28 @@ def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, phy
         _courses(record.command, np.nan_to_num(record.measured - left * measure.unit))
         for record, left in zip(measure.records, retuned.fitted.residuals, strict=True)
     ]
-    terms = [_terms(course) for course in _within_what_was_fitted(courses, fitted)]
-    rows = np.vstack([term[mask] for term, mask in zip(terms, fitted, strict=True)])
+    courses = _within_what_was_fitted(courses, fitted)
+    rows = np.vstack([course[mask] for course, mask in zip(courses, fitted, strict=True)])
     left = np.vstack([residual[mask] for residual, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
-    scale = _scale(rows)
-    weights = np.stack([_chosen(rows / scale, left[:, c], numbers) for c in range(left.shape[1])], axis=1)
-    corrected = tuple(
-        residual - each / scale @ weights for residual, each in zip(retuned.fitted.residuals, terms, strict=True)
+    every = max(len(rows) // SEEN, 1)
+    seen = _terms(rows[::every], range(_count(rows)))
+    scale = _scale(seen)
+    chosen = [_chosen(seen / scale, wanted, numbers) for wanted in left[::every].T]
+    picked = sorted({number for each in chosen for number in each})
+    whole, weights = _terms(rows, picked) / scale[picked], np.zeros((len(picked), left.shape[1]))
+    for channel, each in enumerate(chosen):
+        its = [picked.index(number) for number in each]
+        weights[its, channel] = np.linalg.lstsq(whole[:, its], left[:, channel], rcond=None)[0]
+    corrected = [
+        residual[record.test] - _terms(course[record.test], picked) / scale[picked] @ weights
+        for record, residual, course in zip(measure.records, retuned.fitted.residuals, courses, strict=True)
+    ]
+    return BlackBox(
+        "polynomial of the model's signals",
+        numbers * left.shape[1],
+        _normalised(measure, np.vstack(corrected)),
+        physics,
     )
-    error = _normalised(measure, corrected, [record.test for record in measure.records])
-    return BlackBox("polynomial of the model's signals", numbers * left.shape[1], error, physics)
 
 
 def _scale(rows: FloatArray) -> FloatArray:
@@ -65,17 +80,30 @@ def _courses(command: FloatArray, predicted: FloatArray) -> FloatArray:
     return np.asarray(base / np.maximum(np.sqrt(np.mean(base**2, axis=0)), _TINY))
 
 
-def _terms(base: FloatArray) -> FloatArray:
-    """(n, terms): powers and products."""
-    half = base.shape[1] // 2
-    products = [base[:, i] * base[:, j] for i in range(half) for j in range(i + 1, half)]
-    return np.hstack([base, base**2, base * np.abs(base), base**3, np.stack(products, axis=1)])
+def _count(base: FloatArray) -> int:
+    """Of the terms: powers, and products of two courses."""
+    width: int = base.shape[1]
+    return 4 * width + len(list(combinations(range(width // 2), 2)))
 
 
-def _chosen(rows: FloatArray, left: FloatArray, count: int) -> FloatArray:
-    """(terms,): weights, all but `count` of them zero."""
-    every = max(len(rows) // SEEN, 1)
-    seen, wanted = rows[::every], left[::every]
+def _terms(base: FloatArray, numbers: Sequence[int]) -> FloatArray:
+    """(n, numbers): some of the terms. base: (n, 2 signals)."""
+    width = base.shape[1]
+    products = list(combinations(range(width // 2), 2))
+    found = np.empty((len(base), len(numbers)))
+    for place, number in enumerate(numbers):
+        power, at = divmod(number, width)
+        if power < 4:
+            course = base[:, at]
+            found[:, place] = course * (1.0, course, np.abs(course), course**2)[power]
+        else:
+            first, other = products[number - 4 * width]
+            found[:, place] = base[:, first] * base[:, other]
+    return found
+
+
+def _chosen(seen: FloatArray, wanted: FloatArray, count: int) -> list[int]:
+    """Numbers of the terms that take most, one after the other."""
     picked: list[int] = []
     rest = wanted
     power = np.sum(seen**2, axis=0)
@@ -84,13 +112,12 @@ def _chosen(rows: FloatArray, left: FloatArray, count: int) -> FloatArray:
         gain[picked] = -1.0
         picked.append(int(np.argmax(gain)))
         rest = wanted - seen[:, picked] @ np.linalg.lstsq(seen[:, picked], wanted, rcond=None)[0]
-    weights = np.zeros(rows.shape[1])
-    weights[picked] = np.linalg.lstsq(rows[:, picked], left, rcond=None)[0]
-    return weights
+    return picked
 
 
-def _normalised(measure: ErrorMeasure, residuals: tuple[FloatArray, ...], masks: list[Mask]) -> float:
+def _normalised(measure: ErrorMeasure, left: FloatArray) -> float:
+    """left: (samples to test, c), in units of the measure."""
     signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
-    size = np.maximum(rms_over(measure.records, signals, masks), _TINY)
-    rms = rms_over(measure.records, residuals, masks) * measure.unit / size
+    size = np.maximum(rms_over(measure.records, signals, [record.test for record in measure.records]), _TINY)
+    rms = np.sqrt(np.mean(left**2, axis=0)) * measure.unit / size
     return float(np.sqrt(np.mean(rms**2)))

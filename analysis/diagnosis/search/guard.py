@@ -3,10 +3,10 @@
 Off, as it is unless asked for, every crash is an error: so tests, benchmarks and banks see it.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
@@ -24,6 +24,18 @@ class Crash:
     """An effect's name, or what else was tried, in words."""
     doing: str
     said: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """A piece of the work that can be left out."""
+
+    what: str
+    """An effect's name, or words."""
+    doing: str
+    work: Callable[[], Any]
+    instead: Any
+    """Of its result, where it crashes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +76,19 @@ class Guard:
             self.crashes.append(found)
             return instead
         return found[0]
+
+    def parts(self, map_: Mapper, pieces: Sequence[Part]) -> list[Any]:
+        """The results of pieces that need nothing of each other."""
+
+        def tried(piece: Part) -> tuple[Any] | Crash:
+            return _tried(piece.what, piece.doing, piece.work) if self.on else (piece.work(),)
+
+        results: list[tuple[Any] | Crash] = list(map_(tried, pieces))  # type: ignore[arg-type]
+        self.crashes.extend(found for found in results if isinstance(found, Crash))
+        return [
+            piece.instead if isinstance(found, Crash) else found[0]
+            for piece, found in zip(pieces, results, strict=True)
+        ]
 
     @property
     def sentences(self) -> tuple[str, ...]:

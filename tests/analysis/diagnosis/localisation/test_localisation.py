@@ -3,9 +3,9 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore, SensorRule
+from analysis.diagnosis.localisation.localisation_words import entry_sentence, localisation_sentences, states_sentence
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.state_regions import StateRegion
-from analysis.diagnosis.result.localisation_words import entry_sentence, localisation_sentences, states_sentence
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 
 ALONG_X = EntryScore("a force along x", "mechanism", "x", 1.0, 0.9, 1.0, ())

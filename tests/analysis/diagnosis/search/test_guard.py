@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.search.explain import explain
-from analysis.diagnosis.search.guard import Guard
+from analysis.diagnosis.search.guard import Guard, Part
 from analysis.diagnosis.search.time_budget import OutOfTimeError
 from equalizer.effects.catalogue import EFFECTS
 
@@ -47,6 +47,15 @@ def test_each_item_that_crashes_is_dropped_and_named_once():
     assert len(guard.crashes) == 2 and len(guard.sentences) == 1
     assert guard.part("coulomb_friction", "its last look", broken, "instead") == "instead"
     assert len(guard.sentences) == 2
+
+
+def test_of_pieces_beside_each_other_the_crashed_one_is_replaced_and_said():
+    pieces = [Part("the black box", "its fit", broken, "none"), Part("the curves", "their making", lambda: 7, 0)]
+    guard = Guard(on=True)
+    assert guard.parts(map, pieces) == ["none", 7]
+    assert len(guard.sentences) == 1 and guard.sentences[0].startswith("The black box was left out")
+    with pytest.raises(ValueError, match="broadcast"):
+        Guard().parts(map, pieces)
 
 
 def test_a_search_that_ends_for_lack_of_time_is_no_crash():

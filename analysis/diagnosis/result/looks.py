@@ -1,0 +1,88 @@
+"""What is looked at once a search is done, piece by piece beside each other: where it sits, curves, a black box."""
+
+from dataclasses import dataclass
+from functools import partial
+
+from analysis.diagnosis.errors.hypothesis import without_claim
+from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
+from analysis.diagnosis.localisation.distortion import Distortions, distortion
+from analysis.diagnosis.localisation.localisation import Localisation, entered, tied_states
+from analysis.diagnosis.localisation.mismatch_maps import Maps
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
+from analysis.diagnosis.result.black_box import black_box
+from analysis.diagnosis.result.error_table import errors_of
+from analysis.diagnosis.result.findings import BlackBox, Signature
+from analysis.diagnosis.result.named_effects import said_of
+from analysis.diagnosis.result.signature_curves import Names, signature_of
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.guard import Part
+from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.search_context import SearchContext
+from equalizer.effects.effect import Values
+from equalizer.effects.placing import axis_letter
+from equalizer.effects.starts.evidence import Evidence
+
+WHERE = "the look at where it sits"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks:
+    evidence: tuple[Evidence, ...]
+    """Of the re-tuned model."""
+    local: Localisation
+    signatures: tuple[Signature, ...]
+    black_box: BlackBox | None
+
+
+def looks_of(searched: Searched, floor: NoiseFloor, maps: Maps) -> Looks:
+    """floor: of the first recording."""
+    context, found = searched.context, searched.found
+    measure, tuning, stages = context.whole, context.tuning, found.stages
+    evidence = gather_evidence(measure, tuning, stages["retuned"])
+    look = partial(entered, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])
+    entry = context.guard.part(WHERE, "its work", look, None)
+    # What is the same fit is looked at once.
+    fits = {id(fitted): stage for stage, fitted in stages.items()}
+    tied = [
+        partial(tied_states, measure, tuning, stages[stage], maps.cells[stage], entry, known)
+        for stage in fits.values()
+        for known in [evidence if stages[stage] is stages["retuned"] else ()]
+    ]
+    pieces = [
+        *(Part(WHERE, "its work", work, ()) for work in tied),
+        Part("the curves of effects", "their making", partial(_signatures, context, found), ()),
+        Part("the black box", "its fit", partial(_black_box, context, found), None),
+        Part(WHERE, "its work", partial(distortion, measure.records[0].recording, floor), Distortions((), ())),
+    ]
+    *each, signatures, box, distortions = context.guard.parts(context.map_, pieces)
+    by_fit = dict(zip(fits, each, strict=True))
+    states = {stage: by_fit[id(fitted)] for stage, fitted in stages.items()}
+    return Looks(evidence, Localisation(states, entry, distortions), signatures, box)
+
+
+def _black_box(context: SearchContext, found: Explanation) -> BlackBox | None:
+    if found.statistic is not None:
+        return None
+    numbers = max(len(found.after.fitted.hypothesis.point), 1)
+    return black_box(context.whole, found.retuned, numbers, errors_of(context.whole, found).test.after)
+
+
+def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, ...]:
+    """Each named effect's, against the final model without it alone."""
+    measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
+    recording = measure.records[0].recording
+    said, drawn = said_of(recording, tuning.model), []
+    names = Names(
+        tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.system
+    )
+    for number in range(len(fitted.hypothesis.claims)):
+        others = without_claim(fitted.hypothesis, number)
+        bare = gather_evidence(measure, tuning, evaluated(measure, tuning, fitted.deviations, others))
+        main = max(fitted.hypothesis.of_claim(number), key=lambda placed: _strength(placed.values))
+        drawn.append(signature_of(bare[0], main, others.placed(), names, recording.hold))
+    return tuple(drawn)
+
+
+def _strength(values: Values) -> float:
+    """By the main number, which comes first."""
+    return abs(next(iter(values.values())))
