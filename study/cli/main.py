@@ -44,6 +44,7 @@ from study.cli import (
     show,
     stream,
     study,
+    study_plan,
     twin,
     validate,
     watch,
@@ -76,6 +77,9 @@ app.command("stream", short_help="Send a running session's facts as LSL markers"
 app.command("note", short_help="Write a note into a session's log", rich_help_panel="Study")(note.note)
 app.command("sessions", short_help="List all sessions, latest first: how far each one is", rich_help_panel="Study")(
     sessions.sessions
+)
+app.command("study-plan", short_help="Who is done, which orders are needed, the next code", rich_help_panel="Study")(
+    study_plan.study_plan
 )
 app.command("withdraw", short_help="Erase a participant's sessions; a tombstone stays", rich_help_panel="Study")(
     withdraw.withdraw

@@ -1,1 +1,1 @@
-"""Planning a study before its first participant. Begin at `simulate_power.py`."""
+"""Planning a study: its size before the first participant (`simulate_power`), and who comes next (`plan_study`)."""

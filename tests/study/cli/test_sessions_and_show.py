@@ -143,3 +143,14 @@ def test_a_person_reads_local_times_and_a_script_reads_utc(run, taken, tmp_path,
     assert f"{local:%H:%M:%S}  Session P01_001 began" in said
     facts = dict(json.loads(run("show", "P01_001", "--data", data, "--json")[1])["facts"])
     assert facts["begun"] == f"{begun:%Y-%m-%d %H:%M:%S} +00:00"
+
+
+def test_the_plan_says_who_is_done_and_who_comes_next(run, taken, tmp_path):
+    code, out, _ = run("study-plan", taken, "--simulated")
+    assert code == 0
+    assert out.splitlines()[0].startswith("small: ")
+    assert "No sample size is declared" in out
+    (study,) = json.loads(run("study-plan", taken, "--simulated", "--json")[1])["studies"]
+    assert f"next: {study['next']['code']}" in out
+    code, _, err = run("study-plan", tmp_path / "nothing")
+    assert code == 2 and "There is no study to plan" in err

@@ -1,0 +1,54 @@
+"""`hapteq study-plan`: who is planned, done and left out, which orders are still needed, and the next code."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+from study.cli.screen import columns
+
+if TYPE_CHECKING:
+    from study.workflows.planning.plan_study import PlannedStudy
+
+
+def study_plan(
+    data: Annotated[Path, typer.Argument(help="Folder of the sessions.")] = Path("data"),
+    protocol: Annotated[
+        str | None, typer.Option(help="Name or file. Default: all that have sessions in the folder.")
+    ] = None,
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="Of simulated participants, who are counted apart.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Say who is planned, done and left out, which orders of the frequencies are still needed, and who comes next.
+
+    Planned is what analysis.participants of the protocol declares.
+    """
+    from study.workflows.planning.plan_study import document, planned_studies
+
+    studies = planned_studies(data, protocol, simulated)
+    if as_json:
+        typer.echo(json.dumps(document(studies), indent=2))
+        return
+    for number, study in enumerate(studies):
+        for line in (*[""] * (number > 0), *_shown(study, columns())):
+            typer.echo(line)
+
+
+def _shown(study: "PlannedStudy", width: int | None) -> Iterator[str]:
+    from study.tui.text_rows import aligned, hanging
+    from study.workflows.planning.plan_study import lines, order_words
+
+    for line in lines(study):
+        yield from hanging(line, 2, width)
+    if study.plan.cells:
+        header = ("order", "frequencies", "wanted", "done", "begun", "needed")
+        rows = [
+            (str(place), order_words(cell), *map(str, (cell.wanted, cell.done, cell.begun, cell.needed)))
+            for place, cell in enumerate(study.plan.cells, start=1)
+        ]
+        yield from aligned((header, *rows), width)

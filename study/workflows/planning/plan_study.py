@@ -1,0 +1,210 @@
+"""The plan of each study in a data folder: who is planned, done and left out, and who comes next. Reads only."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.loading import ProtocolError, load_protocol
+from protocols.procedure.study_plan import Cell, Participant, Progress, StudyPlan, plan_study
+from study.errors import StudyError, WrongUseError
+from study.session.facts.events import SessionOpened
+from study.session.views.archive_views import SessionLine
+from study.session.views.participant_codes import next_code
+from study.store.formats.protocol_files import read_study_protocol
+from study.store.sessions.archive import SessionFolder, session_folders
+from study.store.sessions.event_log import read_opening
+from study.workflows.session.participant_number import begun_in, participant_number
+from study.workflows.views.session_line import session_line
+
+PROGRESS: dict[str, Progress] = {"finished": "done", "unfinished": "begun", "running": "begun"}
+BEST_FIRST = ("finished", "running", "unfinished")
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedStudy:
+    plan: StudyPlan
+    next_code: str
+    """A free one, in the manner of the latest."""
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Begun:
+    folder: SessionFolder
+    protocol: str
+    number: int | None
+    line: SessionLine
+
+
+def planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[PlannedStudy, ...]:
+    """protocol: a name or file; None = all that were begun in `data`. simulated: of simulated participants instead of
+    people, who are counted apart. Raises StudyError where there is nothing to plan."""
+    begun = _begun(data, simulated)
+    if protocol is not None:
+        chosen = read_study_protocol(protocol, data).protocol
+        return (_planned(data, chosen, [each for each in begun if each.protocol == chosen.name], simulated),)
+    found = []
+    for name, sessions in groupby(sorted(begun, key=lambda each: each.protocol), key=lambda each: each.protocol):
+        kept = list(sessions)
+        found.append(_planned(data, _latest_protocol(name, kept), kept, simulated))
+    if not found:
+        raise WrongUseError(
+            "There is no study to plan",
+            f"{data} holds no session of {'simulated participants' if simulated else 'people'}.",
+            "Name the protocol with --protocol, or the folder of the sessions.",
+        )
+    return tuple(found)
+
+
+def _begun(data: Path, simulated: bool) -> list[_Begun]:
+    found = []
+    for folder in session_folders(data):
+        begun = begun_in(folder)
+        if begun is not None and begun.protocol and begun.simulated == simulated:
+            found.append(_Begun(folder, begun.protocol, begun.number, session_line(folder)))
+    return found
+
+
+def _planned(data: Path, protocol: StudyProtocol, begun: Sequence[_Begun], simulated: bool) -> PlannedStudy:
+    people: dict[str, list[_Begun]] = {}
+    for each in sorted(begun, key=_by_number):
+        people.setdefault(each.folder.subject, []).append(each)
+    # As the program gives it to a new participant, whose code no folder has.
+    number = participant_number(data, "", protocol.name, simulated)
+    plan = plan_study(protocol, [_participant(code, sessions) for code, sessions in people.items()], number)
+    return PlannedStudy(plan, _free_code(data, tuple(reversed(people))), _remarks(begun))
+
+
+def _free_code(data: Path, own: tuple[str, ...]) -> str:
+    """own: codes of this study, the latest first, whose manner is kept."""
+    others = tuple(folder.subject for folder in session_folders(data))
+    return next_code((*own, *others)) if own or "P01" in others else next_code(())
+
+
+def _by_number(each: _Begun) -> tuple[float, str]:
+    """Numbers are given in turn; when a withdrawn session began is erased."""
+    return (float("inf") if each.number is None else each.number, each.folder.name)
+
+
+def _participant(code: str, sessions: Sequence[_Begun]) -> Participant:
+    """By the session that is furthest."""
+    standings = [each.line.standing for each in sessions]
+    numbers = [each.number for each in sessions if each.number is not None]
+    best = next((standing for standing in BEST_FIRST if standing in standings), standings[-1])
+    progress = PROGRESS.get(best, "left out")
+    return Participant(code, numbers[0] if numbers else None, progress, "" if best in PROGRESS else best)
+
+
+def _latest_protocol(name: str, begun: Sequence[_Begun]) -> StudyProtocol:
+    """Of the latest session whose log can be read. Raises WrongUseError where there is none."""
+    for each in sorted(begun, key=lambda each: each.line.begun_utc, reverse=True):
+        try:
+            opening = read_opening(each.folder.log)
+            if isinstance(opening, SessionOpened):
+                protocol = load_protocol(opening.protocol_text, "the log")
+                if isinstance(protocol, StudyProtocol):
+                    return protocol
+        except (StudyError, ProtocolError, OSError, ValueError):
+            continue
+    raise WrongUseError(
+        "The protocol cannot be read",
+        f"No session of '{name}' has a log that says what its protocol was: all are withdrawn or damaged.",
+        "Give the protocol's file with --protocol.",
+    )
+
+
+def _remarks(begun: Sequence[_Begun]) -> tuple[str, ...]:
+    """Texts that differ: orders of one protocol would then be counted with those of another."""
+    texts = set()
+    for each in begun:
+        try:
+            opening = read_opening(each.folder.log)
+        except (StudyError, OSError):
+            continue
+        if isinstance(opening, SessionOpened):
+            texts.add(opening.protocol_text)
+    if len(texts) < 2:
+        return ()
+    return (f"{len(texts)} different texts of this protocol were used. Lock it: hapteq protocol lock.",)
+
+
+def document(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
+    """For programs."""
+    return {
+        "studies": [
+            {
+                "protocol": each.plan.protocol,
+                "planned": each.plan.planned,
+                "done": each.plan.count("done"),
+                "begun": each.plan.count("begun"),
+                "left_out": each.plan.count("left out"),
+                "participants": [
+                    {"code": who.code, "number": who.number, "progress": who.progress.replace(" ", "_"), "why": who.why}
+                    for who in each.plan.participants
+                ],
+                "orders": [
+                    {
+                        "frequencies_hz": list(cell.frequencies_hz),
+                        "swapped": cell.swapped,
+                        "wanted": cell.wanted,
+                        "done": cell.done,
+                        "begun": cell.begun,
+                        "needed": cell.needed,
+                    }
+                    for cell in each.plan.cells
+                ],
+                "next": {"code": each.next_code, "number": each.plan.next_number, **_next_order(each.plan.next_cell)},
+                "remarks": list(each.remarks),
+            }
+            for each in studies
+        ]
+    }
+
+
+def _next_order(cell: Cell | None) -> dict[str, Any]:
+    return {} if cell is None else {"frequencies_hz": list(cell.frequencies_hz), "swapped": cell.swapped}
+
+
+def lines(study: PlannedStudy) -> list[str]:
+    """For the terminal: sentences, and rows of cells below `orders`."""
+    plan = study.plan
+    done, begun, out = (plan.count(each) for each in ("done", "begun", "left out"))
+    size = f" of {plan.planned} planned" if plan.planned else ""
+    found = [f"{plan.protocol}: {done} done{size}, {begun} begun, {out} left out"]
+    found += _named("to resume", [who.code for who in plan.participants if who.progress == "begun"])
+    found += _named("left out", [f"{who.code} ({who.why})" for who in plan.participants if who.progress == "left out"])
+    if plan.planned and plan.planned % plan.balanced_sizes:
+        found.append(
+            f"{plan.planned} participants do not balance the orders: multiples of {plan.balanced_sizes} would."
+        )
+    if not plan.planned:
+        found.append("No sample size is declared: analysis.participants in the protocol says how many are planned.")
+    if not plan.cells:
+        found.append("No orders have to be balanced: they are drawn by lot, or the same for all.")
+    else:
+        short = [place for place, cell in enumerate(plan.cells) if cell.needed]
+        places = ", ".join(f"{place + 1}" for place in short)
+        found.append(f"orders still needed: {places}" if short else "orders still needed: none")
+    found.append(f"next: {study.next_code}{_said(plan)}")
+    return [*found, *study.remarks]
+
+
+def _named(title: str, codes: Sequence[str]) -> list[str]:
+    return [f"{title}: {', '.join(codes)}"] if codes else []
+
+
+def _said(plan: StudyPlan) -> str:
+    cell = plan.next_cell
+    if cell is None:
+        return ""
+    return f", order {plan.next_number % len(plan.cells) + 1}: {order_words(cell)}"
+
+
+def order_words(cell: Cell) -> str:
+    """Such as: 5, 45, 15, 35, 25 Hz, numbers swapped."""
+    hertz = ", ".join(f"{frequency:g}" for frequency in cell.frequencies_hz)
+    words = f"{hertz} Hz" if hertz else "by lot"
+    return f"{words}, numbers swapped" if cell.swapped else words
