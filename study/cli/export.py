@@ -13,15 +13,19 @@ def export(
     data: Annotated[Path, typer.Argument(help="Folder of sessions, or one session.")],
     out: Annotated[Path, typer.Option(help="Folder to write; it must not be there yet, or be empty.")],
     form: Annotated[
-        Literal["psych-ds", "bids", "mat"],
-        typer.Option(help="Psych-DS (CSV with a data dictionary), BIDS behaviour, or a MATLAB file."),
+        Literal["psych-ds", "bids", "mat", "csv"],
+        typer.Option(
+            "--format",
+            "--form",
+            help="Psych-DS (a table per session, described), BIDS behaviour, a MATLAB file, or one table as CSV.",
+        ),
     ] = "psych-ds",
     protocol: Annotated[
         str | None, typer.Option(help="Which protocol's sessions, where the folder holds several.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write all trials with their protocol, seeds and versions. `hapteq analyze` takes a Psych-DS dataset back."""
+    """Write all trials with their protocol, seeds and versions. `hapteq analyze` takes psych-ds and csv back."""
     from study.workflows.results.collect_sessions import collect_sessions
     from study.workflows.results.export_study import export_study
 

@@ -27,11 +27,13 @@ OURS = "hapteq"
 
 
 @dataclass(frozen=True, slots=True)
-class PsychDs:
+class ExportedTrials:
+    """A dataset read back."""
+
     trials: tuple[Trial, ...]
     protocol_text: str
     facts: Mapping[str, Any]
-    """Of the description's own key."""
+    """Provenance, seeds, devices: what only this program needs."""
     files: tuple[Path, ...]
 
 
@@ -65,7 +67,7 @@ def write_psych_ds(
     return (*written, folder / PROTOCOL_NAME, folder / DESCRIPTION_NAME)
 
 
-def read_psych_ds(folder: Path) -> PsychDs:
+def read_psych_ds(folder: Path) -> ExportedTrials:
     """As `write_psych_ds` wrote it. Raises CannotReadError, UnusableFileError."""
     path = folder / DESCRIPTION_NAME
     try:
@@ -77,16 +79,19 @@ def read_psych_ds(folder: Path) -> PsychDs:
     if not isinstance(facts, dict) or not files:
         missing = "no file below data/ ends in _data.csv" if isinstance(facts, dict) else f"the key '{OURS}' is missing"
         raise UnusableFileError(path, KIND, (missing,))
-    trials: list[Trial] = []
-    for each in files:
-        try:
-            rows = rows_from_csv(read_text(each), Trial)
-        except CsvError as error:
-            raise UnusableFileError(each, KIND, error.problems) from error
-        if wrong := trial_problems(rows):
-            raise UnusableFileError(each, KIND, wrong)
-        trials += rows
-    return PsychDs(tuple(trials), read_text(folder / PROTOCOL_NAME), facts, files)
+    trials = tuple(trial for each in files for trial in trials_in(each, KIND))
+    return ExportedTrials(trials, read_text(folder / PROTOCOL_NAME), facts, files)
+
+
+def trials_in(path: Path, kind: str) -> tuple[Trial, ...]:
+    """Rows of a CSV table of trials. kind: of the dataset, for the error. Raises CannotReadError, UnusableFileError."""
+    try:
+        rows = rows_from_csv(read_text(path), Trial)
+    except CsvError as error:
+        raise UnusableFileError(path, kind, error.problems) from error
+    if wrong := trial_problems(rows):
+        raise UnusableFileError(path, kind, wrong)
+    return tuple(rows)
 
 
 def _variable(column: str) -> dict[str, str]:

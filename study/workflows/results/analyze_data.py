@@ -21,7 +21,6 @@ from study.store.disk.json_document import write_json
 from study.store.disk.privacy import close_to_others, make_folder
 from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
-from study.store.formats.psych_ds import is_psych_ds
 from study.store.formats.recording_file import read_recording
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
 from study.store.sessions.written_elsewhere import note_written
@@ -29,7 +28,7 @@ from study.workflows.picture_files import write_pictures
 from study.workflows.results.analysis_files import PAGE_NAME, written_by_analysis
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.collected import Collected
-from study.workflows.results.export_study import collect_exported
+from study.workflows.results.export_study import collect_exported, is_exported
 from study.workflows.results.written_analysis import WrittenAnalysis
 
 
@@ -40,7 +39,7 @@ def analyze_data(
 
     Raises StudyError where there is nothing to analyse, where rows contradict their protocol, or on a full disk.
     """
-    collected = collect_exported(data) if is_psych_ds(data) else collect_sessions(data, protocol_name)
+    collected = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
         analysis = analyse_study(collected.trials, collected.protocol)
     except ValueError as problem:

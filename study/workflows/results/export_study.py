@@ -1,4 +1,4 @@
-"""A study's trials as other tools read them, with protocol, seeds and versions; and a Psych-DS dataset read back."""
+"""A study's trials as other tools read them, with protocol, seeds and versions; and a dataset read back."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,18 +12,20 @@ from protocols.document.loading import ProtocolError, load_protocol
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.new_folder import new_folder, require_new_folder
 from study.store.disk.provenance import gather_provenance
+from study.store.formats import tidy_csv
 from study.store.formats.bids_behaviour import write_bids
-from study.store.formats.psych_ds import KIND, PROTOCOL_NAME, read_psych_ds, write_psych_ds
+from study.store.formats.psych_ds import KIND, PROTOCOL_NAME, is_psych_ds, read_psych_ds, write_psych_ds
 from study.store.formats.trials_mat import write_trials_mat
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.written_elsewhere import note_written
 from study.workflows.results.collected import Collected
 
-Form = Literal["psych-ds", "bids", "mat"]
+Form = Literal["psych-ds", "bids", "mat", "csv"]
 WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
     "psych-ds": write_psych_ds,
     "bids": write_bids,
     "mat": write_trials_mat,
+    "csv": tidy_csv.write_tidy_csv,
 }
 
 
@@ -62,16 +64,23 @@ def _facts(collected: Collected) -> dict[str, Any]:
     }
 
 
+def is_exported(folder: Path) -> bool:
+    """Whether `collect_exported` takes it."""
+    return is_psych_ds(folder) or tidy_csv.is_tidy_csv(folder)
+
+
 def collect_exported(folder: Path) -> Collected:
-    """A dataset of `export_study` in Psych-DS form: the same trials and the same protocol give the same results.
+    """A dataset of `export_study` that `is_exported`: the same trials and the same protocol give the same results.
     Raises StudyError."""
-    found = read_psych_ds(folder)
+    psych_ds = is_psych_ds(folder)
+    found = read_psych_ds(folder) if psych_ds else tidy_csv.read_tidy_csv(folder)
+    path, kind = folder / (PROTOCOL_NAME if psych_ds else tidy_csv.PROTOCOL_NAME), KIND if psych_ds else tidy_csv.KIND
     try:
-        protocol = load_protocol(found.protocol_text, PROTOCOL_NAME)
+        protocol = load_protocol(found.protocol_text, path.name)
     except ProtocolError as error:
-        raise UnusableFileError(folder / PROTOCOL_NAME, KIND, tuple(str(each) for each in error.problems)) from error
+        raise UnusableFileError(path, kind, tuple(str(each) for each in error.problems)) from error
     if not isinstance(protocol, StudyProtocol):
-        raise UnusableFileError(folder / PROTOCOL_NAME, KIND, ("it is no protocol of a study",))
+        raise UnusableFileError(path, kind, ("it is no protocol of a study",))
     seeds = found.facts.get("seeds", {})
     sessions = tuple(dict.fromkeys(trial.session for trial in found.trials))
     return Collected(
@@ -86,5 +95,5 @@ def collect_exported(folder: Path) -> Collected:
         qualities=(),
         locked=str(found.facts.get("locked", "not known")),
         finished=(),
-        parents=(*found.files, folder / PROTOCOL_NAME),
+        parents=(*found.files, path),
     )

@@ -50,8 +50,9 @@ def test_a_psych_ds_dataset_names_all_its_columns(data, tmp_path):
 
 
 @pytest.mark.usefixtures("sketched")
-def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, capsys):
-    assert main(["export", str(data), "--out", str(tmp_path / "ds")]) == 0
+@pytest.mark.parametrize("form", ["psych-ds", "csv"])
+def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, capsys, form):
+    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", form]) == 0
     said = []
     for source, out in ((data, tmp_path / "a"), (tmp_path / "ds", tmp_path / "b")):
         capsys.readouterr()
@@ -65,8 +66,32 @@ def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, cap
     assert (tmp_path / "a" / "thresholds.csv").read_bytes() == (tmp_path / "b" / "thresholds.csv").read_bytes()
 
 
+def test_one_table_has_every_trial_and_a_dictionary_of_its_columns(data, tmp_path):
+    assert main(["export", str(data), "--out", str(tmp_path / "csv"), "--format", "csv"]) == 0
+    assert read_trials(tmp_path / "csv" / "trials.csv") == tuple(logged(data))
+    with (tmp_path / "csv" / "dictionary.csv").open(newline="", encoding="utf-8") as table:
+        described = {row["column"]: row for row in csv.DictReader(table)}
+    assert list(described) == list(columns(Trial))
+    assert described["level_n"]["unit"] == "N"
+    assert {name: row["description"] for name, row in described.items()} == {
+        name: words for name, (words, _) in TRIAL_COLUMNS.items()
+    }
+    assert json.loads((tmp_path / "csv" / "facts.json").read_text("utf-8"))["seeds"] == {"P01_001": 1, "P02_001": 2}
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("facts.json", "[]"), ("facts.json", "{"), ("trials.csv", "a,b\n1,2\n"), ("protocol.toml", "x")]
+)
+def test_a_damaged_table_is_refused_by_name(data, tmp_path, capsys, name, text):
+    assert main(["export", str(data), "--out", str(tmp_path / "csv"), "--format", "csv"]) == 0
+    (tmp_path / "csv" / name).write_text(text)
+    capsys.readouterr()
+    assert main(["analyze", str(tmp_path / "csv"), "--out", str(tmp_path / "out")]) == 1
+    assert name in capsys.readouterr().err
+
+
 def test_a_matlab_file_holds_every_trial(data, tmp_path):
-    assert main(["export", str(data), "--out", str(tmp_path / "mat"), "--form", "mat"]) == 0
+    assert main(["export", str(data), "--out", str(tmp_path / "mat"), "--format", "mat"]) == 0
     found = loadmat(tmp_path / "mat" / "trials.mat", simplify_cells=True)
     trials = logged(data)
     assert found["trials"]["level_n"].tolist() == [trial.level_n for trial in trials]
@@ -76,7 +101,7 @@ def test_a_matlab_file_holds_every_trial(data, tmp_path):
 
 
 def test_bids_has_a_table_per_session_and_says_what_is_missing(data, tmp_path):
-    assert main(["export", str(data), "--out", str(tmp_path / "bids"), "--form", "bids"]) == 0
+    assert main(["export", str(data), "--out", str(tmp_path / "bids"), "--format", "bids"]) == 0
     tables = sorted((tmp_path / "bids").glob("sub-*/ses-*/beh/*_beh.tsv"))
     assert [path.name.split("_")[0] for path in tables] == ["sub-P01", "sub-P02"]
     made = json.loads((tmp_path / "bids" / "dataset_description.json").read_text("utf-8"))
@@ -91,7 +116,7 @@ def test_bids_has_a_table_per_session_and_says_what_is_missing(data, tmp_path):
 @pytest.mark.parametrize("form", ["psych-ds", "bids", "mat"])
 def test_a_folder_that_holds_something_is_left_alone(data, tmp_path, form, capsys):
     (tmp_path / "kept.txt").write_text("mine")
-    assert main(["export", str(data), "--out", str(tmp_path), "--form", form]) != 0
+    assert main(["export", str(data), "--out", str(tmp_path), "--format", form]) != 0
     assert "holds files already" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["kept.txt"]
 
