@@ -18,7 +18,7 @@ def stream(
     from study.workflows.views.stream_session import MarkerOutlet, stream_session
 
     folder = find_session(session, data)
-    outlet = MarkerOutlet(folder.name)
+    outlet = MarkerOutlet(folder.log)
     typer.echo(f"Streaming markers of {folder.name}; Ctrl-C ends it, and not the session.", err=True)
     sent = stream_session(folder.log, outlet, on_marker=typer.echo)
     typer.echo(f"{sent} markers; the session is finished.", err=True)

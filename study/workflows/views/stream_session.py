@@ -4,7 +4,9 @@ A program of its own follows the log, so that nothing of it can delay or end the
 monotonic clock; the offset of LSL's clock to it is measured again and again and is a marker too.
 """
 
+import hashlib
 import json
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +24,9 @@ FRESH_S = 5.0
 """An older fact has another clock (a simulated session's, or that of before a restart): its marker is stamped when it
 is sent, and says so."""
 
+LONGEST_FIRST_BYTES = 2**20
+"""Of a log's first line, which says what session it is of."""
+
 TOLD = (
     "event", "run", "trial", "attempt", "phase", "frequency_hz", "level_n", "direction", "angle_deg", "polarity",
     "answer", "response_time_s", "status", "cause", "missed_ticks", "delivered_mps2", "outcome",
@@ -29,6 +34,7 @@ TOLD = (
 """Of each fact: nothing about the person, no notes, no forms."""
 
 LAST = "session_closed"
+"""No fact of a trial follows it, and it is never taken back."""
 
 
 class Outlet(Protocol):
@@ -42,9 +48,10 @@ class Outlet(Protocol):
 
 
 class MarkerOutlet:
-    """An outlet of the library. Raises StudyError where that is not installed."""
+    """An outlet of the library for one session's log. Raises StudyError where the library is not installed or the log
+    cannot be read."""
 
-    def __init__(self, session: str) -> None:
+    def __init__(self, log: Path) -> None:
         try:
             import pylsl
         except (ImportError, RuntimeError, OSError) as problem:  # installed, but without the C library
@@ -54,9 +61,7 @@ class MarkerOutlet:
                 "Install it: pip install '.[lsl]'. Where its wheel has no library for this system, install liblsl too.",
                 saved="The session is not touched.",
             ) from problem
-        described = pylsl.StreamInfo(
-            "hapteq markers", "Markers", 1, pylsl.IRREGULAR_RATE, "string", f"hapteq {session}"
-        )
+        described = pylsl.StreamInfo("hapteq markers", "Markers", 1, pylsl.IRREGULAR_RATE, "string", source_id(log))
         self._outlet = pylsl.StreamOutlet(described)
         self._clock = pylsl.local_clock
 
@@ -67,24 +72,34 @@ class MarkerOutlet:
         self._outlet.push_sample([marker], at_s)
 
 
-class LogFollower:
-    """Whole lines that came since the last look, as they are written; those that were there are passed over."""
+def source_id(log: Path) -> str:
+    """By which a recorder finds the stream again after a restart: of this session alone, wherever its folder lies, and
+    telling nothing of it to the network. Raises StudyError."""
+    try:
+        with open_regular(log) as file:
+            first = file.readline(LONGEST_FIRST_BYTES)
+    except OSError as problem:
+        raise _not_followed(log, problem) from problem
+    return f"hapteq {hashlib.sha256(first).hexdigest()[:16]}"
 
-    def __init__(self, log: Path, from_start: bool = False) -> None:
+
+class LogFollower:
+    """Whole lines as they are written: at the first look those that were there, then those that came since the last."""
+
+    def __init__(self, log: Path) -> None:
         self._log = log
-        self._offset = 0 if from_start else self._whole_bytes()
+        self._offset = 0
 
     def lines(self) -> list[bytes]:
-        """A last line that is still being written waits. Raises OSError."""
+        """A last line that is still being written waits. Raises OSError, and ValueError where lines went."""
         with open_regular(self._log) as file:
+            fresh = os.fstat(file.fileno()).st_size - self._offset
+            if not 0 <= fresh <= TABLE_BYTES:
+                raise ValueError("it became shorter" if fresh < 0 else f"it grew by {fresh} bytes at once")
             file.seek(self._offset)
-            whole = file.read(TABLE_BYTES).split(b"\n")[:-1]
+            whole = file.read(fresh).split(b"\n")[:-1]
         self._offset += sum(len(line) + 1 for line in whole)
         return whole
-
-    def _whole_bytes(self) -> int:
-        with open_regular(self._log) as file:
-            return file.read(TABLE_BYTES).rfind(b"\n") + 1
 
 
 def stream_session(
@@ -94,27 +109,25 @@ def stream_session(
     now_s: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> int:
-    """Follow the log until the session is closed or Ctrl-C. How many facts became markers. Raises StudyError."""
+    """Follow the log until the session is closed or Ctrl-C; of one that is closed already nothing is sent. Returns how
+    many facts became markers. Raises StudyError."""
     try:
         follower, sent, offset_s, next_offset_s = LogFollower(log), 0, 0.0, now_s()
+        if any(LAST.encode() in line and _fact(line).get("event") == LAST for line in follower.lines()):
+            return 0
         while True:
             if now_s() >= next_offset_s:
                 offset_s, next_offset_s = measured_offset_s(outlet, now_s), now_s() + OFFSET_EVERY_S
                 outlet.push(_text({"event": "clock", "lsl_minus_monotonic_s": offset_s}), outlet.clock_s())
             for line in follower.lines():
-                fact: dict[str, Any] = json.loads(line)
+                fact = _fact(line)
                 _send(fact, outlet, offset_s, now_s(), on_marker)
                 sent += 1
                 if fact.get("event") == LAST:
                     return sent
             sleep(EVERY_S)
-    except (OSError, ValueError) as problem:
-        raise StudyError(
-            "The session's log cannot be followed",
-            f"{log.name} in {log.parent.name}: {problem}.",
-            "Check it with: hapteq validate FILE",
-            saved="The session is not touched.",
-        ) from problem
+    except (OSError, ValueError, RecursionError) as problem:
+        raise _not_followed(log, problem) from problem
 
 
 def measured_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
@@ -126,6 +139,22 @@ def measured_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
         after_s = now_s()
         pairs.append((after_s - before_s, theirs_s - (before_s + after_s) / 2))
     return min(pairs)[1]
+
+
+def _fact(line: bytes) -> dict[str, Any]:
+    fact = json.loads(line)
+    if not isinstance(fact, dict):
+        raise ValueError(f"a line of it is no fact: {line[:40]!r}")
+    return fact
+
+
+def _not_followed(log: Path, problem: Exception) -> StudyError:
+    return StudyError(
+        "The session's log cannot be followed",
+        f"{log.name} in {log.parent.name}: {problem}.",
+        "Check it with: hapteq validate FILE",
+        saved="The session is not touched.",
+    )
 
 
 def _send(

@@ -1,13 +1,18 @@
 """A session's facts as markers: all of them, in order, with their own times, and nothing about the person."""
 
+import contextlib
 import json
+import re
+import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from study.cli.main import main
 from study.errors import StudyError
+from study.store.disk.regular_file import open_regular
 from study.workflows.views import stream_session as module
 from study.workflows.views.stream_session import FRESH_S, MarkerOutlet, measured_offset_s, stream_session
 
@@ -19,12 +24,15 @@ class Clock:
 
     def __init__(self, log, lines: list[bytes]) -> None:
         self.now, self.log, self.lines = 50.0, log, lines
+        self.waited = 0
 
     def now_s(self) -> float:
         return self.now
 
     def sleep(self, seconds: float) -> None:
         self.now += seconds
+        self.waited = 0 if self.lines else self.waited + 1
+        assert self.waited < 100, "it waits for a session that is over"
         if self.lines:
             with self.log.open("ab") as file:
                 file.write(self.lines.pop(0))
@@ -110,7 +118,46 @@ def test_an_interrupted_reading_of_the_clocks_does_not_count():
     assert measured_offset_s(Theirs(), lambda: next(times)) == pytest.approx(100.0 - 1.0005)
 
 
-@pytest.mark.parametrize("broken", [b"not json\n", None])
+@pytest.mark.parametrize("after", [b"", line("note_taken", text="he said session_closed")])
+def test_of_a_session_that_is_over_nothing_is_sent_and_it_ends(tmp_path, after):
+    before = line("answer_given", answer=1) + line("session_closed", outcome="completed") + after
+    assert streamed(tmp_path, [], before) == ([], 0)
+
+
+def test_a_note_that_names_the_end_is_not_the_end(tmp_path):
+    before = line("note_taken", text="was this session_closed?")
+    assert streamed(tmp_path, [line("session_closed", monotonic_s=50.0)], before)[1] == 1
+
+
+def test_no_more_is_read_than_what_came(tmp_path, monkeypatch):
+    """At 50 looks a second: room for the largest log that there may be is not taken each time."""
+    asked: list[int] = []
+
+    def noted(path):
+        with open_regular(path) as file:
+            yield SimpleNamespace(
+                fileno=file.fileno, seek=file.seek, read=lambda size: asked.append(size) or file.read(size)
+            )
+
+    monkeypatch.setattr(module, "open_regular", contextlib.contextmanager(noted))
+    before, last = line("answer_given", answer=1), line("session_closed", monotonic_s=50.0)
+    streamed(tmp_path, [b"", last], before)
+    assert asked == [len(before), 0, 0, len(last)]
+
+
+def test_a_log_that_became_shorter_is_said(tmp_path):
+    log = tmp_path / "events.jsonl"
+    log.write_bytes(line("answer_given", answer=1))
+    clock = Clock(log, [b""])
+    clock.sleep = lambda seconds: log.write_bytes(b"")
+    with pytest.raises(StudyError, match="became shorter"):
+        stream_session(log, Kept(clock), print, clock.now_s, clock.sleep)
+
+
+BROKEN = [b"not json\n", b"3\n", b'["session_closed"]\n', b"null\n", b"[" * 100_000 + b"\n", b"\xff\xfe\n", None]
+
+
+@pytest.mark.parametrize("broken", BROKEN, ids=["text", "number", "list", "null", "deep", "bytes", "no file"])
 def test_a_log_that_cannot_be_followed_is_said(tmp_path, broken):
     if broken is None:
         clock = Clock(tmp_path / "gone.jsonl", [])
@@ -122,22 +169,49 @@ def test_a_log_that_cannot_be_followed_is_said(tmp_path, broken):
 
 
 def test_without_the_library_it_is_said_what_to_install(monkeypatch, tmp_path, small_text, capsys):
-    monkeypatch.setitem(__import__("sys").modules, "pylsl", None)
+    monkeypatch.setitem(sys.modules, "pylsl", None)
     with pytest.raises(StudyError, match=r"pip install '\.\[lsl\]'"):
-        MarkerOutlet("P01_001")
+        MarkerOutlet(tmp_path / "events.jsonl")
+
+
+def test_the_source_is_a_digest_of_this_session_alone(tmp_path, monkeypatch):
+    made: list[tuple] = []
+    fake = SimpleNamespace(
+        IRREGULAR_RATE=0.0,
+        local_clock=time.monotonic,
+        StreamInfo=lambda *of: made.append(of),
+        StreamOutlet=lambda of: of,
+    )
+    monkeypatch.setitem(sys.modules, "pylsl", fake)
+    for name, seed in (("P01_001", 1), ("P02_001", 2), ("moved", 1)):
+        log = tmp_path / name / "events.jsonl"
+        log.parent.mkdir()
+        log.write_bytes(line("session_opened", subject="P01", seed=seed))
+        MarkerOutlet(log)
+        with log.open("ab") as file:
+            file.write(line("answer_given", answer=1))
+        MarkerOutlet(log)
+    first, again, other, _, moved, _ = (of[-1] for of in made)
+    assert first == again == moved != other
+    assert all(re.fullmatch(r"hapteq [0-9a-f]{16}", of[-1]) for of in made)
+    with pytest.raises(StudyError, match="cannot be followed"):
+        MarkerOutlet(tmp_path / "gone.jsonl")
 
 
 @pytest.mark.real_time
 def test_markers_arrive_at_another_end_with_their_times(tmp_path):
     """A real outlet and a real inlet, over the loopback."""
-    pylsl = pytest.importorskip("pylsl", reason="the extra lsl is not installed: no loopback of markers was tested")
+    try:
+        import pylsl
+    except (ImportError, RuntimeError) as problem:  # its wheel for some systems is without the library
+        pytest.skip(f"no loopback of markers was tested: {problem}")
     log = tmp_path / "events.jsonl"
-    log.write_bytes(b"")
-    outlet = MarkerOutlet(f"loopback {time.time_ns()}")
+    log.write_bytes(line("session_opened", loopback=time.time_ns()))
+    outlet = MarkerOutlet(log)
     following = threading.Thread(target=stream_session, args=(log, outlet, lambda marker: None))
     following.start()
     try:
-        found = pylsl.resolve_byprop("name", "hapteq markers", timeout=20)
+        found = pylsl.resolve_byprop("source_id", module.source_id(log), timeout=20)
         inlet = pylsl.StreamInlet(found[0])
         inlet.open_stream(timeout=20)
         written = []
