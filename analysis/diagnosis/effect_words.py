@@ -186,7 +186,7 @@ def unit_of(effect: str, parameter: str, system: UnitSystem) -> str:
     """Of a parameter; 1 where it is not known."""
     if effect in LAW_WORDS:
         linear, turning = LAW_WORDS[effect].units.get(parameter, ("1", "1"))
-        return turning if system.rotational else system.of(linear)
+        return turning if system.rotational else system.express(linear)
     known = EFFECTS_BY_NAME.get(effect)
     units = {} if known is None else {each.name: each.unit_in(system, "1") for each in known.parameters}
     return units.get(parameter, "1")

@@ -12,7 +12,7 @@ from equalizer.effects.starts.starting_values import beside_linear, moving
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
 from equalizer.laws.roles import roles
-from equalizer.laws.tree import Apply, Node, Variable, written
+from equalizer.laws.tree import Apply, Node, Variable, format_formula
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -57,7 +57,7 @@ def _turned(law: Law, letters: tuple[str, ...], site: int) -> Law:
     turn[own] = letters[site]
     names = {prefix + letter: prefix + to for letter, to in turn.items() for prefix in (*DERIVATIVES, COMMAND)}
     tree = _renamed(law.tree, names)
-    return replace(law, expression=written(tree, None, None), axis=letters[site])
+    return replace(law, expression=format_formula(tree, None, None), axis=letters[site])
 
 
 def _renamed(node: Node, names: Mapping[str, str]) -> Node:

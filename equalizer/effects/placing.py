@@ -9,7 +9,7 @@ from equalizer.effects.effect import Effect, PlacedEffect
 from equalizer.laws.law import Law
 from equalizer.laws.parse import LawError
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME, LAW_PLACES, Place
-from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, nearest
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, suggest_word
 
 SHORT = 2
 """Letters of a channel's name that say no more than quantity and axis."""
@@ -78,7 +78,8 @@ def _placed(effect: ModelEffect, channels: Channels) -> PlacedEffect:
     entry = EFFECTS.get(effect.kind)
     if entry is None:
         raise PlacingError(
-            f"no simulation plays '{effect.kind}'{nearest(effect.kind, tuple(EFFECTS))}; it plays {', '.join(EFFECTS)}"
+            f"no simulation plays '{effect.kind}'{suggest_word(effect.kind, tuple(EFFECTS))}; "
+            f"it plays {', '.join(EFFECTS)}"
         )
     for parameter in entry.parameters:
         value = effect.parameters.get(parameter.name, 0.0)

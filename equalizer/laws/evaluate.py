@@ -1,10 +1,10 @@
-"""A law along samples, compiled: what a simulation would compute at the same instants."""
+"""Evaluates a law along samples, with the compiled code that a simulation uses."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
-from equalizer.laws.kernel import FROM_ZERO, along, along_held
+from equalizer.laws.kernel import FROM_ZERO, run_along, run_along_held
 from equalizer.laws.law import Law
 from equalizer.laws.parse import LawError
 from equalizer.laws.program import Program, program_of
@@ -19,23 +19,23 @@ def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float)
 
     Raises LawError for a signal that is not there.
     """
-    program, signals = _bound(law, columns, sample_rate_hz)
+    program, signals = _bind_signals(law, columns, sample_rate_hz)
     value, memory = np.empty(len(signals)), np.zeros(program.memory)
-    along(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, value)
+    run_along(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, value)
     return value
 
 
 def evaluate_held(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> FloatArray:
     """(2, n): at the start and at the end of each step, over which the signals (n,) are held, as commands are. Before
     the first all was zero. Raises LawError."""
-    program, signals = _bound(law, columns, sample_rate_hz)
+    program, signals = _bind_signals(law, columns, sample_rate_hz)
     values, memory = np.empty((2, len(signals))), np.zeros(program.memory)
     memory[0] = FROM_ZERO
-    along_held(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
+    run_along_held(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
     return values
 
 
-def _bound(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> tuple[Program, FloatArray]:
+def _bind_signals(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> tuple[Program, FloatArray]:
     if not columns:
         raise LawError("a law is evaluated along signals, and there are none")
     lengths = {len(column) for column in columns.values()}

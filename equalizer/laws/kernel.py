@@ -1,4 +1,4 @@
-"""Runs the program of a law at one instant, or along samples, compiled.
+"""Stack machine that runs a law's program at one instant or along samples, compiled.
 
 A step has a start and an end. Between them signals that are remembered go on a straight line; at a start they may jump
 (a command does). What is remembered moves on when a step is kept.
@@ -12,8 +12,8 @@ from equalizer.signals.signal import FloatArray
 
 START, END = 0, 1
 SETTLED, BEGUN, FROM_ZERO = 0.0, 1.0, 2.0
-"""What the memory's first number says: nothing is remembered, and all is taken to have been as it is first; the run has
-begun; nothing is remembered, and all is taken to have been zero."""
+"""State of the memory, its first number: empty, and signals are taken to have always had their first value; begun;
+empty, and signals are taken to have been zero."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 _NUMBER, _VARIABLE = CODE["number"], CODE["variable"]
@@ -23,7 +23,7 @@ _NEGATE, _ABS, _SIGN, _SQRT = CODE["neg"], CODE["abs"], CODE["sign"], CODE["sqrt
 _SIN, _COS, _EXP, _LOG, _TANH, _ATAN = (CODE[name] for name in ("sin", "cos", "exp", "log", "tanh", "atan"))
 _LAG, _PLAY, _DELAY, _INTEGRAL = (CODE[name] for name in ("lag", "play", "delay", "integral"))
 _SAME = 1e-9
-"""Of a delay: instants that are no further apart are the same, but for rounding."""
+"""Relative to the delay: instants closer than this are equal but for rounding."""
 _RING = (KEPT["delay"] - 4) // 2
 
 
@@ -45,33 +45,34 @@ def _binary(code: int, left: float, right: float) -> float:
 
 
 @njit(inline="always")
-def _unary(code: int, of: float) -> float:  # noqa: C901 - a table, in the only form that compiles to a jump
+def _unary(code: int, operand: float) -> float:  # noqa: C901 - a table, in the only form that compiles to a jump
     if code == _NEGATE:
-        return -of
+        return -operand
     if code == _ABS:
-        return abs(of)
+        return abs(operand)
     if code == _SIGN:
-        return float(np.sign(of))
+        return float(np.sign(operand))
     if code == _TANH:
-        return float(np.tanh(of))
+        return float(np.tanh(operand))
     if code == _SIN:
-        return float(np.sin(of))
+        return float(np.sin(operand))
     if code == _COS:
-        return float(np.cos(of))
+        return float(np.cos(operand))
     if code == _EXP:
-        return float(np.exp(of))
+        return float(np.exp(operand))
     if code == _LOG:
-        return float(np.log(of))
+        return float(np.log(operand))
     if code == _SQRT:
-        return float(np.sqrt(of))
+        return float(np.sqrt(operand))
     if code == _ATAN:
-        return float(np.arctan(of))
-    return float(np.tan(of))
+        return float(np.arctan(operand))
+    return float(np.tan(operand))
 
 
 @njit(inline="always")
 def _lag(signal: float, tau_s: float, memory: FloatArray, at: int, phase: int, step_s: float) -> float:
-    """y' = (s - y) / tau, exact for straight lines. memory: y and s at the start, and at the end."""
+    """First-order lag, y' = (s - y) / tau, exact for signals s that are straight lines. memory: y and s at the start,
+    and at the end."""
     if not tau_s > 0:
         return signal
     if phase == START:
@@ -109,9 +110,12 @@ def _play(signal: float, half_width: float, memory: FloatArray, at: int, phase: 
     types.float64(types.float64, types.float64, _VECTOR, types.int64, types.int64, types.float64),
     cache=True, nogil=True,
 )  # fmt: skip
-def _late(signal: float, delay_s: float, memory: FloatArray, at: int, phase: int, time_s: float) -> float:
-    """memory: how many instants were written, the first that still counts, their times and values; then the last signal
-    and delay, which are not written yet. At a jump, a step starts after it and ends before it."""
+def _interpolate_delayed(
+    signal: float, delay_s: float, memory: FloatArray, at: int, phase: int, time_s: float
+) -> float:
+    """The signal at time_s - delay_s, interpolated in the ring buffer. memory: how many instants were written, the
+    first that still counts, their times and values; then the last signal and delay, which are not written yet. At a
+    jump, a step starts after it and ends before it."""
     times, values, wanted = at + 2, at + 2 + _RING, time_s - delay_s
     first, last = int(memory[at + 1]), int(memory[at]) - 1
     passed = wanted + (_SAME if phase == START else -_SAME) * delay_s
@@ -127,8 +131,8 @@ def _late(signal: float, delay_s: float, memory: FloatArray, at: int, phase: int
 
 
 @njit(types.void(types.float64, types.float64, _VECTOR, types.int64, types.float64), cache=True, nogil=True)
-def _write(signal: float, delay_s: float, memory: FloatArray, at: int, time_s: float) -> None:
-    """Over the newest instant, while that is too close to the one before it to be kept."""
+def _store_instant(signal: float, delay_s: float, memory: FloatArray, at: int, time_s: float) -> None:
+    """Append an instant to the ring buffer; replace the newest one while it is too close to its predecessor."""
     times, values, count = at + 2, at + 2 + _RING, int(memory[at])
     if count < 2 or time_s - memory[times + (count - 2) % _RING] >= delay_s / CELLS * (1 - _SAME):
         count += 1
@@ -140,19 +144,19 @@ def _write(signal: float, delay_s: float, memory: FloatArray, at: int, time_s: f
 
 
 @njit(inline="always")
-def _delayed(signal: float, delay_s: float, memory: FloatArray, at: int, phase: int, time_s: float) -> float:
+def _delay(signal: float, delay_s: float, memory: FloatArray, at: int, phase: int, time_s: float) -> float:
     if not delay_s > 0:
         return signal
     newest = at + 2 + _RING + (int(memory[at]) - 1) % _RING
     if phase == START and memory[newest] != signal:
-        _write(signal, delay_s, memory, at, time_s)
+        _store_instant(signal, delay_s, memory, at, time_s)
     memory[at + 2 + 2 * _RING], memory[at + 3 + 2 * _RING] = signal, delay_s
-    return float(_late(signal, delay_s, memory, at, phase, time_s))
+    return float(_interpolate_delayed(signal, delay_s, memory, at, phase, time_s))
 
 
 @njit(inline="always")
-def _begin(code: int, signal: float, memory: FloatArray, at: int, time_s: float) -> None:
-    """As if the signal had always been so."""
+def _initialise_memory(code: int, signal: float, memory: FloatArray, at: int, time_s: float) -> None:
+    """Fill an operator's memory as if its signal had always had this value."""
     if code == _DELAY:
         memory[at], memory[at + 1], memory[at + 2], memory[at + 2 + _RING] = 1.0, 0.0, time_s, signal
     elif code != _INTEGRAL:
@@ -160,17 +164,17 @@ def _begin(code: int, signal: float, memory: FloatArray, at: int, time_s: float)
 
 
 @njit(inline="always")
-def _remembered(  # noqa: PLR0913 - a kernel takes flat arrays
+def _run_with_memory(  # noqa: PLR0913 - a kernel takes flat arrays
     code: int, signal: float, number: float, memory: FloatArray, at: int, phase: int, time_s: float, step_s: float
 ) -> float:
     if memory[0] != BEGUN:
-        _begin(code, 0.0 if memory[0] == FROM_ZERO else signal, memory, at, time_s)
+        _initialise_memory(code, 0.0 if memory[0] == FROM_ZERO else signal, memory, at, time_s)
     if code == _LAG:
         return float(_lag(signal, number, memory, at, phase, step_s))
     if code == _PLAY:
         return float(_play(signal, number, memory, at, phase))
     if code == _DELAY:
-        return float(_delayed(signal, number, memory, at, phase, time_s))
+        return float(_delay(signal, number, memory, at, phase, time_s))
     return float(_integral(signal, memory, at, phase, step_s))
 
 
@@ -199,15 +203,15 @@ def run(  # noqa: PLR0913 - a kernel takes flat arrays
             stack[top] = _unary(code, stack[top])
         else:
             top -= code != _INTEGRAL
-            stack[top] = _remembered(
+            stack[top] = _run_with_memory(
                 code, stack[top], stack[top + 1], memory, int(program[row + 1]), phase, time_s, step_s
             )
     return float(stack[0])
 
 
 @njit(types.void(_VECTOR, _VECTOR, types.float64), cache=True, nogil=True)
-def keep(program: FloatArray, memory: FloatArray, time_s: float) -> None:
-    """The end of a step as it was run last becomes what is remembered. time_s: of that end."""
+def commit_step(program: FloatArray, memory: FloatArray, time_s: float) -> None:
+    """Store the end of the step that was run last as the start of the next one. time_s: of that end."""
     for row in range(0, program.shape[0], 2):
         code, at = int(program[row]), int(program[row + 1])
         if code in (_LAG, _INTEGRAL):
@@ -215,26 +219,28 @@ def keep(program: FloatArray, memory: FloatArray, time_s: float) -> None:
         elif code == _PLAY:
             memory[at] = memory[at + 1]
         elif code == _DELAY and memory[at + 3 + 2 * _RING] > 0:
-            _write(memory[at + 2 + 2 * _RING], memory[at + 3 + 2 * _RING], memory, at, time_s)
+            _store_instant(memory[at + 2 + 2 * _RING], memory[at + 3 + 2 * _RING], memory, at, time_s)
 
 
 @njit(types.void(_VECTOR, _MATRIX, _VECTOR, types.float64, _VECTOR), cache=True, nogil=True, error_model="numpy")
-def along(program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, out: FloatArray) -> None:
+def run_along(program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, out: FloatArray) -> None:
     """Fills out (n,). signals: (n, k), on straight lines from sample to sample."""
     stack = np.empty(DEEPEST)
     for k in range(signals.shape[0]):
         out[k] = run(program, signals[k], memory, stack, END if k > 0 else START, k * step_s, step_s)
         if k > 0:
-            keep(program, memory, k * step_s)
+            commit_step(program, memory, k * step_s)
         memory[0] = BEGUN
 
 
 @njit(types.void(_VECTOR, _MATRIX, _VECTOR, types.float64, _MATRIX), cache=True, nogil=True, error_model="numpy")
-def along_held(program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, out: FloatArray) -> None:
+def run_along_held(
+    program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, out: FloatArray
+) -> None:
     """Fills out (2, n): at the start and at the end of each step, over which the signals (n, k) are held."""
     stack = np.empty(DEEPEST)
     for k in range(signals.shape[0]):
         out[0, k] = run(program, signals[k], memory, stack, START, k * step_s, step_s)
         memory[0] = BEGUN
         out[1, k] = run(program, signals[k], memory, stack, END, (k + 1) * step_s, step_s)
-        keep(program, memory, (k + 1) * step_s)
+        commit_step(program, memory, (k + 1) * step_s)

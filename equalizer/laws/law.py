@@ -1,11 +1,11 @@
-"""A law without a name: a formula with free numbers, and what it acts on."""
+"""A law: a formula with free parameters, and what it acts on (force, command or response)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-from equalizer.laws.parse import LawError, parsed
-from equalizer.laws.tree import Free, Node, Variable, nodes, written
+from equalizer.laws.parse import LawError, parse_formula
+from equalizer.laws.tree import Free, Node, Variable, format_formula, nodes
 
 ActsOn = Literal["force", "command", "response"]
 KINDS: tuple[ActsOn, ...] = get_args(ActsOn)
@@ -40,17 +40,17 @@ class Law:
 
     @property
     def tree(self) -> Node:
-        return parsed(self.expression, template=True)[0]
+        return parse_formula(self.expression, template=True)[0]
 
     @property
     def text(self) -> str:
         """With its numbers written in, to five digits."""
-        return written(self.tree, self.numbers)
+        return format_formula(self.tree, self.numbers)
 
     @property
     def exact_text(self) -> str:
         """The same with all digits: `law_of` reads the same numbers back."""
-        return written(self.tree, self.numbers, None)
+        return format_formula(self.tree, self.numbers, None)
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -62,7 +62,7 @@ class Law:
 
 
 def law_of(text: str, acts_on: ActsOn, axis: str) -> Law:
-    """From a formula with its numbers. Those with a point or an exponent become free: '-4.1*abs(vy)**1.5*sign(vy)' is
+    """A law from a formula with numbers. Those with a point or an exponent become free: '-4.1*abs(vy)**1.5*sign(vy)' is
     '-p0*abs(vy)**p1*sign(vy)' with 4.1 and 1.5; in '-4.1*vy**2' the 2 stays. Raises LawError."""
-    tree, numbers = parsed(text)
-    return Law(written(tree), numbers, (), acts_on, axis)
+    tree, numbers = parse_formula(text)
+    return Law(format_formula(tree), numbers, (), acts_on, axis)

@@ -1,4 +1,4 @@
-"""Reads a formula: Python's syntax, of which this holds arithmetic, names, and the functions below. Nothing is run.
+"""Parses a formula: the arithmetic, names and functions below in Python's syntax. No code is executed.
 
 Numbers with a point or an exponent (`4.1`, `1e-3`) are free: a fit may move them. Whole numbers (`2`) and `pi` are part
 of the form. Instead of free numbers a template holds their names `p0`, `p1`, …
@@ -22,7 +22,7 @@ FUNCTIONS: Mapping[str, int] = {
 }  # fmt: skip
 """How many arguments each takes."""
 MEMORY = ("lag", "play", "delay", "integral")
-"""lag(s, tau_s), play(s, half_width), delay(s, s), integral(s): their value hangs on what was before."""
+"""Operators with memory: lag(s, tau_s), play(s, half_width), delay(s, delay_s), integral(s)."""
 LONGEST, LARGEST = 2000, 200
 """Characters; parts of a formula."""
 _OPERATORS: dict[type[ast.operator], str] = {
@@ -104,7 +104,7 @@ class _Reader:
 
 
 @lru_cache(maxsize=4096)
-def parsed(text: str, template: bool = False) -> tuple[Node, tuple[float, ...]]:
+def parse_formula(text: str, template: bool = False) -> tuple[Node, tuple[float, ...]]:
     """The tree and its free numbers. template: the text names its free numbers; others are form. Raises LawError."""
     text = text.strip()
     if not text:

@@ -1,4 +1,4 @@
-"""A formula as a flat program for a stack, as compiled code runs it; see `equalizer.laws.kernel`."""
+"""Compiles a formula to a flat program for the stack machine in `equalizer.laws.kernel`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -42,31 +42,31 @@ class Program:
 
 def program_of(tree: Node, signals: Mapping[str, int]) -> Program:
     """signals: column of each. Raises LawError for one that is not there, and for a formula that is too deep."""
-    program = _added(tree, Program(np.empty((0, 2)), (), 1), signals)
+    program = _append_formula(tree, Program(np.empty((0, 2)), (), 1), signals)
     _check_depth(program.codes[:, 0])
     return program
 
 
-def _added(tree: Node, to: Program, signals: Mapping[str, int]) -> Program:
+def _append_formula(tree: Node, to: Program, signals: Mapping[str, int]) -> Program:
     match tree:
         case Number(value):
-            return _with(to, "number", value)
+            return _append_row(to, "number", value)
         case Free(place):
-            return replace(_with(to, "number", np.nan), free=(*to.free, (len(to.codes), place)))
+            return replace(_append_row(to, "number", np.nan), free=(*to.free, (len(to.codes), place)))
         case Variable("pi"):
-            return _with(to, "number", np.pi)
+            return _append_row(to, "number", np.pi)
         case Variable(name):
             if name not in signals:
                 raise LawError(f"the law needs the signal '{name}'; there are {', '.join(signals) or 'none'}")
-            return _with(to, "variable", signals[name])
+            return _append_row(to, "variable", signals[name])
         case Apply(name, parts):
             for part in parts:
-                to = _added(part, to, signals)
+                to = _append_formula(part, to, signals)
             kept = KEPT.get(name, 0)
-            return replace(_with(to, name, to.memory if kept else 0), memory=to.memory + kept)
+            return replace(_append_row(to, name, to.memory if kept else 0), memory=to.memory + kept)
 
 
-def _with(program: Program, name: str, operand: float) -> Program:
+def _append_row(program: Program, name: str, operand: float) -> Program:
     return replace(program, codes=np.vstack([program.codes, [CODE[name], operand]]))
 
 

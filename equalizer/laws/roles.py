@@ -1,4 +1,4 @@
-"""What each free number of a law is for, which says how a fit may move it."""
+"""Role of each free number in a law's formula, which decides its range and scale in a fit."""
 
 from typing import Literal
 
@@ -17,23 +17,27 @@ _SECOND: dict[str, Role] = {
 
 
 def roles(tree: Node) -> dict[int, Role]:
-    """By the number's place. Of one that stands in several parts, as it stands first."""
+    """Role of each free number, by its place; where a number occurs several times, by its first occurrence."""
     found: dict[int, Role] = {}
-    _find(tree, "factor", found)
+    _collect_roles(tree, "factor", found)
     return found
 
 
-def _find(node: Node, role: Role, found: dict[int, Role]) -> None:
+def _collect_roles(node: Node, role: Role, found: dict[int, Role]) -> None:
     if isinstance(node, Free):
         found.setdefault(node.place, role)
         return
     if not isinstance(node, Apply):
         return
     for place, part in enumerate(node.parts):
-        _find(part, _SECOND.get(node.name, _first(node.name, role)) if place else _first(node.name, role), found)
+        _collect_roles(
+            part,
+            _SECOND.get(node.name, _first_part_role(node.name, role)) if place else _first_part_role(node.name, role),
+            found,
+        )
 
 
-def _first(name: str, role: Role) -> Role:
+def _first_part_role(name: str, role: Role) -> Role:
     """Of an operator's first part, or of each."""
     if name in ("+", "-", "neg"):
         return role

@@ -1,11 +1,11 @@
-"""A formula as a tree, and the tree as text again."""
+"""Expression tree of a formula, and its formatting as text."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 _SUM, _PRODUCT, _SIGN, _POWER, _ATOM = 1, 2, 3, 4, 5
 DIGITS = 5
-"""Significant ones that a reader is shown."""
+"""Significant digits of the numbers that a reader is shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,39 +44,41 @@ def nodes(tree: Node) -> Iterator[Node]:
         yield from nodes(part)
 
 
-def written(tree: Node, numbers: Sequence[float] | None = None, digits: int | None = DIGITS) -> str:
+def format_formula(tree: Node, numbers: Sequence[float] | None = None, digits: int | None = DIGITS) -> str:
     """Python syntax. numbers: in place of `p0`, `p1`, …; without them these names are written. digits: of the numbers;
     None = all that are needed to read the same numbers back."""
-    return _text(tree, numbers, digits)[0]
+    return _format_node(tree, numbers, digits)[0]
 
 
-def _text(tree: Node, numbers: Sequence[float] | None, digits: int | None) -> tuple[str, int]:
-    """The text, and how strongly it holds together."""
+def _format_node(tree: Node, numbers: Sequence[float] | None, digits: int | None) -> tuple[str, int]:
+    """The text, and its operator precedence, which decides where parentheses are needed."""
     match tree:
         case Number(value):
-            return _signed(repr(float(value)).removesuffix(".0"))
+            return _format_signed(repr(float(value)).removesuffix(".0"))
         case Free(place):
-            return (f"p{place}", _ATOM) if numbers is None else _signed(_free(numbers[place], digits))
+            return (
+                (f"p{place}", _ATOM) if numbers is None else _format_signed(_format_free_number(numbers[place], digits))
+            )
         case Variable(name):
             return name, _ATOM
         case Apply("neg", (inner,)):
-            return _negative(*_text(inner, numbers, digits))
+            return _format_negated(*_format_node(inner, numbers, digits))
         case Apply(name, (left, right)) if name in _OPERATORS:
-            return _joined(name, _text(left, numbers, digits), _text(right, numbers, digits))
-    inside = ", ".join(_text(part, numbers, digits)[0] for part in tree.parts)
+            return _format_operation(name, _format_node(left, numbers, digits), _format_node(right, numbers, digits))
+    inside = ", ".join(_format_node(part, numbers, digits)[0] for part in tree.parts)
     return f"{tree.name}({inside})", _ATOM
 
 
-def _free(value: float, digits: int | None) -> str:
+def _format_free_number(value: float, digits: int | None) -> str:
     """With a point or an exponent, which say that it is free; see `equalizer.laws.law.law_of`."""
     return repr(float(value) if digits is None else float(f"{value:.{digits}g}"))
 
 
-def _signed(text: str) -> tuple[str, int]:
+def _format_signed(text: str) -> tuple[str, int]:
     return text, _SIGN if text.startswith("-") else _ATOM
 
 
-def _negative(text: str, strength: int) -> tuple[str, int]:
+def _format_negated(text: str, strength: int) -> tuple[str, int]:
     if strength < _PRODUCT:
         return f"-({text})", _SIGN
     return (text[1:], min(strength, _SIGN)) if text.startswith("-") else (f"-{text}", min(strength, _SIGN))
@@ -85,11 +87,11 @@ def _negative(text: str, strength: int) -> tuple[str, int]:
 _OPERATORS = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT, "**": _POWER}
 
 
-def _joined(name: str, left: tuple[str, int], right: tuple[str, int]) -> tuple[str, int]:
+def _format_operation(name: str, left: tuple[str, int], right: tuple[str, int]) -> tuple[str, int]:
     own = _OPERATORS[name]
     if name == "**":
-        return f"{_inside(left, _ATOM)}**{_inside(right, _SIGN)}", own
-    first, second = _inside(left, own), _inside(right, own + 1)
+        return f"{_parenthesise(left, _ATOM)}**{_parenthesise(right, _SIGN)}", own
+    first, second = _parenthesise(left, own), _parenthesise(right, own + 1)
     if own == _PRODUCT:
         return f"{first}{name}{f'({second})' if second.startswith('-') else second}", own
     if second.startswith("-"):
@@ -97,6 +99,6 @@ def _joined(name: str, left: tuple[str, int], right: tuple[str, int]) -> tuple[s
     return f"{first} {name} {second}", own
 
 
-def _inside(part: tuple[str, int], least: int) -> str:
+def _parenthesise(part: tuple[str, int], least: int) -> str:
     text, strength = part
     return text if strength >= least else f"({text})"

@@ -1,4 +1,4 @@
-"""Units of a law's free numbers, from what its signals are measured in."""
+"""Dimensional analysis: units of a law's free numbers from the units of its signals."""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,7 +13,7 @@ SECOND: Dimension = (0.0, 0.0, 1.0)
 
 
 def motion_dimension(order: int) -> Dimension:
-    """Of a position's derivative."""
+    """Dimension of the position's derivative of this order."""
     return 0.0, 1.0, -float(order)
 
 
@@ -29,31 +29,42 @@ def units_of(
     for _ in range(2):  # what is found on the right may tell of the left
         reader.assign(tree, wanted)
     symbols = (system.force, system.length, system.time)
-    return tuple(_text(reader.found[place], symbols) if place in reader.found else "?" for place in range(len(numbers)))
+    return tuple(
+        _format_dimension(reader.found[place], symbols) if place in reader.found else "?"
+        for place in range(len(numbers))
+    )
 
 
-def _text(dimension: Dimension, symbols: tuple[str, str, str]) -> str:
-    above = [_power(name, power) for name, power in zip(symbols, dimension, strict=True) if power > 0 and name != "1"]
-    below = [_power(name, -power) for name, power in zip(symbols, dimension, strict=True) if power < 0 and name != "1"]
+def _format_dimension(dimension: Dimension, symbols: tuple[str, str, str]) -> str:
+    above = [
+        _format_power(name, power) for name, power in zip(symbols, dimension, strict=True) if power > 0 and name != "1"
+    ]
+    below = [
+        _format_power(name, -power) for name, power in zip(symbols, dimension, strict=True) if power < 0 and name != "1"
+    ]
     over = " ".join(above) or "1"
     under = " ".join(below)
     return f"{over}/{f'({under})' if len(below) > 1 else under}" if below else over
 
 
-def _power(name: str, power: float) -> str:
+def _format_power(name: str, power: float) -> str:
     if power == 1:
         return name
     return f"{f'({name})' if ' ' in name else name}^{power:.3g}"
 
 
-def _sum(one: Dimension | None, other: Dimension | None, sign: float = 1.0) -> Dimension | None:
-    if one is None or other is None:
+def _add_dimensions(first: Dimension | None, second: Dimension | None, sign: float = 1.0) -> Dimension | None:
+    if first is None or second is None:
         return None
-    return one[0] + sign * other[0], one[1] + sign * other[1], one[2] + sign * other[2]
+    return first[0] + sign * second[0], first[1] + sign * second[1], first[2] + sign * second[2]
 
 
-def _times(of: Dimension | None, factor: float | None) -> Dimension | None:
-    return None if of is None or factor is None else (of[0] * factor, of[1] * factor, of[2] * factor)
+def _scale_dimension(dimension: Dimension | None, factor: float | None) -> Dimension | None:
+    return (
+        None
+        if dimension is None or factor is None
+        else (dimension[0] * factor, dimension[1] * factor, dimension[2] * factor)
+    )
 
 
 class _Reader:
@@ -62,7 +73,7 @@ class _Reader:
         self.signals = signals
         self.found: dict[int, Dimension] = {}
 
-    def of(self, node: Node) -> Dimension | None:
+    def dimension_of(self, node: Node) -> Dimension | None:
         match node:
             case Number() | Variable("pi"):
                 return NONE
@@ -71,17 +82,17 @@ class _Reader:
             case Variable(name):
                 return self.signals.get(name)
             case Apply("+" | "-" | "minimum" | "maximum" | "neg" | "abs", parts):
-                return next((known for part in parts if (known := self.of(part)) is not None), None)
+                return next((known for part in parts if (known := self.dimension_of(part)) is not None), None)
             case Apply("lag" | "play" | "delay", (signal, _)):
-                return self.of(signal)
+                return self.dimension_of(signal)
             case Apply("*" | "/" as name, (left, right)):
-                return _sum(self.of(left), self.of(right), 1.0 if name == "*" else -1.0)
+                return _add_dimensions(self.dimension_of(left), self.dimension_of(right), 1.0 if name == "*" else -1.0)
             case Apply("**", (base, exponent)):
-                return _times(self.of(base), self._value(exponent))
+                return _scale_dimension(self.dimension_of(base), self._value(exponent))
             case Apply("sqrt", (inner,)):
-                return _times(self.of(inner), 0.5)
+                return _scale_dimension(self.dimension_of(inner), 0.5)
             case Apply("integral", (inner,)):
-                return _sum(self.of(inner), SECOND)
+                return _add_dimensions(self.dimension_of(inner), SECOND)
         return NONE
 
     def _value(self, node: Node) -> float | None:
@@ -102,15 +113,15 @@ class _Reader:
                     self.found.setdefault(place, wanted)
             case Apply("+" | "-" | "minimum" | "maximum" | "neg" | "abs", parts):
                 for part in parts:
-                    self.assign(part, self.of(node) if wanted is None else wanted)
+                    self.assign(part, self.dimension_of(node) if wanted is None else wanted)
             case Apply("*" | "/" as name, (left, right)):
                 sign = 1.0 if name == "*" else -1.0
-                self.assign(left, _sum(wanted, self.of(right), -sign))
-                self.assign(right, _times(_sum(wanted, self.of(left), -1.0), sign))
+                self.assign(left, _add_dimensions(wanted, self.dimension_of(right), -sign))
+                self.assign(right, _scale_dimension(_add_dimensions(wanted, self.dimension_of(left), -1.0), sign))
             case Apply("**", (base, exponent)):
                 power = self._value(exponent)
                 self.assign(exponent, NONE)
-                self.assign(base, _times(wanted, 1 / power if power else None))
+                self.assign(base, _scale_dimension(wanted, 1 / power if power else None))
             case Apply(name, parts):
                 self._assign_arguments(name, parts, wanted)
 
@@ -119,11 +130,11 @@ class _Reader:
         match name:
             case "lag" | "delay" | "play":
                 self.assign(first, wanted)
-                self.assign(parts[1], self.of(first) if name == "play" else SECOND)
+                self.assign(parts[1], self.dimension_of(first) if name == "play" else SECOND)
             case "integral":
-                self.assign(first, _sum(wanted, SECOND, -1.0))
+                self.assign(first, _add_dimensions(wanted, SECOND, -1.0))
             case "sqrt":
-                self.assign(first, _times(wanted, 2.0))
+                self.assign(first, _scale_dimension(wanted, 2.0))
             case "sign":
                 self.assign(first, None)
             case _:

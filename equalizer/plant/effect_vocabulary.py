@@ -29,7 +29,7 @@ class EffectParameter:
 
     def unit_in(self, system: UnitSystem, response_unit: str) -> str:
         """The unit in a model of these units whose response is in `response_unit`."""
-        unit = {False: self.unit, True: self.rotational_unit, None: system.of(self.unit)}[system.rotational]
+        unit = {False: self.unit, True: self.rotational_unit, None: system.express(self.unit)}[system.rotational]
         if system.rotational is None and self.unit == ROTATIONAL.force:
             unit = system.force
         if unit == f"1/{RESPONSE}^2":
@@ -49,7 +49,7 @@ class EffectName:
         return self.parameters[0]
 
 
-def _number(name: str, unit: str, rotational: str = "") -> EffectParameter:
+def _required(name: str, unit: str, rotational: str = "") -> EffectParameter:
     return EffectParameter(name, unit, rotational or unit)
 
 
@@ -58,19 +58,19 @@ def _optional(name: str, unit: str, rotational: str = "") -> EffectParameter:
 
 
 def _level(name: str) -> EffectParameter:
-    return _number(name, "N", "N m")
+    return _required(name, "N", "N m")
 
 
 def _stiffness(name: str) -> EffectParameter:
-    return _number(name, "N/m", "N m/rad")
+    return _required(name, "N/m", "N m/rad")
 
 
 def _damping(name: str) -> EffectParameter:
-    return _number(name, "N s/m", "N m s/rad")
+    return _required(name, "N s/m", "N m s/rad")
 
 
 def _mass(name: str) -> EffectParameter:
-    return _number(name, "kg", "kg m^2")
+    return _required(name, "kg", "kg m^2")
 
 
 MATRIX_UNITS = {"mass": _mass("mass"), "damping": _damping("damping"), "stiffness": _stiffness("stiffness")}
@@ -86,45 +86,49 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
     EffectName("coulomb_friction", "mechanism", (_level("level"),)),
     EffectName("asymmetric_friction", "mechanism", (_level("level_positive"), _level("level_negative"))),
     EffectName(
-        "stribeck_friction", "mechanism", (_level("coulomb"), _level("static"), _number("speed", "m/s", "rad/s"))
+        "stribeck_friction", "mechanism", (_level("coulomb"), _level("static"), _required("speed", "m/s", "rad/s"))
     ),
     EffectName(
         "position_dependent_friction",
         "mechanism",
-        (_level("level"), _number("slope_per_m", "1/m", "1/rad"), _number("bend_per_m2", "1/m^2", "1/rad^2")),
+        (_level("level"), _required("slope_per_m", "1/m", "1/rad"), _required("bend_per_m2", "1/m^2", "1/rad^2")),
     ),
     EffectName("presliding_hysteresis", "mechanism", (_level("level"), _stiffness("stiffness"))),
     EffectName("viscous_damping", "mechanism", (_damping("damping"),)),
-    EffectName("quadratic_damping", "mechanism", (_number("coefficient", "N s^2/m^2", "N m s^2/rad^2"),)),
-    EffectName("hardening_stiffness", "mechanism", (_number("k3", "N/m^3", "N m/rad^3"),)),
-    EffectName("asymmetric_stiffness", "mechanism", (_number("k2", "N/m^2", "N m/rad^2"),)),
+    EffectName("quadratic_damping", "mechanism", (_required("coefficient", "N s^2/m^2", "N m s^2/rad^2"),)),
+    EffectName("hardening_stiffness", "mechanism", (_required("k3", "N/m^3", "N m/rad^3"),)),
+    EffectName("asymmetric_stiffness", "mechanism", (_required("k2", "N/m^2", "N m/rad^2"),)),
     EffectName("constant_force", "mechanism", (_level("force"),)),
-    EffectName("gravity_torque", "mechanism", (_number("torque", "N m"), _number("angle", "rad"))),
-    EffectName("cogging", "mechanism", (_level("amplitude"), _number("pitch", "m", "rad"), _optional("phase", "rad"))),
+    EffectName("gravity_torque", "mechanism", (_required("torque", "N m"), _required("angle", "rad"))),
+    EffectName(
+        "cogging", "mechanism", (_level("amplitude"), _required("pitch", "m", "rad"), _optional("phase", "rad"))
+    ),
     EffectName(
         "backlash",
         "mechanism",
         (
-            _number("gap", "m", "rad"),
+            _required("gap", "m", "rad"),
             _optional("motor_mass", "kg", "kg m^2"),
             _optional("contact_stiffness", "N/m", "N m/rad"),
             _optional("contact_damping", "N s/m", "N m s/rad"),
         ),
     ),
-    EffectName("loose_joint", "mechanism", (_number("gap", "m", "rad"), _stiffness("stiffness"), _level("slip"))),
+    EffectName("loose_joint", "mechanism", (_required("gap", "m", "rad"), _stiffness("stiffness"), _level("slip"))),
     EffectName(
-        "end_stop", "mechanism", (_number("position", "m", "rad"), _stiffness("stiffness"), _optional("opposite", "1"))
+        "end_stop",
+        "mechanism",
+        (_required("position", "m", "rad"), _stiffness("stiffness"), _optional("opposite", "1")),
     ),
     EffectName(
-        "pose_dependent_inertia", "mechanism", (_number("per_m", "1/m", "1/rad"), _optional("speed_share", "1"))
+        "pose_dependent_inertia", "mechanism", (_required("per_m", "1/m", "1/rad"), _optional("speed_share", "1"))
     ),
     EffectName(
         "extra_mode",
         "mechanism",
         (
-            _number("frequency", "Hz"),
+            _required("frequency", "Hz"),
             _mass("mass"),
-            _number("damping_ratio", "1"),
+            _required("damping_ratio", "1"),
             _optional("tilt_next", "1"),
             _optional("tilt_after_next", "1"),
         ),
@@ -134,39 +138,48 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
     EffectName(
         "time_varying_grip",
         "hand",
-        (_number("rate_hz", "Hz"), _number("depth", "1"), _optional("phase", "rad"), _optional("stiffness_share", "1")),
+        (
+            _required("rate_hz", "Hz"),
+            _required("depth", "1"),
+            _optional("phase", "rad"),
+            _optional("stiffness_share", "1"),
+        ),
     ),
     EffectName("body_on_actuator", "actuator", (_mass("mass"), _damping("damping"), _stiffness("stiffness"))),
     EffectName("force_saturation", "actuator", (_level("limit"),)),
     EffectName("force_deadband", "actuator", (_level("width"), _optional("jump", "1"))),
-    EffectName("slew_limit", "actuator", (_number("rate", "N/s", "N m/s"),)),
-    EffectName("amplifier_lag", "actuator", (_number("time_constant", "s"),)),
-    EffectName("transport_delay", "actuator", (_number("delay", "s"),)),
-    EffectName("force_gain", "actuator", (_number("gain", "1"),)),
-    EffectName("force_nonlinearity", "actuator", (_number("square", "1"), _level("reference"))),
-    EffectName("sensor_lag", "sensor", (_number("bandwidth", "Hz"),)),
-    EffectName("sensor_clipping", "sensor", (_number("limit", RESPONSE),)),
+    EffectName("slew_limit", "actuator", (_required("rate", "N/s", "N m/s"),)),
+    EffectName("amplifier_lag", "actuator", (_required("time_constant", "s"),)),
+    EffectName("transport_delay", "actuator", (_required("delay", "s"),)),
+    EffectName("force_gain", "actuator", (_required("gain", "1"),)),
+    EffectName("force_nonlinearity", "actuator", (_required("square", "1"), _level("reference"))),
+    EffectName("sensor_lag", "sensor", (_required("bandwidth", "Hz"),)),
+    EffectName("sensor_clipping", "sensor", (_required("limit", RESPONSE),)),
     EffectName(
         "sensor_misalignment",
         "sensor",
-        (_number("degrees", "deg"), *(_optional(f"about_{axis}", "deg") for axis in "xyz")),
+        (_required("degrees", "deg"), *(_optional(f"about_{axis}", "deg") for axis in "xyz")),
     ),
-    EffectName("cross_axis_sensitivity", "sensor", (_number("from_next", "1"), _number("from_after_next", "1"))),
-    EffectName("sensor_gain", "sensor", (_number("gain", "1"),)),
-    EffectName("sensor_nonlinearity", "sensor", (_number("cubic", f"1/{RESPONSE}^2"),)),
-    EffectName("sensor_offset", "sensor", (_number("offset", RESPONSE),)),
-    EffectName("sensor_drift", "sensor", (_number("total", RESPONSE), _optional("bend", "1"), _optional("start", "1"))),
-    EffectName("quantization", "sensor", (_number("step", RESPONSE),)),
+    EffectName("cross_axis_sensitivity", "sensor", (_required("from_next", "1"), _required("from_after_next", "1"))),
+    EffectName("sensor_gain", "sensor", (_required("gain", "1"),)),
+    EffectName("sensor_nonlinearity", "sensor", (_required("cubic", f"1/{RESPONSE}^2"),)),
+    EffectName("sensor_offset", "sensor", (_required("offset", RESPONSE),)),
     EffectName(
-        "mains_hum", "sensor", (_number("amplitude", RESPONSE), _number("frequency", "Hz"), _optional("phase", "rad"))
+        "sensor_drift", "sensor", (_required("total", RESPONSE), _optional("bend", "1"), _optional("start", "1"))
+    ),
+    EffectName("quantization", "sensor", (_required("step", RESPONSE),)),
+    EffectName(
+        "mains_hum",
+        "sensor",
+        (_required("amplitude", RESPONSE), _required("frequency", "Hz"), _optional("phase", "rad")),
     ),
     EffectName(
         "clock_drift",
         "sensor",
-        (_number("ppm", "ppm"), _optional("interpolated", "1"), _optional("with_position", "1")),
+        (_required("ppm", "ppm"), _optional("interpolated", "1"), _optional("with_position", "1")),
     ),
-    EffectName("logger_offset", "sensor", (_number("offset", "s"), _optional("interpolated", "1"))),
-    EffectName("lost_samples", "sensor", (_number("fraction", "1"),)),
+    EffectName("logger_offset", "sensor", (_required("offset", "s"), _optional("interpolated", "1"))),
+    EffectName("lost_samples", "sensor", (_required("fraction", "1"),)),
 )
 
 DISCOVERED_LAW = "discovered_law"

@@ -1,4 +1,4 @@
-"""A mechanical model's linear part, exactly discretised for forces that are held over each step."""
+"""Exact zero-order-hold discretisation of a mechanical model's linear part, by the matrix exponential."""
 
 from dataclasses import dataclass
 
@@ -57,8 +57,8 @@ def linear_steps(model: MechanicalModel, step_s: float, ports: FloatArray | None
     continuous[n:size, size:] = inputs
     exact = expm(continuous * step_s)
     rate = DERIVATIVE_OF_QUANTITY[model.quantity]
-    looked, directly = _rows(model.output, rate, from_state, inputs)
-    motion = [_rows(axes.T, order, from_state, inputs) for order in range(3)]
+    looked, directly = _output_rows(model.output, rate, from_state, inputs)
+    motion = [_output_rows(axes.T, order, from_state, inputs) for order in range(3)]
     return LinearSteps(
         step_s=step_s,
         advance=exact[:size, :size],
@@ -70,11 +70,13 @@ def linear_steps(model: MechanicalModel, step_s: float, ports: FloatArray | None
         response=looked,
         response_by_command=directly[:, :m],
         response_by_axis_force=directly[:, m:],
-        position=_rows(model.output, 0, from_state, inputs)[0],
+        position=_output_rows(model.output, 0, from_state, inputs)[0],
     )
 
 
-def _rows(output: FloatArray, order: int, from_state: FloatArray, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _output_rows(
+    output: FloatArray, order: int, from_state: FloatArray, inputs: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """An output's `order`-th derivative: its rows for the state, (p, 2n), and for the inputs, (p, 2m)."""
     nothing, directly = np.zeros_like(output), np.zeros((len(output), inputs.shape[1]))
     if order == 0:

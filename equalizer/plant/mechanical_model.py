@@ -152,7 +152,7 @@ def with_units_of(
     return replace(model, units=found)
 
 
-def nearest(word: str, allowed: tuple[str, ...]) -> str:
+def suggest_word(word: str, allowed: tuple[str, ...]) -> str:
     """A suggestion to append to an error, or nothing."""
     close = get_close_matches(word[:60], allowed, n=1)  # longer ones would take minutes
     return f" (did you mean '{close[0]}'?)" if close else ""
@@ -209,12 +209,12 @@ def effect_problems(effect: ModelEffect) -> Iterator[str]:
     known = EFFECTS_BY_NAME.get(effect.kind)
     if known is None:
         names = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
-        yield f"unknown kind '{effect.kind}'{nearest(effect.kind, names)}; allowed are {', '.join(names)}"
+        yield f"unknown kind '{effect.kind}'{suggest_word(effect.kind, names)}; allowed are {', '.join(names)}"
         return
     names = tuple(parameter.name for parameter in known.parameters)
     for name, value in effect.parameters.items():
         if name not in names:
-            yield f"{effect.kind} has no parameter '{name}'{nearest(name, names)}; allowed are {', '.join(names)}"
+            yield f"{effect.kind} has no parameter '{name}'{suggest_word(name, names)}; allowed are {', '.join(names)}"
         elif not np.isfinite(value):
             yield f"{effect.kind}.{name} is {value}; it must be a finite number"
     missing = [

@@ -18,7 +18,7 @@ from equalizer.plant.mechanical_model import (
     ModelEffect,
     SensorLimits,
     Tolerance,
-    nearest,
+    suggest_word,
 )
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
@@ -39,21 +39,21 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise MechanicalModelError((f"this is not TOML: {error}",)) from error
-    problems: list[str] = _unknown_keys(document, _TABLES, "")
-    model = _table(document, "model", problems)
-    problems += _unknown_keys(model, _MODEL_KEYS, "model.")
-    matrices = {name: _matrix(model, name, problems) for name in MATRICES}
-    words = {name: _word(model, name, problems) for name in ("name", "quantity")}
-    sensor = _numbers(document, "sensor", SensorLimits, problems)
-    actuator = _numbers(document, "actuator", ActuatorLimits, problems)
-    tolerance = _numbers(document, "tolerance", Tolerance, problems) if "tolerance" in document else None
-    effects = _effects(document.get("effect", []), problems)
+    problems: list[str] = _find_unknown_keys(document, _TABLES, "")
+    model = _read_table(document, "model", problems)
+    problems += _find_unknown_keys(model, _MODEL_KEYS, "model.")
+    matrices = {name: _read_matrix(model, name, problems) for name in MATRICES}
+    words = {name: _read_word(model, name, problems) for name in ("name", "quantity")}
+    sensor = _read_numbers(document, "sensor", SensorLimits, problems)
+    actuator = _read_numbers(document, "actuator", ActuatorLimits, problems)
+    tolerance = _read_numbers(document, "tolerance", Tolerance, problems) if "tolerance" in document else None
+    effects = _read_effects(document.get("effect", []), problems)
     rotational = model.get("rotational", document.get("rotational", False))
     if not isinstance(rotational, bool):
-        problems.append(f"rotational is {_said(rotational)}; it must be true or false")
+        problems.append(f"rotational is {_quote_value(rotational)}; it must be true or false")
     if problems:
         raise MechanicalModelError(tuple(problems))
-    origin = _table(document, "provenance", problems)
+    origin = _read_table(document, "provenance", problems)
     return MechanicalModel(
         name=words["name"],
         quantity=words["quantity"],
@@ -68,33 +68,33 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
         tolerance=tolerance,
         rotational=rotational,
         provenance=origin,
-        units=_units(origin),
+        units=_read_units(origin),
     )
 
 
 def mechanical_model_toml(model: MechanicalModel) -> str:
     """Text that `parse_mechanical_model` reads back to the same numbers."""
-    lines = ["[model]", f"name = {_value(model.name)}", f"quantity = {_value(model.quantity)}"]
+    lines = ["[model]", f"name = {_format_value(model.name)}", f"quantity = {_format_value(model.quantity)}"]
     if model.rotational:
         lines.append("rotational = true")
     for name in MATRICES:
-        rows = [f"  {_value(row)}," for row in getattr(model, name).tolist()]
+        rows = [f"  {_format_value(row)}," for row in getattr(model, name).tolist()]
         lines += [f"{name} = [", *rows, "]"]
-    lines += _section("[sensor]", asdict(model.sensor))
-    lines += _section("[actuator]", asdict(model.actuator))
+    lines += _format_section("[sensor]", asdict(model.sensor))
+    lines += _format_section("[actuator]", asdict(model.actuator))
     for effect in model.effects:
-        lines += _section(
-            "[[effect]]", {"kind": effect.kind, "axis": effect.axis, **_of_law(effect), **effect.parameters}
+        lines += _format_section(
+            "[[effect]]", {"kind": effect.kind, "axis": effect.axis, **_law_entries(effect), **effect.parameters}
         )
     if model.tolerance is not None:
-        lines += _section("[tolerance]", asdict(model.tolerance))
+        lines += _format_section("[tolerance]", asdict(model.tolerance))
     origin = {**model.provenance, **({} if model.units is None else {UNITS: asdict(model.units)})}
     if origin:
-        lines += _section("[provenance]", origin)
+        lines += _format_section("[provenance]", origin)
     return "\n".join(lines) + "\n"
 
 
-def _units(origin: Mapping[str, Any]) -> UnitSystem | None:
+def _read_units(origin: Mapping[str, Any]) -> UnitSystem | None:
     """Of numbers that are not in SI, as a program of ours writes them down."""
     said = origin.get(UNITS)
     words = {key: value for key, value in said.items() if isinstance(value, str)} if isinstance(said, dict) else {}
@@ -105,15 +105,15 @@ def _units(origin: Mapping[str, Any]) -> UnitSystem | None:
     )
 
 
-def _unknown_keys(table: Mapping[str, Any], allowed: tuple[str, ...], prefix: str) -> list[str]:
+def _find_unknown_keys(table: Mapping[str, Any], allowed: tuple[str, ...], prefix: str) -> list[str]:
     return [
-        f"unknown key '{prefix}{key}'{nearest(key, allowed)}; allowed are {', '.join(allowed)}"
+        f"unknown key '{prefix}{key}'{suggest_word(key, allowed)}; allowed are {', '.join(allowed)}"
         for key in table
         if key not in allowed
     ]
 
 
-def _table(document: Mapping[str, Any], name: str, problems: list[str]) -> dict[str, Any]:
+def _read_table(document: Mapping[str, Any], name: str, problems: list[str]) -> dict[str, Any]:
     table = document.get(name, {})
     if not isinstance(table, dict):
         problems.append(f"{name} must be a table: [{name}]")
@@ -123,14 +123,16 @@ def _table(document: Mapping[str, Any], name: str, problems: list[str]) -> dict[
     return table
 
 
-def _word(table: Mapping[str, Any], name: str, problems: list[str]) -> Any:
+def _read_word(table: Mapping[str, Any], name: str, problems: list[str]) -> Any:
     word = table.get(name)
     if not isinstance(word, str) or not word:
-        problems.append(f"model.{name} {'is missing' if word is None else f'is {_said(word)}'}; it must be a text")
+        problems.append(
+            f"model.{name} {'is missing' if word is None else f'is {_quote_value(word)}'}; it must be a text"
+        )
     return word
 
 
-def _matrix(table: Mapping[str, Any], name: str, problems: list[str]) -> FloatArray:
+def _read_matrix(table: Mapping[str, Any], name: str, problems: list[str]) -> FloatArray:
     rows = table.get(name)
     if rows is None:
         problems.append(f"model.{name} is missing")
@@ -139,33 +141,33 @@ def _matrix(table: Mapping[str, Any], name: str, problems: list[str]) -> FloatAr
     elif len({len(row) for row in rows}) != 1:
         problems.append(f"model.{name} has rows of different lengths: {', '.join(str(len(row)) for row in rows)}")
     elif wrong := [value for row in rows for value in row if not _is_number(value)]:
-        problems.append(f"model.{name} holds {_said(wrong[0])}, which is not a number")
+        problems.append(f"model.{name} holds {_quote_value(wrong[0])}, which is not a number")
     else:
         return np.array(rows, dtype=np.float64)
     return np.empty((0, 0))
 
 
-def _numbers(document: Mapping[str, Any], name: str, kind: type[Numbers], problems: list[str]) -> Numbers:
-    table = _table(document, name, problems)
+def _read_numbers(document: Mapping[str, Any], name: str, kind: type[Numbers], problems: list[str]) -> Numbers:
+    table = _read_table(document, name, problems)
     allowed = tuple(part.name for part in fields(kind))
-    problems += _unknown_keys(table, allowed, f"{name}.")
+    problems += _find_unknown_keys(table, allowed, f"{name}.")
     known = {key: value for key, value in table.items() if key in allowed}
     for key, value in known.items():
         if not _is_number(value):
-            problems.append(f"{name}.{key} is {_said(value)}; it must be a number")
+            problems.append(f"{name}.{key} is {_quote_value(value)}; it must be a number")
     return kind(**{key: float(value) for key, value in known.items() if _is_number(value)})
 
 
-def _effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
+def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
     if not (isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)):
         problems.append("effects are written as tables: [[effect]]")
         return ()
     found = []
     for number, entry in enumerate(entries, start=1):
-        law = _law(entry, number, problems) if entry.get("kind") == DISCOVERED_LAW else None
+        law = _read_law(entry, number, problems) if entry.get("kind") == DISCOVERED_LAW else None
         words = ("kind", "axis") if law is None else ("kind", "axis", *_LAW_KEYS)
         numbers = {key: value for key, value in entry.items() if key not in words}
-        wrong = [f"{key} = {_said(value)}" for key, value in numbers.items() if not _is_number(value)]
+        wrong = [f"{key} = {_quote_value(value)}" for key, value in numbers.items() if not _is_number(value)]
         if wrong:
             problems.append(f"effect {number} holds {', '.join(wrong)}; parameters are numbers")
         kind = entry.get("kind")
@@ -174,16 +176,16 @@ def _effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
             continue
         if not isinstance(entry.get("axis", ""), str):
             problems.append(
-                f"effect {number}: axis is {_said(entry['axis'])}; it must be a text, or left out for all axes"
+                f"effect {number}: axis is {_quote_value(entry['axis'])}; it must be a text, or left out for all axes"
             )
         found.append(ModelEffect(kind, entry.get("axis") or None, numbers, law))
-    return () if problems else tuple(_as_floats(effect) for effect in found)
+    return () if problems else tuple(_with_float_parameters(effect) for effect in found)
 
 
 _LAW_KEYS = ("acts_on", "expression")
 
 
-def _law(entry: Mapping[str, Any], number: int, problems: list[str]) -> Law | None:
+def _read_law(entry: Mapping[str, Any], number: int, problems: list[str]) -> Law | None:
     missing = [key for key in (*_LAW_KEYS, "axis") if not isinstance(entry.get(key), str)]
     if missing:
         problems.append(f"effect {number}: {DISCOVERED_LAW} lacks {', '.join(missing)} (texts)")
@@ -195,11 +197,11 @@ def _law(entry: Mapping[str, Any], number: int, problems: list[str]) -> Law | No
         return None
 
 
-def _of_law(effect: ModelEffect) -> dict[str, str]:
+def _law_entries(effect: ModelEffect) -> dict[str, str]:
     return {} if effect.law is None else {"acts_on": effect.law.acts_on, "expression": effect.law.exact_text}
 
 
-def _as_floats(effect: ModelEffect) -> ModelEffect:
+def _with_float_parameters(effect: ModelEffect) -> ModelEffect:
     numbers = {key: float(value) for key, value in effect.parameters.items()}
     return ModelEffect(effect.kind, effect.axis, numbers, effect.law)
 
@@ -209,7 +211,7 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**64)
 
 
-def _said(value: Any) -> str:
+def _quote_value(value: Any) -> str:
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # Python writes no number of more than 4300 digits
@@ -217,32 +219,36 @@ def _said(value: Any) -> str:
     return text if len(text) <= 80 else f"{text[:80]}…"
 
 
-def _section(heading: str, table: Mapping[str, Any]) -> list[str]:
-    return ["", heading, *(f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None)]
+def _format_section(heading: str, table: Mapping[str, Any]) -> list[str]:
+    return [
+        "",
+        heading,
+        *(f"{_format_key(key)} = {_format_value(value)}" for key, value in table.items() if value is not None),
+    ]
 
 
-def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _text(key)
+def _format_key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _format_text(key)
 
 
-def _text(text: str) -> str:
+def _format_text(text: str) -> str:
     """A basic string: control characters, quotes and backslashes escaped, all else as it is."""
     return '"' + re.sub(r'[\x00-\x1f\x7f"\\]', lambda match: f"\\u{ord(match[0]):04x}", text) + '"'
 
 
-def _value(value: Any) -> str:
+def _format_value(value: Any) -> str:
     match value:
         case bool():
             return "true" if value else "false"
         case str():
-            return _text(value)
+            return _format_text(value)
         case int():
             return str(value)
         case float():
             return repr(float(value))
         case list() | tuple():
-            return f"[{', '.join(_value(part) for part in value if part is not None)}]"
+            return f"[{', '.join(_format_value(part) for part in value if part is not None)}]"
         case Mapping():
-            parts = (f"{_key(key)} = {_value(part)}" for key, part in value.items() if part is not None)
+            parts = (f"{_format_key(key)} = {_format_value(part)}" for key, part in value.items() if part is not None)
             return f"{{ {', '.join(parts)} }}" if value else "{}"
     raise TypeError(f"a value of type {type(value).__name__} cannot be written as TOML: {value!r}")

@@ -1,5 +1,5 @@
-"""How good an identified model is, by what was measured: kept with the model, and said before anything that the model
-predicts of itself."""
+"""Quality of an identified model: its errors against measurements. Stored with the model, and stated before any figure
+that the model predicts about itself."""
 
 from dataclasses import asdict, dataclass, fields
 from typing import Any

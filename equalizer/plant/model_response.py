@@ -1,4 +1,4 @@
-"""What a discrete model answers at given frequencies."""
+"""Frequency response and simulation of a discrete state-space model."""
 
 import numpy as np
 from scipy.linalg import schur
@@ -9,7 +9,7 @@ from equalizer.signals.signal import FloatArray
 
 
 def model_response(model: IdentifiedModel, frequency_hz: FloatArray) -> ComplexArray:
-    """C (zI - A)^-1 B + D on the unit circle, shape (lines, p, m). frequency_hz: (lines,)."""
+    """Frequency response C (zI - A)^-1 B + D on the unit circle, shape (lines, p, m). frequency_hz: (lines,)."""
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / model.sample_rate_hz)
     # A = Q T Q^H, once: with T triangular a line takes n^2 operations instead of n^3.
     T, Q = schur(model.A, output="complex")

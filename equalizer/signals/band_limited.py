@@ -1,4 +1,4 @@
-"""Signals without what lies above a band, and their derivatives, without a shift in time."""
+"""Zero-phase low-pass filtering of finite records in the frequency domain: Butterworth magnitude, no shift in time."""
 
 from collections.abc import Callable
 
@@ -9,26 +9,26 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 ORDER = 4
-"""Of the low pass: Butterworth's magnitude, as forwards and backwards in time (Gautier, Vandanjon and Pressé 1994)."""
+"""Order of the Butterworth low pass, applied forwards and backwards (Gautier, Vandanjon and Pressé 1994)."""
 
 LINES = 8192
-"""That are looked at at once."""
+"""Frequency lines that are filtered at once: bounds the memory."""
 
 
-def low_pass(frequency_hz: FloatArray, band_hz: float) -> FloatArray:
-    """Gain of a filter of the order that is run forwards and backwards; half the power passes each way."""
+def low_pass_gain(frequency_hz: FloatArray, band_hz: float) -> FloatArray:
+    """Gain of the low pass at each frequency, in its shape: 1/2 at band_hz, because each pass takes half the power."""
     return np.asarray(1 / (1 + (frequency_hz / band_hz) ** (2 * ORDER)))
 
 
-def through(
+def filter_by_gain(
     samples: FloatArray, sample_rate_hz: float, gain: Callable[[FloatArray], ComplexArray | FloatArray]
 ) -> FloatArray:
-    """Finite samples (n, k) by lines: gain(frequency_hz) is (lines, r, k). Gives (n, r).
+    """Filter finite samples (n, k) line by line with gain(frequency_hz), (lines, r, k). Returns (n, r).
 
-    Continued beyond both ends as an odd function, after the straight line between them was taken off: neither steps
-    nor kinks arise there. The line itself is not put back.
+    The samples are continued beyond both ends by an odd extension, after the straight line between their ends was
+    subtracted, so that neither steps nor kinks arise there. The line itself is not added again.
     """
-    whole = odd_continued(samples - straight(samples))
+    whole = odd_extension(samples - end_to_end_line(samples))
     spectrum, lines = rfft(whole, axis=0), rfftfreq(len(whole), 1 / sample_rate_hz)
     # Matrices of all lines at once would take a gigabyte for some minutes at 1 kHz.
     pieces = [slice(first, first + LINES) for first in range(0, len(lines), LINES)]
@@ -36,29 +36,28 @@ def through(
     return np.asarray(irfft(passed, len(whole), axis=0)[: len(samples)])
 
 
-def odd_continued(samples: FloatArray) -> FloatArray:
-    """One period, (> n, k), of samples (n, k) continued beyond both ends as an odd function about them. Zeros half way
-    round, as far from both ends as can be, bring it to a length of small factors: a transform of a length with a large
-    prime factor takes twenty times as long."""
+def odd_extension(samples: FloatArray) -> FloatArray:
+    """One period, (> n, k), of samples (n, k) extended beyond both ends as an odd function. Zeros half way round, far
+    from both ends, bring it to a length of small prime factors: with a large one the FFT takes twenty times as long."""
     mirrored = -samples[-2:0:-1]
     exact, middle = len(samples) + len(mirrored), len(mirrored) // 2
     zeros = np.zeros((next_fast_len(exact, real=True) - exact, samples.shape[1]))
     return np.concatenate([samples, mirrored[:middle], zeros, mirrored[middle:]])
 
 
-def straight(samples: FloatArray) -> FloatArray:
-    """(n, k): the line from the first to the last."""
+def end_to_end_line(samples: FloatArray) -> FloatArray:
+    """(n, k): the straight line from the first to the last of samples (n, k)."""
     along = np.linspace(0.0, 1.0, len(samples))[:, None]
     return np.asarray((1 - along) * samples[0] + along * samples[-1])
 
 
-def band_limited(samples: FloatArray, sample_rate_hz: float, band_hz: float, late_s: float = 0.0) -> FloatArray:
-    """(n, k) finite samples; late_s: seconds by which they come later."""
+def filter_low_pass(samples: FloatArray, sample_rate_hz: float, band_hz: float, late_s: float = 0.0) -> FloatArray:
+    """Samples (n, k) below band_hz, delayed by late_s seconds. Missing samples (NaN) are not allowed."""
 
     def gain(frequency_hz: FloatArray) -> ComplexArray:
-        one = low_pass(frequency_hz, band_hz) * np.exp(-2j * np.pi * frequency_hz * late_s)
-        return np.asarray(one[:, None, None] * np.eye(samples.shape[1]))
+        scalar = low_pass_gain(frequency_hz, band_hz) * np.exp(-2j * np.pi * frequency_hz * late_s)
+        return np.asarray(scalar[:, None, None] * np.eye(samples.shape[1]))
 
-    line = straight(samples)
+    line = end_to_end_line(samples)
     slope = (samples[-1] - samples[0]) / max(len(samples) - 1, 1) * sample_rate_hz
-    return np.asarray(line - slope * late_s + through(samples, sample_rate_hz, gain))
+    return np.asarray(line - slope * late_s + filter_by_gain(samples, sample_rate_hz, gain))

@@ -1,11 +1,11 @@
-"""How far two clocks are apart, from one motion that both have recorded."""
+"""Clock offset of two recordings of the same motion, from the peak of their normalised cross-correlation."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from equalizer.signals.resampling import Grid, Samples, resampled
+from equalizer.signals.resampling import Grid, Samples, resample
 from equalizer.signals.signal import FloatArray
 
 IntArray = npt.NDArray[np.signedinteger]
@@ -17,7 +17,7 @@ RIVAL = 0.98
 
 
 class NoOffsetError(ValueError):
-    """Two signals that do not say how far their clocks are apart."""
+    """The cross-correlation of two signals has no single clear peak, so their clock offset is not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +36,11 @@ def offset_by_correlation(reference: Samples, other: Samples, about_s: float, wi
     end of the range, or another offset agrees as well.
     """
     rate_hz = 2 * max(1 / float(np.median(np.diff(part.times_s))) for part in (reference, other))
-    one, two = (_on_grid(part, rate_hz) for part in (reference, other))
-    correlation = _normalised(one, two)
-    lags = np.arange(-(len(two) - 1), len(one))
+    first, second = (_resample_centred(part, rate_hz) for part in (reference, other))
+    correlation = _normalised_correlation(first, second)
+    lags = np.arange(-(len(second) - 1), len(first))
     offsets_s = reference.times_s[0] - other.times_s[0] + lags / rate_hz
-    allowed = (np.abs(offsets_s - about_s) <= within_s) & _enough_overlap(lags, len(one), len(two))
+    allowed = (np.abs(offsets_s - about_s) <= within_s) & _has_enough_overlap(lags, len(first), len(second))
     if allowed.sum() < 8:
         raise NoOffsetError("the two signals do not overlap within the range of offsets that is searched")
     offsets_s, correlation = offsets_s[allowed], correlation[allowed]
@@ -53,33 +53,34 @@ def offset_by_correlation(reference: Samples, other: Samples, about_s: float, wi
             f"the two signals agree best at the end of the range that is searched ({offsets_s[peak]:g} s)"
         )
     _refuse_rivals(offsets_s, np.abs(correlation), peak)
-    return _between_samples(offsets_s, correlation, peak)
+    return _interpolate_peak(offsets_s, correlation, peak)
 
 
-def _on_grid(samples: Samples, rate_hz: float) -> FloatArray:
+def _resample_centred(samples: Samples, rate_hz: float) -> FloatArray:
     count = int(np.floor((samples.times_s[-1] - samples.times_s[0]) * rate_hz)) + 1
-    values = resampled(samples, Grid(float(samples.times_s[0]), rate_hz, count), "band-limited")
+    values = resample(samples, Grid(float(samples.times_s[0]), rate_hz, count), "band-limited")
     centred = values - np.nanmean(values)
     return np.nan_to_num(centred, nan=0.0)
 
 
-def _normalised(values: FloatArray, two: FloatArray) -> FloatArray:
-    """Cross-correlation over the overlap of each lag, by the energy of both there."""
+def _normalised_correlation(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Cross-correlation of (n,) and (m,) at each of the n + m - 1 lags, divided by the energy of both where they
+    overlap."""
     # Here and below: SciPy's signals and splines take longer to import than a diagnosis that does without them.
     from scipy import signal as sg
 
-    raw = sg.correlate(values, two, mode="full", method="fft")
-    ones, twos = np.ones(len(values)), np.ones(len(two))
-    energy_one = sg.correlate(values**2, twos, mode="full", method="fft")
-    energy_two = sg.correlate(ones, two**2, mode="full", method="fft")
-    floor = 1e-9 * float(np.sum(values**2) * np.sum(two**2))
-    both: FloatArray = raw / np.sqrt(np.maximum(energy_one * energy_two, max(floor, np.finfo(float).tiny)))
-    return both
+    raw = sg.correlate(first, second, mode="full", method="fft")
+    first_energy = sg.correlate(first**2, np.ones(len(second)), mode="full", method="fft")
+    second_energy = sg.correlate(np.ones(len(first)), second**2, mode="full", method="fft")
+    floor = 1e-9 * float(np.sum(first**2) * np.sum(second**2))
+    normalised: FloatArray = raw / np.sqrt(np.maximum(first_energy * second_energy, max(floor, np.finfo(float).tiny)))
+    return normalised
 
 
-def _enough_overlap(lags: IntArray, number: int, two: int) -> BoolArray:
-    overlap = np.minimum(number, lags + two) - np.maximum(0, lags)
-    enough: BoolArray = overlap >= 0.25 * min(number, two)
+def _has_enough_overlap(lags: IntArray, first: int, second: int) -> BoolArray:
+    """At which lags signals of these lengths overlap by a quarter of the shorter one."""
+    overlap = np.minimum(first, lags + second) - np.maximum(0, lags)
+    enough: BoolArray = overlap >= 0.25 * min(first, second)
     return enough
 
 
@@ -95,7 +96,7 @@ def _refuse_rivals(offsets_s: FloatArray, height: FloatArray, peak: int) -> None
         )
 
 
-def _between_samples(offsets_s: FloatArray, correlation: FloatArray, peak: int) -> ClockOffset:
+def _interpolate_peak(offsets_s: FloatArray, correlation: FloatArray, peak: int) -> ClockOffset:
     from scipy.interpolate import make_interp_spline
 
     around = slice(max(0, peak - 8), peak + 9)

@@ -30,7 +30,7 @@ def log_sweep(from_hz: float, to_hz: float, amplitude: float, n: int, sample_rat
     return wave
 
 
-def faded(samples: FloatArray, fade_in: int, fade_out: int) -> FloatArray:
+def apply_fades(samples: FloatArray, fade_in: int, fade_out: int) -> FloatArray:
     """Raised-cosine rise over the first `fade_in` and fall over the last `fade_out` samples. samples: (n, ...)."""
     n = samples.shape[0]
     if fade_in + fade_out > n:

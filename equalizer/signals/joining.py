@@ -1,4 +1,4 @@
-"""Recordings made one after another, as one."""
+"""Concatenates recordings that were made one after another."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -26,31 +26,33 @@ def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
             )
     starts = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
     segments = [
-        _moved(segment, int(start)) for part, start in zip(parts, starts, strict=False) for segment in part.segments
+        _shift_segment(segment, int(start))
+        for part, start in zip(parts, starts, strict=False)
+        for segment in part.segments
     ]
     return Recording(
         device=first.device,
-        command=_joined([part.command for part in parts]),
-        response=_joined([part.response for part in parts]),
-        position=_all_or_none([part.position for part in parts]),
-        excitation=_all_or_none([part.excitation for part in parts]),
-        condition=_all_or_none([part.condition for part in parts]),
+        command=_concatenate([part.command for part in parts]),
+        response=_concatenate([part.response for part in parts]),
+        position=_concatenate_if_all([part.position for part in parts]),
+        excitation=_concatenate_if_all([part.excitation for part in parts]),
+        condition=_concatenate_if_all([part.condition for part in parts]),
         hold=first.hold,
         segments=tuple(segments),
         meta=meta,
     )
 
 
-def _moved(segment: Segment, by: int) -> Segment:
+def _shift_segment(segment: Segment, by: int) -> Segment:
     return replace(segment, start=segment.start + by, stop=segment.stop + by)
 
 
-def _all_or_none(signals: Sequence[Signal | None]) -> Signal | None:
+def _concatenate_if_all(signals: Sequence[Signal | None]) -> Signal | None:
     present = [signal for signal in signals if signal is not None]
-    return _joined(present) if len(present) == len(signals) else None
+    return _concatenate(present) if len(present) == len(signals) else None
 
 
-def _joined(signals: Sequence[Signal]) -> Signal:
+def _concatenate(signals: Sequence[Signal]) -> Signal:
     first = signals[0]
     if any((s.channels, s.unit) != (first.channels, first.unit) for s in signals):
         raise ValueError(f"not all parts have the channels {', '.join(first.channels)} in {first.unit}")

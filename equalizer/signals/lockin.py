@@ -1,4 +1,4 @@
-"""Lock-in: amplitude and phase of a known frequency in noisy samples."""
+"""Lock-in: amplitude and phase of a known frequency in noisy samples, by least squares."""
 
 import numpy as np
 import numpy.typing as npt

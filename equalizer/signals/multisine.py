@@ -48,11 +48,13 @@ def multisines(
     every line. A realisation depends on the seed and its own number only, not on how many are asked for.
     """
     groups = -(-realisations // axes)
-    waves = [wave for group in range(groups) for wave in _group(lines, n, axes, np.random.default_rng([seed, group]))]
+    waves = [
+        wave for group in range(groups) for wave in _draw_group(lines, n, axes, np.random.default_rng([seed, group]))
+    ]
     return tuple(amplitude * wave / np.linalg.norm(wave, axis=1).max() for wave in waves[:realisations])
 
 
-def _group(lines: IntArray, n: int, axes: int, random: np.random.Generator) -> FloatArray:
+def _draw_group(lines: IntArray, n: int, axes: int, random: np.random.Generator) -> FloatArray:
     """(axes, n, axes): the experiments of one group, from the draw whose highest peak is lowest."""
     turns = np.exp(2j * np.pi * np.outer(np.arange(axes), np.arange(axes)) / axes)
     best, lowest = np.zeros((axes, n, axes)), np.inf

@@ -1,4 +1,4 @@
-"""What makes a recording consistent."""
+"""Consistency checks of a recording: lengths, rates, channels, segments and time stamps."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -19,7 +19,7 @@ def recording_problems(recording: Recording) -> tuple[str, ...]:
 
 
 def signals_of(recording: Recording) -> dict[str, Signal]:
-    """Those that the recording has, by the names of the format."""
+    """The signals that the recording has, by their names in the file format."""
     every = {
         "command": recording.command,
         "response": recording.response,

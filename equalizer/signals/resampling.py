@@ -1,4 +1,4 @@
-"""A signal put onto another, uniform grid of time: held, along straight lines, or band-limited.
+"""Resampling to a uniform time grid: zero-order hold, linear or band-limited interpolation.
 
 It matters which: a command that stays until the next one is right when it is held and smeared when it is
 interpolated; a signal that was sampled behind a filter is right when it is band-limited and gets images when it is
@@ -53,8 +53,9 @@ class Grid:
         return self.start_s + np.arange(self.count) / self.rate_hz
 
 
-def resampled(samples: Samples, grid: Grid, method: Method) -> FloatArray:
-    """(count,). Raises ValueError where no more than one sample is not missing, or the grid leaves the samples."""
+def resample(samples: Samples, grid: Grid, method: Method) -> FloatArray:
+    """Values at the grid's times, (count,); NaN where samples are missing. method: "held" (zero-order hold), "linear"
+    or "band-limited". Raises ValueError where fewer than two samples are known, or the grid exceeds the samples."""
     times_s = grid.times_s()
     near = SAME_INSTANT / grid.rate_hz
     if times_s[0] < samples.times_s[0] - near or times_s[-1] > samples.times_s[-1] + near:
@@ -71,13 +72,13 @@ def resampled(samples: Samples, grid: Grid, method: Method) -> FloatArray:
     else:
         filled = np.interp(samples.times_s, samples.times_s[good], samples.values[good])
         whole = Samples(samples.times_s, filled, samples.rate_hz, samples.gap_s)
-        found = np.interp(times_s, whole.times_s, filled) if method == "linear" else _band_limited(whole, grid)
-    found[_missing(samples, good, times_s, near, held=method == "held")] = np.nan
+        found = np.interp(times_s, whole.times_s, filled) if method == "linear" else _resample_band_limited(whole, grid)
+    found[_is_missing(samples, good, times_s, near, held=method == "held")] = np.nan
     return found
 
 
-def _missing(samples: Samples, good: BoolArray, times_s: FloatArray, near: float, held: bool) -> BoolArray:
-    """Which times lie between two good samples that are not neighbours."""
+def _is_missing(samples: Samples, good: BoolArray, times_s: FloatArray, near: float, held: bool) -> BoolArray:
+    """(count,): which of the times lie in a gap between two good samples that are not neighbours."""
     stamps, places = samples.times_s[good], np.flatnonzero(good)
     step = float(np.median(np.diff(samples.times_s)))
     hole = (np.diff(stamps) > samples.gap_s) | (np.diff(places) > 1)
@@ -88,21 +89,21 @@ def _missing(samples: Samples, good: BoolArray, times_s: FloatArray, near: float
     return missing
 
 
-def _band_limited(samples: Samples, grid: Grid) -> FloatArray:
+def _resample_band_limited(samples: Samples, grid: Grid) -> FloatArray:
     if not samples.rate_hz:
-        return _from_uneven(samples, grid)
+        return _resample_uneven(samples, grid)
     first = (grid.start_s - samples.times_s[0]) * samples.rate_hz
     ratio = Fraction(grid.rate_hz / samples.rate_hz).limit_denominator(1000)
     exact = abs(float(ratio) * samples.rate_hz / grid.rate_hz - 1) * grid.count < ON_A_SAMPLE
     if exact and abs(first - round(first)) < ON_A_SAMPLE:
-        return _by_ratio(samples.values, ratio, round(first), grid.count)
-    dense = _by_ratio(samples.values, Fraction(_UPSAMPLED), 0, _UPSAMPLED * (len(samples.values) - 1) + 1)
+        return _resample_by_ratio(samples.values, ratio, round(first), grid.count)
+    dense = _resample_by_ratio(samples.values, Fraction(_UPSAMPLED), 0, _UPSAMPLED * (len(samples.values) - 1) + 1)
     dense_rate_hz = _UPSAMPLED * samples.rate_hz
     times_s = samples.times_s[0] + np.arange(len(dense)) / dense_rate_hz
-    return _along_spline(times_s, dense, grid, samples.rate_hz)
+    return _resample_spline(times_s, dense, grid, samples.rate_hz)
 
 
-def _from_uneven(samples: Samples, grid: Grid) -> FloatArray:
+def _resample_uneven(samples: Samples, grid: Grid) -> FloatArray:
     """Through a quintic spline; gaps are bridged by straight lines first, or the spline would swing in them."""
     times_s, values = samples.times_s, samples.values
     steps = np.diff(times_s)
@@ -112,10 +113,10 @@ def _from_uneven(samples: Samples, grid: Grid) -> FloatArray:
         between = [np.arange(times_s[i] + median_s, times_s[i + 1] - median_s / 2, median_s) for i in wide]
         every = np.sort(np.concatenate([times_s, *between]))
         times_s, values = every, np.interp(every, times_s, values)
-    return _along_spline(times_s, values, grid, 1 / median_s)
+    return _resample_spline(times_s, values, grid, 1 / median_s)
 
 
-def _along_spline(times_s: FloatArray, values: FloatArray, grid: Grid, source_rate_hz: float) -> FloatArray:
+def _resample_spline(times_s: FloatArray, values: FloatArray, grid: Grid, source_rate_hz: float) -> FloatArray:
     """The spline on the grid, or on a finer one and then filtered, where the grid is slower than the source."""
     # Here and below: SciPy's signals and splines take longer to import than a diagnosis that does without them.
     from scipy.interpolate import make_interp_spline
@@ -126,10 +127,10 @@ def _along_spline(times_s: FloatArray, values: FloatArray, grid: Grid, source_ra
     finer = int(np.ceil(2 * source_rate_hz / grid.rate_hz)) if grid.rate_hz < 0.99 * source_rate_hz else 1
     dense_times_s = grid.start_s - origin_s + np.arange((grid.count - 1) * finer + 1) / (grid.rate_hz * finer)
     dense: FloatArray = spline(np.clip(dense_times_s, 0.0, times_s[-1] - origin_s))
-    return dense if finer == 1 else _by_ratio(dense, Fraction(1, finer), 0, grid.count)
+    return dense if finer == 1 else _resample_by_ratio(dense, Fraction(1, finer), 0, grid.count)
 
 
-def _by_ratio(values: FloatArray, ratio: Fraction, first: int, count: int) -> FloatArray:
+def _resample_by_ratio(values: FloatArray, ratio: Fraction, first: int, count: int) -> FloatArray:
     """`ratio` times the rate, from the sample `first` on; ends are continued by their point reflection."""
     from scipy import signal as sg
 

@@ -29,8 +29,8 @@ class Signal:
             raise ValueError(f"samples must have shape (n, channels), not {samples.shape}")
         if samples.shape[1] != len(self.channels):
             raise ValueError(f"{samples.shape[1]} columns of samples but {len(self.channels)} channel names")
-        object.__setattr__(self, "quantity", _folded("quantity", self.quantity, len(self.channels)))
-        object.__setattr__(self, "unit", _folded("unit", self.unit, len(self.channels)))
+        object.__setattr__(self, "quantity", _fold_equal_words("quantity", self.quantity, len(self.channels)))
+        object.__setattr__(self, "unit", _fold_equal_words("unit", self.unit, len(self.channels)))
         if not (np.isfinite(self.sample_rate_hz) and self.sample_rate_hz > 0):
             raise ValueError(f"sample_rate_hz must be a positive number, not {self.sample_rate_hz}")
         if samples.flags.writeable:
@@ -62,7 +62,7 @@ class Signal:
         """Samples start (included) to stop (excluded)."""
         return replace(self, samples=self.samples[start:stop])
 
-    def picked(self, places: Sequence[int]) -> Self:
+    def select_channels(self, places: Sequence[int]) -> Self:
         """The channels at these places, in this order."""
         kept = list(places)
         return replace(
@@ -73,14 +73,14 @@ class Signal:
             channels=tuple(self.channels[k] for k in kept),
         )
 
-    def rotated(self, rotation: FloatArray) -> Self:
+    def rotate(self, rotation: FloatArray) -> Self:
         """Each sample v becomes rotation @ v. rotation: (channels, channels), orthogonal."""
         if not (isinstance(self.quantity, str) and isinstance(self.unit, str)):
             raise ValueError(f"channels of different quantities cannot be rotated into each other: {self.quantity}")
         return replace(self, samples=self.samples @ np.asarray(rotation, dtype=np.float64).T)
 
 
-def _folded(name: str, words: str | tuple[str, ...], channels: int) -> str | tuple[str, ...]:
+def _fold_equal_words(name: str, words: str | tuple[str, ...], channels: int) -> str | tuple[str, ...]:
     if isinstance(words, str):
         return words
     if len(words) != channels:

@@ -1,4 +1,4 @@
-"""Spectral density by Welch's averaged, windowed stretches (Welch 1967, IEEE Trans. Audio Electroacoust. 15:70).
+"""Spectral density by Welch's method: averaged windowed segments (Welch 1967, IEEE Trans. Audio Electroacoust. 15:70).
 
 As `welch` and `csd` of SciPy at their defaults, whose package takes longer to import than many a spectrum.
 """
@@ -12,37 +12,40 @@ ComplexArray = npt.NDArray[np.complexfloating]
 
 
 def spectral_density(signal: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, FloatArray]:
-    """One-sided density of (n,) or (n, c), in units squared per hertz, over its first axis, at frequencies (lines,).
+    """Frequencies (lines,) and the one-sided power spectral density of (n,) or (n, c), in units squared per hertz.
 
-    length: of a stretch; stretches have a Hann window, no mean, and overlap by half.
+    length: samples of a segment; segments are freed of their mean, Hann-windowed, and overlap by half.
     """
-    frequency_hz, power = _averaged(signal, signal, rate_hz, length)
+    frequency_hz, power = _welch_average(signal, signal, rate_hz, length)
     return frequency_hz, np.asarray(power.real)
 
 
 def cross_density(first: FloatArray, other: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, ComplexArray]:
-    """The same of two signals of one shape: mean of the first's conjugate with the other."""
-    return _averaged(first, other, rate_hz, length)
+    """Frequencies (lines,) and the one-sided cross-spectral density of two signals of the same shape, the mean of the
+    first's conjugate times the other; segments as in `spectral_density`."""
+    return _welch_average(first, other, rate_hz, length)
 
 
 def hann(length: int) -> FloatArray:
-    """(length,), periodic."""
+    """Periodic Hann window, (length,)."""
     return np.asarray(0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
 
 
-def _averaged(first: FloatArray, other: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, ComplexArray]:
+def _welch_average(
+    first: FloatArray, other: FloatArray, rate_hz: float, length: int
+) -> tuple[FloatArray, ComplexArray]:
     length = min(length, len(first))
     window = hann(length).reshape(-1, *[1] * (first.ndim - 1))
     starts = range(0, len(first) - length + 1, length - length // 2)
     total = np.zeros((length // 2 + 1, *first.shape[1:]), dtype=np.complex128)
     for start in starts:
-        lines = _lines(first[start : start + length], window)
-        total += lines.conj() * (lines if other is first else _lines(other[start : start + length], window))
+        lines = _windowed_spectrum(first[start : start + length], window)
+        total += lines.conj() * (lines if other is first else _windowed_spectrum(other[start : start + length], window))
     density = total / (len(starts) * rate_hz * float(np.sum(window**2)))
     # Each line but those at zero and at half the rate stands for its negative frequency, too.
     density[1 : len(density) - (length % 2 == 0)] *= 2
     return np.asarray(np.fft.rfftfreq(length, 1 / rate_hz), dtype=np.float64), np.asarray(density)
 
 
-def _lines(stretch: FloatArray, window: FloatArray) -> ComplexArray:
+def _windowed_spectrum(stretch: FloatArray, window: FloatArray) -> ComplexArray:
     return np.asarray(np.fft.rfft(window * (stretch - stretch.mean(axis=0)), axis=0))

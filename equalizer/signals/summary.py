@@ -21,7 +21,7 @@ class Summary:
 
 
 class Summarised:
-    """A result that prints as its summary, for its fields hold arrays of any length."""
+    """Base of results that print as their summary: their fields hold arrays too long to print."""
 
     __slots__ = ()
 

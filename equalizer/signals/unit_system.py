@@ -1,4 +1,4 @@
-"""Units of a mechanical model's numbers: those of its commands over those of its motion.
+"""System of units of a mechanical model: of its commands (force), its motion (length) and time.
 
 Where a command is a current or has no unit, a mass is no kg: force constants are not known, and are in every number.
 """
@@ -21,9 +21,9 @@ class UnitSystem:
     time: str = "s"
     """"sample" where no time is known."""
 
-    def of(self, unit: str) -> str:
-        """The same quantity here. unit: SI of a translational model, or what is no unit of a force or motion, which
-        stays."""
+    def express(self, unit: str) -> str:
+        """The unit of the same quantity in this system. unit: SI of a translational model; a unit of neither force nor
+        motion is returned as it is."""
         if unit == "Hz":
             return unit if self.time == "s" else f"1/{self.time}"
         over, _, under = unit.partition("/")
@@ -33,18 +33,20 @@ class UnitSystem:
                 found = _FACTOR.match(factor)
                 if found is None and factor != "1":
                     return unit
-                for name, power in _basic(found[1]) if found else ():
+                for name, power in _base_powers(found[1]) if found else ():
                     assert found is not None
                     powers[name] += sign * power * int(found[2] or 1)
-        return self._written(powers["N"], powers["m"], powers["s"])
+        return self._format_unit(powers["N"], powers["m"], powers["s"])
 
-    def _written(self, force: int, length: int, seconds: int) -> str:
+    def _format_unit(self, force: int, length: int, seconds: int) -> str:
         named = [(self.force, force), (self.length, length), (self.time, seconds)]
         known = [(f"({name})" if "/" in name else name, power) for name, power in named if name != "1"]
         over = [
-            _power(name, power) for name, power in sorted(known, key=lambda each: each[0] == self.length) if power > 0
+            _format_power(name, power)
+            for name, power in sorted(known, key=lambda each: each[0] == self.length)
+            if power > 0
         ]
-        under = [_power(name, -power) for name, power in known if power < 0]
+        under = [_format_power(name, -power) for name, power in known if power < 0]
         below = f"/({' '.join(under)})" if len(under) > 1 else f"/{under[0]}" if under else ""
         return f"{' '.join(over) or '1'}{below}"
 
@@ -68,11 +70,11 @@ def system_of(commands: Sequence[str], motions: Sequence[str], time: str = "s") 
     return UnitSystem(commands[0], motion, time)
 
 
-def _basic(name: str) -> tuple[tuple[str, int], ...]:
+def _base_powers(name: str) -> tuple[tuple[str, int], ...]:
     return (("N", 1), ("s", 2), ("m", -1)) if name == "kg" else ((name, 1),)
 
 
-def _power(name: str, power: int) -> str:
+def _format_power(name: str, power: int) -> str:
     if power == 1:
         return name
     return f"{f'({name})' if ' ' in name else name}^{power}"

@@ -1,4 +1,4 @@
-"""Units written in ASCII and what they are in SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `in`, `g` (standard gravity)."""
+"""Parses ASCII units and converts them to SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `in`, `g` (standard gravity)."""
 
 import math
 import re
@@ -114,13 +114,13 @@ def parse_unit(text: str) -> Unit:
     symbols: dict[str, int] = {}
     factor = 1.0
     dimension: Dimension = (0,) * 6
-    for symbol, power in _factors(text):
-        unit = _symbol(symbol, text)
+    for symbol, power in _parse_factors(text):
+        unit = _parse_symbol(symbol, text)
         factor *= unit.factor**power
         dimension = tuple(have + power * more for have, more in zip(dimension, unit.dimension, strict=True))
-        for part, exponent in _factors(unit.si):
+        for part, exponent in _parse_factors(unit.si):
             symbols[part] = symbols.get(part, 0) + power * exponent
-    return Unit(_PREFERRED.get(dimension) or _written(symbols), factor, dimension)
+    return Unit(_PREFERRED.get(dimension) or _format_symbols(symbols), factor, dimension)
 
 
 def check_quantity(quantity: str, unit: Unit) -> None:
@@ -146,27 +146,27 @@ _QUANTITY_OF = {
 }  # fmt: skip
 
 
-def _factors(text: str) -> list[tuple[str, int]]:
+def _parse_factors(text: str) -> list[tuple[str, int]]:
     """Symbols with their exponents; what follows a stroke is divided by."""
     numerator, *denominators = text.replace("*", " ").split("/")
-    found = [_power(factor, 1, text) for factor in numerator.split()]
+    found = [_parse_power(factor, 1, text) for factor in numerator.split()]
     for part in denominators:
         if len(part.split()) != 1:
-            raise _unknown(text, " (after each stroke stands exactly one symbol, as in N m s/rad or m/s/V)")
-        found.append(_power(part.strip(), -1, text))
+            raise _unknown_unit_error(text, " (after each stroke stands exactly one symbol, as in N m s/rad or m/s/V)")
+        found.append(_parse_power(part.strip(), -1, text))
     if not numerator.strip():
-        raise _unknown(text)
+        raise _unknown_unit_error(text)
     return found
 
 
-def _power(factor: str, sign: int, text: str) -> tuple[str, int]:
+def _parse_power(factor: str, sign: int, text: str) -> tuple[str, int]:
     match = re.fullmatch(r"([A-Za-z%]+|1)(?:\^(-?[1-9]))?", factor)
     if not match:
-        raise _unknown(text)
+        raise _unknown_unit_error(text)
     return match[1], sign * int(match[2] or 1)
 
 
-def _symbol(symbol: str, text: str) -> Unit:
+def _parse_symbol(symbol: str, text: str) -> Unit:
     if symbol in _FIXED:
         return _FIXED[symbol]
     if symbol in _PREFIXABLE:
@@ -174,24 +174,24 @@ def _symbol(symbol: str, text: str) -> Unit:
     prefix, base = symbol[0], symbol[1:]
     if prefix in _PREFIXES and base in _PREFIXABLE:
         return Unit(base, _PREFIXES[prefix], _PREFIXABLE[base])
-    raise _unknown(text)
+    raise _unknown_unit_error(text)
 
 
-def _written(symbols: dict[str, int]) -> str:
-    above = [_raised(symbol, power) for symbol, power in symbols.items() if power > 0 and symbol != "1"]
-    below = [_raised(symbol, -power) for symbol, power in symbols.items() if power < 0 and symbol != "1"]
+def _format_symbols(symbols: dict[str, int]) -> str:
+    above = [_format_power(symbol, power) for symbol, power in symbols.items() if power > 0 and symbol != "1"]
+    below = [_format_power(symbol, -power) for symbol, power in symbols.items() if power < 0 and symbol != "1"]
     return "/".join([" ".join(above) or "1", *below])
 
 
-def _raised(symbol: str, power: int) -> str:
+def _format_power(symbol: str, power: int) -> str:
     return symbol if power == 1 else f"{symbol}^{power}"
 
 
-def _unknown(text: str, why: str = "") -> UnknownUnitError:
-    return UnknownUnitError(f"'{text}' is not a unit known here{why}{_suggestion(text)}; {ALLOWED}")
+def _unknown_unit_error(text: str, why: str = "") -> UnknownUnitError:
+    return UnknownUnitError(f"'{text}' is not a unit known here{why}{_suggest_unit(text)}; {ALLOWED}")
 
 
-def _suggestion(text: str) -> str:
+def _suggest_unit(text: str) -> str:
     plain = plain_unit(text)
     return f" (did you mean '{plain}'?)" if plain != text else ""
 

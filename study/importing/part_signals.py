@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.resampling import FLAT_TO, SAME_INSTANT, Grid, Method, Samples, resampled
+from equalizer.signals.resampling import FLAT_TO, SAME_INSTANT, Grid, Method, Samples, resample
 from equalizer.signals.signal import FloatArray
 from study.importing.alignment import Logger
 from study.importing.expressions.functions import Value
@@ -149,7 +149,7 @@ def _same_rate(samples: Samples, grid: Grid) -> bool:
 
 def _moved(channel: ChannelMap, method: Method, samples: Samples, grid: Grid, say: Callable[[str], None]) -> FloatArray:
     try:
-        column = resampled(samples, grid, method)
+        column = resample(samples, grid, method)
     except ValueError as error:
         raise ImportProblemError(f"channel '{channel.name}': {error}") from error
     source_hz = samples.rate_hz or 1 / float(np.median(np.diff(samples.times_s)))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import stft
 
-from equalizer.signals.excitation import faded, log_sweep, sine
+from equalizer.signals.excitation import apply_fades, log_sweep, sine
 
 RATE_HZ = 1000.0
 
@@ -35,7 +35,7 @@ def test_a_sweep_that_cannot_be_is_refused(from_hz, to_hz):
 
 
 def test_a_fade_starts_and_ends_at_zero_and_leaves_the_middle_alone():
-    x = faded(np.ones((100, 2)), 20, 30)
+    x = apply_fades(np.ones((100, 2)), 20, 30)
     assert x[0] == pytest.approx([0.0, 0.0])
     assert x[-1] == pytest.approx([0.0, 0.0])
     assert np.all(x[20:70] == 1.0)
@@ -44,7 +44,7 @@ def test_a_fade_starts_and_ends_at_zero_and_leaves_the_middle_alone():
 
 def test_fades_longer_than_the_signal_are_refused():
     with pytest.raises(ValueError, match="do not fit into 10"):
-        faded(np.ones(10), 6, 6)
+        apply_fades(np.ones(10), 6, 6)
 
 
 def test_a_sine_starts_at_zero_and_repeats():

@@ -30,7 +30,7 @@ def test_a_list_of_the_wrong_length_is_refused():
 
 def test_different_quantities_are_not_rotated_into_each_other():
     with pytest.raises(ValueError, match="channels of different quantities cannot be rotated"):
-        signal(quantity=("position", "angle"), unit=("m", "rad")).rotated(np.eye(2))
+        signal(quantity=("position", "angle"), unit=("m", "rad")).rotate(np.eye(2))
 
 
 def test_samples_cannot_be_changed_and_do_not_follow_their_source():
@@ -50,7 +50,7 @@ def test_a_rate_that_is_no_rate_is_refused(rate):
 
 def test_picked_channels_keep_their_words_in_the_order_asked_for():
     signal = Signal(np.arange(6.0).reshape(2, 3), 10.0, ("force", "angle", "force"), ("N", "rad", "N"), ("a", "b", "c"))
-    mixed, plain = signal.picked((1, 0)), signal.picked((2, 0))
+    mixed, plain = signal.select_channels((1, 0)), signal.select_channels((2, 0))
     assert (mixed.channels, mixed.quantity, mixed.unit) == (("b", "a"), ("angle", "force"), ("rad", "N"))
     assert mixed.samples.tolist() == [[1.0, 0.0], [4.0, 3.0]]
     assert (plain.quantity, plain.unit) == ("force", "N")

@@ -17,7 +17,7 @@ from analysis.diagnosis.data.measured_motion import filled_gaps
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
-from equalizer.signals.band_limited import low_pass, odd_continued
+from equalizer.signals.band_limited import low_pass_gain, odd_extension
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
 
@@ -91,7 +91,7 @@ def moving_signal(recording: Recording) -> Signal | None:
         lowest = min(known)
         places = [k for k, order in enumerate(orders) if order == lowest and _moves(signal.samples[:, k])]
         if places:
-            found.append((lowest, signal.picked(places)))
+            found.append((lowest, signal.select_channels(places)))
     return min(found, key=lambda item: item[0])[1] if found else None
 
 
@@ -168,8 +168,8 @@ def within(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float
 
 
 def _within(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:
-    shaped = low_pass(frequency_hz, band_hz)
-    return np.asarray(shaped * (1 - low_pass(frequency_hz, lowest_hz)) if lowest_hz > 0 else shaped)
+    shaped = low_pass_gain(frequency_hz, band_hz)
+    return np.asarray(shaped * (1 - low_pass_gain(frequency_hz, lowest_hz)) if lowest_hz > 0 else shaped)
 
 
 def _untimed(record: Observed, samples: FloatArray, condition: FloatArray, names: tuple[str, ...]) -> Motion:
@@ -206,7 +206,7 @@ def _derivative(
 
 
 def low_passed(samples: FloatArray, rate_hz: float, band_hz: float) -> FloatArray:
-    return filtered(samples, rate_hz, lambda f: low_pass(f, band_hz))
+    return filtered(samples, rate_hz, lambda f: low_pass_gain(f, band_hz))
 
 
 def differentiated(samples: FloatArray, rate_hz: float, band_hz: float, times: int) -> FloatArray:
@@ -216,7 +216,7 @@ def differentiated(samples: FloatArray, rate_hz: float, band_hz: float, times: i
 def filtered(samples: FloatArray, rate_hz: float, gain: object, straightened: bool = True) -> FloatArray:
     """Continued beyond both ends as an odd function about them."""
     line = _straight(samples, rate_hz)[0] if straightened else np.zeros_like(samples)
-    whole = odd_continued(samples - line)
+    whole = odd_extension(samples - line)
     spectrum = rfft(whole, axis=0)
     lines = rfftfreq(len(whole), 1 / rate_hz)
     return np.asarray(irfft(gain(lines)[:, None] * spectrum, len(whole), axis=0)[: len(samples)] + line)  # type: ignore[operator]

@@ -10,7 +10,7 @@ from analysis.diagnosis.contrast.fault import Fault, Numbers, Told, Undo, Varian
 from analysis.diagnosis.contrast.taken import Taken
 from equalizer.effects.simulation.sensor_path import one_pole
 from equalizer.effects.simulation.slew_kernel import follow
-from equalizer.signals.band_limited import odd_continued, straight
+from equalizer.signals.band_limited import end_to_end_line, odd_extension
 from equalizer.signals.signal import FloatArray
 
 Made = Callable[[FloatArray, float], FloatArray]
@@ -139,7 +139,7 @@ def at_times(samples: FloatArray, at: FloatArray) -> FloatArray:
     """Samples (n,) at other times (n,), in samples; beyond the ends, as at the ends."""
     line = np.linspace(samples[0], samples[-1], len(samples))
     bent = samples - line
-    whole = odd_continued(bent[:, None])[:, 0]
+    whole = odd_extension(bent[:, None])[:, 0]
     fine = irfft(rfft(whole), FINER * len(whole))[: FINER * (len(samples) - 1) + 1] * FINER
     inside = np.clip(at, 0, len(samples) - 1)
     along = np.interp(inside, np.arange(len(line)), line)
@@ -148,8 +148,8 @@ def at_times(samples: FloatArray, at: FloatArray) -> FloatArray:
 
 def later(samples: FloatArray, by: float) -> FloatArray:
     """Samples (n, k) by samples, whole or not: line by line of the spectrum, which keeps each line's size."""
-    line = straight(samples)
-    whole = odd_continued(samples - line)
+    line = end_to_end_line(samples)
+    whole = odd_extension(samples - line)
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(len(whole)) * by)
     moved = irfft(rfft(whole, axis=0) * turn[:, None], len(whole), axis=0)[: len(samples)]
     slope = (samples[-1] - samples[0]) / max(len(samples) - 1, 1)

@@ -7,7 +7,7 @@ import numpy as np
 from analysis.diagnosis.discovery.grammar import Columns
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
-from equalizer.laws.parse import MEMORY, parsed
+from equalizer.laws.parse import MEMORY, parse_formula
 from equalizer.laws.tree import Apply, Free, Node, Number, nodes
 from equalizer.signals.signal import FloatArray
 
@@ -20,7 +20,7 @@ _WHOLE: Mapping[str, Callable[..., FloatArray]] = {
 
 def along(shape: str, numbers: Sequence[float], columns: Columns, rate_hz: float) -> FloatArray:
     """(n,). Outside its domain NaN or inf."""
-    tree = parsed(shape, template=True)[0]
+    tree = parse_formula(shape, template=True)[0]
     with np.errstate(all="ignore"):
         if any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(tree)):
             return evaluate(Law(shape, tuple(numbers), (), "force", "x"), columns, rate_hz)

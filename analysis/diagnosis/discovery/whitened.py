@@ -23,7 +23,7 @@ from analysis.diagnosis.settings import LAW_BLOCKS, LAW_POWER_KEPT, SETTLED_CONS
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModelError
-from equalizer.signals.band_limited import low_pass
+from equalizer.signals.band_limited import low_pass_gain
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
@@ -168,7 +168,7 @@ def _seen(measure: ErrorMeasure, record: Observed, told: Evidence) -> Seen:
 def _through(measure: ErrorMeasure, told: Evidence, lines: FloatArray) -> ComplexArray:
     if isinstance(measure, PredictedForce):
         m = told.command.shape[1]
-        within = low_pass(lines, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
+        within = low_pass_gain(lines, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
         return np.asarray(-np.ones((len(lines), 1, 1)) * np.eye(m) * within / measure.unit[:, None], dtype=complex)
     seen = axis_transfer(told.model, told.sample_rate_hz, lines)
     c = len(measure.unit)

@@ -54,7 +54,8 @@ def _conditions(recordings: Recordings) -> tuple[Recordings, str]:
     names = listed([command.channels[k] for k in others])
     return (
         tuple(
-            replace(each, command=each.command.picked(kept), condition=_joined(each.condition, each.command, others),
+            replace(each, command=each.command.select_channels(kept),
+                    condition=_joined(each.condition, each.command, others),
                     excitation=None if each.excitation is None else _same(each.excitation, each.command, kept))
             for each in recordings
         ),
@@ -70,7 +71,7 @@ def _moving_commands(recordings: Recordings) -> tuple[Recordings, str]:
     kept = _lowest(command)
     if len(kept) == len(command.channels):
         return recordings, ""
-    return tuple(replace(each, command=each.command.picked(kept), excitation=None) for each in recordings), (
+    return tuple(replace(each, command=each.command.select_channels(kept), excitation=None) for each in recordings), (
         f"The imposed motion was taken from {listed([command.channels[k] for k in kept])} alone."
     )
 
@@ -83,7 +84,7 @@ def _moving_responses(recordings: Recordings) -> tuple[Recordings, str]:
         return recordings, ""
     kept = _lowest(response)
     left = [name for k, name in enumerate(response.channels) if k not in kept]
-    return tuple(replace(each, response=each.response.picked(kept)) for each in recordings), (
+    return tuple(replace(each, response=each.response.select_channels(kept)) for each in recordings), (
         f"Forces are balanced along {listed([response.channels[k] for k in kept])}; {listed(left)}, of another kind, "
         "was left out."
     )
@@ -103,7 +104,7 @@ def _pushing_responses(recordings: Recordings) -> tuple[Recordings, str]:
     )
     kept = sorted(np.argsort(-sizes, kind="stable")[:count].tolist())
     left = [name for k, name in enumerate(response.channels) if k not in kept]
-    return tuple(replace(each, response=each.response.picked(kept)) for each in recordings), (
+    return tuple(replace(each, response=each.response.select_channels(kept)) for each in recordings), (
         f"Of the forces along one motion the strongest, {listed([response.channels[k] for k in kept])}, was balanced; "
         f"for {listed(left)}, import the recording with that force as its only response."
     )
@@ -136,10 +137,10 @@ def _with_axes(recording: Recording, kept: list[int], paired: bool) -> Recording
     alike = position is not None and len(position.channels) == len(recording.response.channels)
     return replace(
         recording,
-        command=command.picked(kept),
+        command=command.select_channels(kept),
         excitation=None if excitation is None else _same(excitation, command, kept),
-        response=recording.response.picked(kept) if paired else recording.response,
-        position=position.picked(kept) if paired and alike and position is not None else position,
+        response=recording.response.select_channels(kept) if paired else recording.response,
+        position=position.select_channels(kept) if paired and alike and position is not None else position,
     )
 
 
@@ -160,8 +161,11 @@ def _summed(recordings: Recordings) -> tuple[Recordings, str]:
     others = [name for k, name in enumerate(command.channels) if k != main]
     return (
         tuple(
-            replace(each, command=replace(each.command.picked([main]), samples=each.command.samples @ gains[:, None]),
-                    excitation=None)
+            replace(
+                each,
+                command=replace(each.command.select_channels([main]), samples=each.command.samples @ gains[:, None]),
+                excitation=None,
+            )
             for each in recordings
         ),
         f"{listed(others)} {_verb(others, 'drives')} the same motion as {command.channels[main]}: one command was made "
@@ -199,11 +203,11 @@ def _lowest(signal: Signal) -> list[int]:
 
 
 def _same(excitation: Signal, command: Signal, kept: Sequence[int]) -> Signal | None:
-    return excitation.picked(kept) if len(excitation.channels) == len(command.channels) else None
+    return excitation.select_channels(kept) if len(excitation.channels) == len(command.channels) else None
 
 
 def _joined(condition: Signal | None, command: Signal, places: Sequence[int]) -> Signal:
-    more = command.picked(places)
+    more = command.select_channels(places)
     if condition is None:
         return more
     return Signal(

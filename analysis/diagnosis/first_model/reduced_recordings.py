@@ -99,4 +99,4 @@ def _driven(
             samples[start:stop] = regression.motions[number].position
         units = tuple(system_of(recording.command.units, (unit,)).length for unit in units)
         quantities = tuple("angle" if unit == "rad" else "position" for unit in units)
-    return replace(measured, samples=samples, quantity=quantities, unit=units).picked(places), order == 2
+    return replace(measured, samples=samples, quantity=quantities, unit=units).select_channels(places), order == 2

@@ -14,7 +14,7 @@ from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from equalizer.effects.simulation.along_motion import entered_force
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.band_limited import band_limited, low_pass
+from equalizer.signals.band_limited import filter_low_pass, low_pass_gain
 from equalizer.signals.signal import FloatArray, Signal
 
 KNOWN = 0.01
@@ -90,7 +90,7 @@ def _middle_hz(force: FloatArray, rate_hz: float) -> float:
 def _view(record: Observed, force: FloatArray, band_hz: float) -> Observed:
     recording = record.recording
     rate_hz, command = recording.sample_rate_hz, recording.command
-    within = band_limited(force, rate_hz, band_hz, late_s=0.5 / rate_hz)
+    within = filter_low_pass(force, rate_hz, band_hz, late_s=0.5 / rate_hz)
     signal = Signal(within, rate_hz, command.quantity, command.unit, command.channels)
     view = replace(recording, response=signal, position=None)
     edge = min(edge_samples(rate_hz, band_hz), len(within) // 8)
@@ -103,7 +103,7 @@ def _view(record: Observed, force: FloatArray, band_hz: float) -> Observed:
 
 def _floor(model: MechanicalModel, motion: MeasuredMotion, floor: NoiseFloor, band_hz: float) -> NoiseFloor:
     frequency_hz, m = floor.frequency_hz, model.inputs
-    within = low_pass(frequency_hz, band_hz)[:, None, None]
+    within = low_pass_gain(frequency_hz, band_hz)[:, None, None]
     gain = np.abs(within * inverse_lines(model, np.maximum(frequency_hz, 1e-3))[:, :m]) ** 2
     guessed = (UNKNOWN * np.std(motion.position, axis=0)) ** 2
     density = np.einsum("lij,lj->li", gain, np.where(np.isfinite(motion.noise), motion.noise, guessed))

@@ -7,7 +7,7 @@ import numpy as np
 from analysis.diagnosis.forces.inverse_lines import inverse_lines, inverse_of
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.band_limited import low_pass, straight, through
+from equalizer.signals.band_limited import end_to_end_line, filter_by_gain, low_pass_gain
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
@@ -45,12 +45,12 @@ def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> 
         wave = 2j * np.pi * frequency_hz
         mean = np.sinc(frequency_hz / sample_rate_hz)
         rows = [shape * wave**order for shape in (1.0, mean) for order in range(3)]
-        within = low_pass(frequency_hz, band_hz) * np.array(rows)
+        within = low_pass_gain(frequency_hz, band_hz) * np.array(rows)
         return np.asarray(np.einsum("rl,ij->lrij", within, np.eye(m)).reshape(len(frequency_hz), 6 * m, m))
 
-    found = through(position, sample_rate_hz, gain).reshape(len(position), 6, m)
+    found = filter_by_gain(position, sample_rate_hz, gain).reshape(len(position), 6, m)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
-    found[:, [0, 3]] += straight(position)[:, None]
+    found[:, [0, 3]] += end_to_end_line(position)[:, None]
     found[:, [1, 4]] += slope
     x, v, a, mean_x, mean_v, mean_a = (np.ascontiguousarray(found[:, k]) for k in range(6))
     return BandMotion(position, sample_rate_hz, band_hz, (x, v, a), (mean_x, mean_v, mean_a))
@@ -65,14 +65,14 @@ def needed_force(model: MechanicalModel, motion: BandMotion) -> NeededForce:
     m, learned = model.inputs, inverse_of(model, len(position), sample_rate_hz / 2)
 
     def gain(frequency_hz: FloatArray) -> ComplexArray:
-        within = low_pass(frequency_hz, motion.band_hz)[:, None, None]
+        within = low_pass_gain(frequency_hz, motion.band_hz)[:, None, None]
         inverse = learned(frequency_hz)
         inverse[:, :m] *= np.sinc(frequency_hz / sample_rate_hz)[:, None, None]
         wave = 2j * np.pi * frequency_hz[:, None, None]
         axes = inverse[:, m:]
         return np.asarray(within * np.concatenate([inverse[:, :m], axes, wave * axes, wave**2 * axes], axis=1))
 
-    found = through(position, sample_rate_hz, gain) + _along_line(model, position, sample_rate_hz)
+    found = filter_by_gain(position, sample_rate_hz, gain) + _along_line(model, position, sample_rate_hz)
     return NeededForce(*(found[:, part * m : (part + 1) * m] for part in range(4)))
 
 
@@ -92,7 +92,7 @@ def _of_seen_bodies(model: MechanicalModel, motion: BandMotion) -> NeededForce:
 def _along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
     """(n, 4 m): of the straight line between the first and the last position, after which all has settled."""
     m = model.inputs
-    line = straight(position)
+    line = end_to_end_line(position)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
     still = inverse_lines(model, np.array([0.0, _NEARLY_STILL_HZ]))
     static, rate = still[0].real, still[1].imag / (2 * np.pi * _NEARLY_STILL_HZ)

@@ -14,7 +14,7 @@ from equalizer.effects.simulation.along_motion import entered_force, force_along
 from equalizer.effects.simulation.bodies import bodies_of
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.band_limited import band_limited
+from equalizer.signals.band_limited import filter_low_pass
 from equalizer.signals.signal import FloatArray
 
 EDGE = 0.5
@@ -101,7 +101,7 @@ class PredictedForce:
         # Both are means over the step that begins at a sample; the needed force is that around it.
         total = entered.around
         if added.any():
-            total = total + band_limited(added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
+            total = total + filter_low_pass(added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
         # A weaker actuator must not make every error smaller.
         strength = _rms(record.command)
         weaker = strength / np.maximum(_rms(entered.force), WEAKEST * strength + np.finfo(float).tiny)
@@ -114,8 +114,8 @@ class PredictedForce:
 
         def found() -> _Entered:
             force = entered_force(model, record.command, rate_hz, changed, hold)
-            late = band_limited(force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
-            return _Entered(force, band_limited(force, rate_hz, self.band_hz), late)
+            late = filter_low_pass(force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
+            return _Entered(force, filter_low_pass(force, rate_hz, self.band_hz), late)
 
         return found() if changed else self._same("entered", number, (model.actuator, record.command), found)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.excitation import faded, log_sweep, sine
+from equalizer.signals.excitation import apply_fades, log_sweep, sine
 from equalizer.signals.signal import FloatArray
 
 SLOWEST_HZ, SLOWEST_SHARE = 1.0, 0.1
@@ -47,7 +47,7 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
     added = ADDED_SHARE * _grounded_mass(model)
 
     def along(wave: FloatArray) -> FloatArray:
-        return np.outer(faded(wave, fade, fade), np.arange(model.inputs) == axis)
+        return np.outer(apply_fades(wave, fade, fade), np.arange(model.inputs) == axis)
 
     def swept(of: float, to_hz: float = usual_hz, times: float = 1.0) -> FloatArray:
         return along(log_sweep(slowest_hz, to_hz, of, int(times * length_s * sample_rate_hz), sample_rate_hz))

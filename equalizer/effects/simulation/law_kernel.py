@@ -24,7 +24,7 @@ from equalizer.effects.simulation.instant import (
     TIME_S,
 )
 from equalizer.effects.simulation.mechanism_kernel import compiled_law
-from equalizer.laws.kernel import BEGUN, END, START, keep, run
+from equalizer.laws.kernel import BEGUN, END, START, commit_step, run
 from equalizer.laws.program import DEEPEST
 from equalizer.signals.signal import FloatArray
 
@@ -98,5 +98,5 @@ def law_force(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
             high, high_off = force, off
     # What sticks is held by a force between those of both ways.
     at[F_END] = _value(of, memory, at, END, force, 1.0) if heavy else (force - (1 - late) * start) / late
-    keep(of[PROGRAM:], kept, at[TIME_S] + at[STEP_S])
+    commit_step(of[PROGRAM:], kept, at[TIME_S] + at[STEP_S])
     return float(force)

@@ -8,7 +8,7 @@ import numpy as np
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
 from equalizer.laws.parse import MEMORY
-from equalizer.laws.tree import Apply, Node, Number, Variable, nodes, written
+from equalizer.laws.tree import Apply, Node, Number, Variable, format_formula, nodes
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.compensation.known_forces import Law as ForceAgainst
 from equalizer.tracking.feedforward.planned_motion import PlannedMotion
@@ -87,7 +87,7 @@ def undone(law: Law, meant: FloatArray) -> FloatArray:
 def _smooth(law: Law, slip: float) -> Law:
     """Signs of a velocity change over `slip` on either side, as friction's does."""
     tree = _smoothed(law.tree, slip)
-    return Law(written(tree, None, None), law.numbers, law.units, law.acts_on, law.axis)
+    return Law(format_formula(tree, None, None), law.numbers, law.units, law.acts_on, law.axis)
 
 
 def _smoothed(node: Node, slip: float) -> Node:

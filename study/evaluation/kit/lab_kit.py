@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.evaluation.proof.lab_kit import CHANGES, CHANGES_BY_NAME, NOTHING, Label
-from equalizer.plant.mechanical_model import nearest
+from equalizer.plant.mechanical_model import suggest_word
 from study.errors import StudyError
 from study.store.disk.csv_rows import CsvError, rows_from_csv, rows_to_csv
 from study.store.disk.file_errors import UnusableFileError
@@ -37,7 +37,8 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     except CsvError as error:
         raise UnusableFileError(path, "table of labels", error.problems, CORRECT) from error
     problems = [
-        f"{label.recording}: '{label.change}' is no change of the kit{nearest(label.change, tuple(CHANGES_BY_NAME))}"
+        f"{label.recording}: '{label.change}' is no change of the kit"
+        f"{suggest_word(label.change, tuple(CHANGES_BY_NAME))}"
         for label in labels
         if label.change not in CHANGES_BY_NAME
     ]

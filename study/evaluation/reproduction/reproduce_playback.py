@@ -12,7 +12,7 @@ from analysis.evaluation.reproduction.played_response import (
     delivered_over_wanted,
     wanted_wave,
 )
-from equalizer.signals.excitation import faded
+from equalizer.signals.excitation import apply_fades
 from equalizer.signals.signal import FloatArray, Signal
 from study.devices.clock import VirtualClock
 from study.devices.device import Device, DeviceSettings
@@ -97,7 +97,7 @@ def _play_axes(plan: ReproductionPlan, playing: Playing, device: Device, peak_n:
 def _steady(device: Device, loop: FloatArray) -> tuple[FloatArray, int]:
     """The last period of the handle's true acceleration, (period, 3), and the ticks at which a cap cut in."""
     rate_hz = device.info.sample_rate_hz
-    forces = faded(np.tile(loop, (PERIODS, 1)), round(FADE_S * rate_hz), 0)
+    forces = apply_fades(np.tile(loop, (PERIODS, 1)), round(FADE_S * rate_hz), 0)
     played = device.play(Signal(forces, rate_hz, "force", "N", ("fx", "fy", "fz")))
     if played.truth is None or played.recording is None:
         raise StudyError(

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equalizer.signals.excitation import faded, log_sweep, sine
+from equalizer.signals.excitation import apply_fades, log_sweep, sine
 from equalizer.signals.multisine import lines_between, multisines
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray, Signal
@@ -76,7 +76,7 @@ def _sine_piece(
     counted = max(1, round(segment.duration_s * rate_hz) // period) * period
     wave = sine(frequency_hz, segment.amplitude_n, settle + counted + fade, rate_hz)
     vector = unit_vector(protocol.directions, segment.along)
-    commands, shift = _with_rests(protocol, faded(wave, fade, fade)[:, None] * vector, rate_hz)
+    commands, shift = _with_rests(protocol, apply_fades(wave, fade, fade)[:, None] * vector, rate_hz)
     start = shift + settle
     return Piece(
         commands=commands,
@@ -94,7 +94,7 @@ def _sweep_piece(protocol: RecordingProtocol, number: int, segment: SweepSegment
     wave = np.tile(log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period, rate_hz), segment.periods)
     vector = unit_vector(protocol.directions, segment.along)
     fade_in = round(protocol.fade_s * rate_hz) if segment.periods > 1 else 0
-    commands, start = _with_rests(protocol, faded(wave, min(fade_in, period), 0)[:, None] * vector, rate_hz)
+    commands, start = _with_rests(protocol, apply_fades(wave, min(fade_in, period), 0)[:, None] * vector, rate_hz)
     return Piece(
         commands=commands,
         segment=Segment(start, start + len(wave), "sweep", segment.amplitude_n, period, segment.role),
@@ -118,7 +118,7 @@ def _multisine_pieces(
     found = []
     for realisation, tile in enumerate(tiles, start=1):
         wave = tile[np.arange(-fade, segment.periods * period + fade) % period]
-        forces = faded(wave if vector is None else wave * vector, fade, fade)
+        forces = apply_fades(wave if vector is None else wave * vector, fade, fade)
         commands, shift = _with_rests(protocol, forces, rate_hz)
         start, stop = shift + fade, shift + fade + segment.periods * period
         found.append(

@@ -18,7 +18,7 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
-from equalizer.plant.mechanical_model import MechanicalModel, nearest
+from equalizer.plant.mechanical_model import MechanicalModel, suggest_word
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.store.disk.new_folder import new_folder, require_new_folder
@@ -201,7 +201,7 @@ def check_names(without: Sequence[str]) -> None:
         if name not in EFFECTS_BY_NAME:
             raise WrongUseError(
                 f"There is no effect '{name}' to do without",
-                f"The catalogue does not know it{nearest(name, tuple(EFFECTS_BY_NAME))}.",
+                f"The catalogue does not know it{suggest_word(name, tuple(EFFECTS_BY_NAME))}.",
                 f"Its names are {', '.join(EFFECTS_BY_NAME)}.",
                 saved="Nothing was written.",
             )

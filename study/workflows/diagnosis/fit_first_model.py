@@ -10,7 +10,7 @@ from analysis.diagnosis.first_model.choose_structure import Choice, first_struct
 from analysis.diagnosis.first_model.model_structures import KINDS, Kind, Number, StructureRefused
 from analysis.diagnosis.result.unit_doubt import constant_sentence
 from analysis.wording import typeset
-from equalizer.plant.mechanical_model import nearest
+from equalizer.plant.mechanical_model import suggest_word
 from study.errors import StudyError, WrongUseError
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.mechanical_model_file import write_mechanical_model
@@ -118,7 +118,7 @@ def _wanted(structure: str) -> Kind | None:
             return kind
     raise WrongUseError(
         f"There is no structure '{structure}'",
-        f"A first model has none of that name{nearest(structure, KINDS)}.",
+        f"A first model has none of that name{suggest_word(structure, KINDS)}.",
         f"Its names are auto, {', '.join(KINDS)}.",
         saved="Nothing was written.",
     )

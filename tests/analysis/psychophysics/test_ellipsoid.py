@@ -119,7 +119,7 @@ def test_gravity_and_offset_are_no_motion():
 def test_a_turned_sensor_is_turned_back():
     recording = recorded([tone([1.0, 0.3, 0.1j], 25.0)], [25.0])
     sensor_to_device = direction_frame(np.array([0.36, 0.48, 0.8]))
-    turned = replace(recording, response=recording.response.rotated(sensor_to_device.T))
+    turned = replace(recording, response=recording.response.rotate(sensor_to_device.T))
     (expected,), (result,) = ellipsoids(recording), ellipsoids(turned, sensor_to_device)
     assert result.phasor.semi_axes_mps2 == pytest.approx(expected.phasor.semi_axes_mps2)
     assert result.phasor.tilt_deg == pytest.approx(expected.phasor.tilt_deg)

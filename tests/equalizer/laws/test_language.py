@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law, law_of
-from equalizer.laws.parse import LawError, parsed
-from equalizer.laws.tree import Apply, Free, Node, Number, Variable, written
+from equalizer.laws.parse import LawError, parse_formula
+from equalizer.laws.tree import Apply, Free, Node, Number, Variable, format_formula
 
 
 def test_numbers_with_a_point_are_free_and_whole_ones_are_form():
@@ -74,7 +74,7 @@ def law_with(tree: Node, numbers: list[float]) -> Law:
     """With every number used, whatever the tree has."""
     for place in range(3):
         tree = Apply("+", (tree, Apply("*", (Number(0.0), Free(place)))))
-    return Law(written(tree), tuple(numbers), (), "force", "x")
+    return Law(format_formula(tree), tuple(numbers), (), "force", "x")
 
 
 @given(TREES, NUMBERS)
@@ -91,8 +91,8 @@ def test_random_formulas_give_what_numpy_gives(tree: Node, numbers: list[float])
 @given(TREES, NUMBERS)
 @settings(max_examples=150, deadline=None)
 def test_a_formula_is_read_as_it_was_written(tree: Node, numbers: list[float]):
-    again, _ = parsed(written(tree), template=True)
-    assert written(again) == written(tree)
+    again, _ = parse_formula(format_formula(tree), template=True)
+    assert format_formula(again) == format_formula(tree)
     with np.errstate(all="ignore"):
         expected, found = by_numpy(tree, numbers), by_numpy(again, numbers)
     assert np.array_equal(found, expected, equal_nan=True)

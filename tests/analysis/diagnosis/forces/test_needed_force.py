@@ -9,7 +9,7 @@ from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.along_motion import force_along
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.band_limited import band_limited
+from equalizer.signals.band_limited import filter_low_pass
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -43,19 +43,19 @@ def test_bodies_that_are_not_measured_are_moved_along() -> None:
         "two", "position", np.diag([2.0, 0.5]), np.diag([5.0, 8.0]), [[900.0, -600.0], [-600.0, 600.0]],
         [[1.0], [0.0]], [[1.0, 0.0]],
     )  # fmt: skip
-    force = band_limited(np.random.default_rng(1).standard_normal((4000, 1)), RATE_HZ, 10.0)
+    force = filter_low_pass(np.random.default_rng(1).standard_normal((4000, 1)), RATE_HZ, 10.0)
     force *= np.clip(np.minimum(TIME_S, TIME_S[::-1]) / 0.5, 0, 1)[:, None]
     moved = simulate_mechanism(two, force, RATE_HZ).response
     needed = needed_force(two, band_motion(moved, RATE_HZ, 60.0)).force
-    entered = band_limited(force, RATE_HZ, 60.0, late_s=0.5 / RATE_HZ)
+    entered = filter_low_pass(force, RATE_HZ, 60.0, late_s=0.5 / RATE_HZ)
     assert np.std((needed - entered)[300:-600]) < 0.01 * np.std(entered)
 
 
 def test_a_band_limited_signal_keeps_its_place_and_comes_late_when_asked() -> None:
     slow, fast = np.sin(2 * np.pi * 3 * TIME_S), np.sin(2 * np.pi * 200 * TIME_S)
     inside = slice(300, -300)
-    assert np.allclose(band_limited((slow + fast)[:, None], RATE_HZ, 30.0)[inside, 0], slow[inside], atol=2e-3)
-    late = band_limited(slow[:, None], RATE_HZ, 30.0, late_s=0.01)
+    assert np.allclose(filter_low_pass((slow + fast)[:, None], RATE_HZ, 30.0)[inside, 0], slow[inside], atol=2e-3)
+    late = filter_low_pass(slow[:, None], RATE_HZ, 30.0, late_s=0.01)
     assert np.allclose(late[inside, 0], np.sin(2 * np.pi * 3 * (TIME_S - 0.01))[inside], atol=2e-3)
 
 

@@ -61,7 +61,7 @@ def test_no_unit_holds_a_second(first):
     assert [matrix_unit(part, system) for part in ("mass", "damping", "stiffness")] == [
         "N sample^2/m", "N sample/m", "N/m",
     ]  # fmt: skip
-    assert (system.of("m/s"), system.of("s"), system.of("Hz")) == ("m/sample", "sample", "1/sample")
+    assert (system.express("m/s"), system.express("s"), system.express("Hz")) == ("m/sample", "sample", "1/sample")
 
 
 def test_no_place_is_said_in_hertz(first):
