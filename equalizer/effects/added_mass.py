@@ -1,4 +1,4 @@
-"""A mass at the handle that the model does not know of."""
+"""Added mass: a mass at the handle that the model lacks."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from equalizer.effects.effect import ALL_SITES, Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import Beside, moving, own
+from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, value_along
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -23,10 +23,11 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     sites = range(evidence.model.inputs) if axis == ALL_SITES else (axis,)
     found = []
     for site in sites:
-        of = moving(evidence, site)
-        beside = Beside(of.force, np.column_stack([of.position, of.velocity, np.ones_like(of.force)]))
-        found.append(float(beside.fit(-of.acceleration).strengths[0]))
-    known = min(own(evidence.model.mass, driven_axes(evidence.model)[:, site]) for site in sites)
+        motion = axis_motion(evidence, site)
+        nuisances = np.column_stack([motion.position, motion.velocity, np.ones_like(motion.force)])
+        beside = PartialRegression(motion.force, nuisances)
+        found.append(float(beside.fit(-motion.acceleration).strengths[0]))
+    known = min(value_along(evidence.model.mass, driven_axes(evidence.model)[:, site]) for site in sites)
     guesses = (float(np.median(found)), _GUESS * known)
     return tuple({"mass": guess} for guess in guesses if guess > 0)
 

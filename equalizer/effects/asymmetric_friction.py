@@ -1,22 +1,22 @@
-"""Dry friction that is stronger one way than the other."""
+"""Asymmetric Coulomb friction: dry friction that is stronger in one direction than in the other."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.simulation.dry_friction_kernel import rubbing
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.dry_friction_kernel import friction_force
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import beside_linear, sliding
+from equalizer.effects.starts.starting_values import regress_beside_linear, sliding_motion
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _GUESS = 1.3
-"""How many times stronger one way, where the data do not say."""
+"""Ratio of the two levels to start from, where the data do not tell it."""
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    return float(rubbing(of[0], of[1], memory[0], memory, at))
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    return float(friction_force(numbers[0], numbers[1], memory[0], memory, at))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
@@ -24,10 +24,10 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = sliding(evidence, axis)
-    forward = np.asarray(of.velocity > 0, dtype=np.float64)
+    motion = sliding_motion(evidence, axis)
+    forward = np.asarray(motion.velocity > 0, dtype=np.float64)
     # A constant beside them would be the asymmetry itself.
-    positive, negative = beside_linear(of, constant=False).fit(-forward, 1 - forward).strengths.tolist()
+    positive, negative = regress_beside_linear(motion, constant=False).fit(-forward, 1 - forward).strengths.tolist()
     mean = (positive + negative) / 2
     if mean <= 0:
         return ()

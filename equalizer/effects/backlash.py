@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values
-from equalizer.effects.simulation.bodies import bodies_of, moved
-from equalizer.effects.simulation.command_path import Driven
+from equalizer.effects.simulation.bodies import bodies_of, simulate_bodies
+from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.instant import F_END, STEP_S, X_FREE, X_PER_N, X
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import own
+from equalizer.effects.starts.starting_values import value_along
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -19,15 +19,17 @@ from equalizer.signals.spectral_density import spectral_density
 STEPS = 20
 """Per sample: a contact lasts a millisecond."""
 MOTOR_SHARE, CONTACT_HZ, CONTACT_RATIO = 0.3, 300.0, 0.03
-"""Of the moving mass; of the motor on the contact; its damping ratio. They stand for what a file leaves out."""
+"""Defaults for what a file leaves out: the motor's share of the moving mass; natural frequency of the motor on its
+contact; damping ratio of that contact."""
 GAPS, TRIED_S, BAND_S = np.geomspace(0.02, 3.0, 14), 2.0, 0.128
-"""Tried, over the way that the motor would go alone; on how much of the record; per window of a spectrum."""
+"""Gaps that are tried, relative to the travel of the motor alone; seconds of the record that are simulated; length of a
+spectrum's window in seconds."""
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Spring and damper of the contact, between their force at the step's start and end; it pushes apart only."""
-    half, stiffness, rate = 0.5 * of[0], of[1], of[2] / at[STEP_S]
+    half, stiffness, rate = 0.5 * numbers[0], numbers[1], numbers[2] / at[STEP_S]
     for way in (1.0, -1.0):
         start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
         if start <= 0 and end <= 0:
@@ -46,9 +48,9 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     return 0.0
 
 
-def _motor(model: MechanicalModel, axis: int, values: Values) -> tuple[float, float, float]:
+def _motor_and_contact(model: MechanicalModel, axis: int, values: Values) -> tuple[float, float, float]:
     """Its mass, and the contact's stiffness and damping."""
-    known = own(model.mass, driven_axes(model)[:, axis])
+    known = value_along(model.mass, driven_axes(model)[:, axis])
     mass = min(values.get("motor_mass", MOTOR_SHARE * known), 0.9 * known)
     stiffness = values.get("contact_stiffness", mass * (2 * np.pi * CONTACT_HZ) ** 2)
     return mass, stiffness, values.get("contact_damping", 2 * CONTACT_RATIO * float(np.sqrt(stiffness * mass)))
@@ -58,7 +60,7 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[Mechanic
     along = driven_axes(model)[:, axis]
     if values["gap"] <= 0:
         return model, np.zeros_like(along)
-    motor = _motor(model, axis, values)[0]
+    motor = _motor_and_contact(model, axis, values)[0]
     mass = np.pad(model.mass - motor * np.outer(along, along), ((0, 1), (0, 1)))
     mass[-1, -1] = motor
     force = np.pad(model.input, ((0, 1), (0, 0)))
@@ -76,30 +78,30 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[Mechanic
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["gap"], *_motor(model, axis, values)[1:]])
+    return np.array([values["gap"], *_motor_and_contact(model, axis, values)[1:]])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """No waveform of impacts can be predicted; their spectrum can."""
-    motor, stiffness, damping = _motor(evidence.model, axis, {})
+    """Gaps whose simulated impacts match the residual's spectrum best: the waveform of impacts cannot be predicted."""
+    motor, stiffness, damping = _motor_and_contact(evidence.model, axis, {})
     rest = {"motor_mass": motor, "contact_stiffness": stiffness, "contact_damping": damping}
-    kept = _parts(evidence, axis)
+    kept = _weakest_and_strongest_part(evidence, axis)
     alone = float(np.std(evidence.command[kept[-1], axis])) / motor / (2 * np.pi * 10.0) ** 2
     floor = evidence.noise**2 / (0.5 * evidence.sample_rate_hz)
     left = [_spectrum(evidence, (evidence.response - evidence.predicted)[part]) for part in kept]
-    linear = [_played(evidence, axis, None, part) for part in kept]
+    linear = [_simulate_part(evidence, axis, None, part) for part in kept]
     tried = []
     for gap in (GAPS * alone).tolist():
         off = 0.0
         for part, missed, smooth in zip(kept, left, linear, strict=True):
-            rattled = _spectrum(evidence, _played(evidence, axis, {"gap": gap, **rest}, part) - smooth)
+            rattled = _spectrum(evidence, _simulate_part(evidence, axis, {"gap": gap, **rest}, part) - smooth)
             off += float(np.mean(np.log((rattled + floor) / (missed + 0.1 * floor)) ** 2))
         tried.append((off, gap))
     return tuple({"gap": gap, **rest} for _, gap in sorted(tried)[:2] if gap > 0)
 
 
-def _parts(evidence: Evidence, axis: int) -> list[slice]:
-    """Where the axis is driven gently, and where most strongly."""
+def _weakest_and_strongest_part(evidence: Evidence, axis: int) -> list[slice]:
+    """The excerpt in which the axis is driven most weakly, and that in which it is driven most strongly."""
     length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
     power = np.cumsum(np.append(0.0, evidence.command[:, axis] ** 2 * evidence.used))
     firsts = np.arange(0, len(evidence.command) - length + 1, max(length // 4, 1))
@@ -108,12 +110,12 @@ def _parts(evidence: Evidence, axis: int) -> list[slice]:
     return [slice(int(first), int(first) + length) for first in (firsts[np.argmin(gentle)], firsts[np.argmax(inside)])]
 
 
-def _played(evidence: Evidence, axis: int, values: Values | None, kept: slice) -> FloatArray:
+def _simulate_part(evidence: Evidence, axis: int, values: Values | None, kept: slice) -> FloatArray:
     placed = () if values is None else (PlacedEffect(EFFECT, (axis,), values),)
     bodies = bodies_of(evidence.model, placed)
     commands = evidence.command[kept]
-    looked, _ = moved(
-        bodies, Driven(commands, commands), (kept.stop - kept.start, STEPS), 1 / evidence.sample_rate_hz / STEPS
+    looked, _ = simulate_bodies(
+        bodies, ActuatorForce(commands, commands), (kept.stop - kept.start, STEPS), 1 / evidence.sample_rate_hz / STEPS
     )
     ports, p = bodies.ports.shape[1], evidence.model.outputs
     return looked[:, 3 * ports : 3 * ports + p]

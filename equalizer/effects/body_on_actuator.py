@@ -1,9 +1,9 @@
-"""A body that an actuator shakes through something soft: a finger, a case, a wrist."""
+"""A well-damped oscillator on the actuator: a body on something soft, such as a finger, a case or a wrist."""
 
 import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
-from equalizer.effects.starts.attached_oscillator import hung, missing_mass, with_oscillator
+from equalizer.effects.starts.attached_oscillator import likely_oscillators, missing_mass, with_oscillator
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -21,7 +21,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     seen = missing_mass(evidence, axis)
     natural = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()
     starts = []
-    for each in hung(seen, axis, natural, RATIOS)[:2]:
+    for each in likely_oscillators(seen, axis, natural, RATIOS)[:2]:
         wave = 2 * np.pi * each.natural_hz
         damping, stiffness = 2 * each.damping_ratio * each.mass * wave, each.mass * wave**2
         starts.append({"mass": each.mass, "damping": damping, "stiffness": stiffness})

@@ -1,4 +1,4 @@
-"""Two clocks of unlike speed: one sends commands, the other samples what comes of them."""
+"""Clock drift: commands are sent and responses sampled by two clocks of different rate."""
 
 import numpy as np
 
@@ -10,26 +10,28 @@ from equalizer.signals.signal import FloatArray
 
 WINDOW_S, LEAST_WINDOWS = 2.0, 4
 LONGEST_S = 0.1
-"""By which a window may be off."""
+"""Largest lateness of a window that is searched for."""
 LARGEST_PPM = 2e4
 LEAST_SIGMA = 5.0
 
 
-def _read(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
-    return read_other_times(response, 1 + 1e-6 * of["ppm"], 0.0, of.get("interpolated", 0.0))
+def _read_drifting(
+    response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
+) -> FloatArray:
+    return read_other_times(response, 1 + 1e-6 * values["ppm"], 0.0, values.get("interpolated", 0.0))
 
 
-def _read_position(position: FloatArray, sample_rate_hz: float, of: Values) -> FloatArray:
-    return _read(position, sample_rate_hz, (), of) if of.get("with_position", 1.0) > 0.5 else position
+def _read_position(position: FloatArray, sample_rate_hz: float, values: Values) -> FloatArray:
+    return _read_drifting(position, sample_rate_hz, (), values) if values.get("with_position", 1.0) > 0.5 else position
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """The slope of how late the response comes, window by window. A straight line between samples loses height where
-    a real clock does not: both are tried."""
+    """The slope of the response's lateness over time, window by window. Linear interpolation lowers peaks, as a real
+    clock does not: both kinds are tried."""
     slope = _lateness_per_second(evidence) if channel <= 0 else None
     if slope is None:
         return ()
-    with_position = _with_position(evidence, slope)
+    with_position = _position_drifts_along(evidence, slope)
     starts = [
         {"ppm": -1e6 * slope, "interpolated": straight, "with_position": with_position} for straight in (0.0, 1.0)
     ]
@@ -37,29 +39,29 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 
 def _misfit(evidence: Evidence, values: Values) -> float:
-    read = _read(evidence.predicted, evidence.sample_rate_hz, (), values)
+    read = _read_drifting(evidence.predicted, evidence.sample_rate_hz, (), values)
     return float(np.sum((((evidence.response - read) / evidence.noise) ** 2)[evidence.used > 0]))
 
 
-def _with_position(evidence: Evidence, slope: float) -> float:
+def _position_drifts_along(evidence: Evidence, slope: float) -> float:
     """1 where the measured position drifts along, 0 where the commands' clock reads it."""
     if evidence.position is None or evidence.predicted_position is None or evidence.position_noise is None:
         return 1.0
     noise = evidence.position_noise
-    own = _slope(evidence, evidence.position / noise, evidence.predicted_position / noise)
+    own = _lateness_slope(evidence, evidence.position / noise, evidence.predicted_position / noise)
     return 1.0 if own is None or abs(own[0] - slope) < abs(own[0]) else 0.0
 
 
 def _lateness_per_second(evidence: Evidence) -> float | None:
-    found = _slope(evidence, evidence.response / evidence.noise, evidence.predicted / evidence.noise)
+    found = _lateness_slope(evidence, evidence.response / evidence.noise, evidence.predicted / evidence.noise)
     if found is None:
         return None
     slope, error = found
     return slope if abs(slope) > LEAST_SIGMA * error and abs(slope) < 1e-6 * LARGEST_PPM else None
 
 
-def _slope(evidence: Evidence, measured: FloatArray, predicted: FloatArray) -> tuple[float, float] | None:
-    """By which the lateness grows with time, and its standard error."""
+def _lateness_slope(evidence: Evidence, measured: FloatArray, predicted: FloatArray) -> tuple[float, float] | None:
+    """Slope of the lateness over time (Theil-Sen), and its standard error; None where too few windows tell it."""
     rate = evidence.sample_rate_hz
     length = int(WINDOW_S * rate)
     if LONGEST_S * rate < 1:
@@ -92,7 +94,7 @@ EFFECT = Effect(
         Parameter("interpolated", 0.0, 1.0, none=None, scale="linear", step=0.05),
         Parameter("with_position", 0.0, 1.0, none=None, scale="linear", step=1.0, fixed=True),
     ),
-    acts=OnResponse(_read, stage=4, shared=True, on_position=_read_position),
+    acts=OnResponse(_read_drifting, stage=4, shared=True, on_position=_read_position),
     starts=_starts,
     of_time=True,
     sites=("all",),

@@ -1,29 +1,29 @@
-"""A force that repeats along the way: magnets over iron, teeth, the lay of a cable."""
+"""Cogging: a force that is periodic in position, as of magnets over iron, teeth, or the lay of a cable."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import Beside, Moving, beside_linear, moving
+from equalizer.effects.starts.starting_values import AxisMotion, PartialRegression, axis_motion, regress_beside_linear
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 CELLS = 4096
-"""Of the travelled way."""
+"""Histogram cells over the travel."""
 PITCHES = 3
-"""Tried, the strongest first."""
+"""How many pitches are tried, the strongest first."""
 _FINER = 8
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The mean of the force at the step's start and end, where the position at its end depends on it."""
-    start, force = np.sin(of[1] * at[X] + of[2]), 0.0
+    start, force = np.sin(numbers[1] * at[X] + numbers[2]), 0.0
     for _ in range(4):
-        force = 0.5 * of[0] * (start + np.sin(of[1] * (at[X_FREE] + at[X_PER_N] * force) + of[2]))
-    at[F_END] = of[0] * np.sin(of[1] * (at[X_FREE] + at[X_PER_N] * force) + of[2])
+        force = 0.5 * numbers[0] * (start + np.sin(numbers[1] * (at[X_FREE] + at[X_PER_N] * force) + numbers[2]))
+    at[F_END] = numbers[0] * np.sin(numbers[1] * (at[X_FREE] + at[X_PER_N] * force) + numbers[2])
     return float(force)
 
 
@@ -32,18 +32,18 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = moving(evidence, axis)
-    beside = beside_linear(of)
-    found = [_at(of, beside, pitch) for pitch in _likely_pitches(of, beside)]
+    motion = axis_motion(evidence, axis)
+    beside = regress_beside_linear(motion)
+    found = [_fit_pitch(motion, beside, pitch) for pitch in _likely_pitches(motion, beside)]
     return tuple(values for _, values in sorted(found, key=lambda item: -item[0]))
 
 
-def _likely_pitches(of: Moving, beside: Beside) -> list[float]:
+def _likely_pitches(motion: AxisMotion, beside: PartialRegression) -> list[float]:
     """By a periodogram of the missing force over the position."""
-    way = float(np.ptp(of.position))
+    way = float(np.ptp(motion.position))
     if way == 0:
         return []
-    cell = ((of.position - of.position.min()) / way * (CELLS - 1)).astype(int)
+    cell = ((motion.position - motion.position.min()) / way * (CELLS - 1)).astype(int)
     force = np.bincount(cell, beside.force, CELLS)
     density = np.bincount(cell, minlength=CELLS).astype(float)
     smooth = np.convolve(density, np.ones(9) / 9, "same")
@@ -62,8 +62,8 @@ def _likely_pitches(of: Moving, beside: Beside) -> list[float]:
     return pitches
 
 
-def _at(of: Moving, beside: Beside, pitch: float) -> tuple[float, Values]:
-    angle = 2 * np.pi * of.position / pitch
+def _fit_pitch(motion: AxisMotion, beside: PartialRegression, pitch: float) -> tuple[float, Values]:
+    angle = 2 * np.pi * motion.position / pitch
     fit = beside.fit(np.sin(angle), np.cos(angle))
     sine, cosine = fit.strengths.tolist()
     return fit.explained, {

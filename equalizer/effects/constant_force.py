@@ -3,16 +3,16 @@
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import Beside, linear_part, moving
+from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, linear_part
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    return float(of[0])
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    return float(numbers[0])
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
@@ -20,10 +20,11 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = moving(evidence, axis)
+    motion = axis_motion(evidence, axis)
     # The spring may have been re-tuned, but not so as to pull at the place of rest.
-    force = float(Beside(of.force, linear_part(of, constant=False)).fit(np.ones_like(of.force)).strengths[0])
-    mean = float(np.mean(of.force))
+    beside = PartialRegression(motion.force, linear_part(motion, constant=False))
+    force = float(beside.fit(np.ones_like(motion.force)).strengths[0])
+    mean = float(np.mean(motion.force))
     return tuple({"force": guess} for guess in (mean, force) if guess != 0)
 
 

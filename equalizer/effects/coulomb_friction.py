@@ -1,19 +1,19 @@
-"""Dry friction: a constant force against the motion that holds still what is pushed less than that."""
+"""Coulomb friction: a constant force against the motion, which holds at rest whatever is pushed with less."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.simulation.dry_friction_kernel import rubbing
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.dry_friction_kernel import friction_force
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import beside_linear, sliding
+from equalizer.effects.starts.starting_values import regress_beside_linear, sliding_motion
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    return float(rubbing(of[0], of[0], memory[0], memory, at))
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    return float(friction_force(numbers[0], numbers[0], memory[0], memory, at))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
@@ -21,8 +21,8 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = sliding(evidence, axis)
-    level = float(beside_linear(of).fit(-np.sign(of.velocity)).strengths[0])
+    motion = sliding_motion(evidence, axis)
+    level = float(regress_beside_linear(motion).fit(-np.sign(motion.velocity)).strengths[0])
     return ({"level": level},) if level > 0 else ()
 
 

@@ -1,4 +1,4 @@
-"""A channel that also reads a share of the others: sensing axes that are not square to each other."""
+"""Cross-axis sensitivity: a channel that also reads a share of the others, as sensing axes that are not orthogonal."""
 
 import numpy as np
 
@@ -12,21 +12,21 @@ LARGEST = 1.0
 LEAST = 1e-4
 
 
-def _others(channel: int, channels: int) -> list[int]:
-    """The one or two that follow, round about."""
+def _next_channels(channel: int, channels: int) -> list[int]:
+    """The one or two channels that follow this one, cyclically."""
     return [(channel + ahead) % channels for ahead in range(1, min(channels, 3))]
 
 
-def _mixed(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+def _mix_channels(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
     read = response.copy()
     for channel in channels:
-        for name, other in zip(FROM, _others(channel, response.shape[1]), strict=False):
-            read[:, channel] += of[name] * response[:, other]
+        for name, other in zip(FROM, _next_channels(channel, response.shape[1]), strict=False):
+            read[:, channel] += values[name] * response[:, other]
     return read
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    others = _others(channel, evidence.response.shape[1])
+    others = _next_channels(channel, evidence.response.shape[1])
     residual = evidence.response - evidence.predicted
     if not others:
         return ()
@@ -43,7 +43,7 @@ EFFECT = Effect(
     signature="one channel reads a constant share of others at every frequency and level and they none of it, while "
     "the position agrees",
     parameters=tuple(Parameter(name, -LARGEST, LARGEST, none=0.0, scale="linear", step=1e-3) for name in FROM),
-    acts=OnResponse(_mixed, stage=-1),
+    acts=OnResponse(_mix_channels, stage=-1),
     starts=_starts,
     sites=("one", "each"),
     simpler=("sensor_misalignment",),

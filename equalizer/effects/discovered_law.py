@@ -1,4 +1,4 @@
-"""A law that has no name, as an effect: a formula that is added to the force, or replaces command or response."""
+"""A discovered law as an effect: a formula that is added to the force, or replaces a command or a response."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -41,11 +41,11 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
     end in x, y, z, the axes are called so in their order. Raises LawError for a signal that is not there.
     """
     make: dict[str, Callable[[Law, Channels], Acts]] = {
-        "force": _on_force, "command": _on_command, "response": _on_response
+        "force": _force_action, "command": _command_action, "response": _response_action
     }  # fmt: skip
     return Effect(
         name=DISCOVERED_LAW,
-        equation=f"{_replaced(law)} {law.text}",
+        equation=f"{_left_hand_side(law)} {law.text}",
         source="found in these recordings",
         signature=f"it follows {', '.join(law.variables) or 'nothing'} as the formula says",
         parameters=law_parameters(law),
@@ -57,7 +57,7 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
 
 
 def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ...]:
-    """Of its free numbers: those that it says, else as far as its formula tells them."""
+    """Units of the law's free numbers: those that it states, else as far as dimensional analysis tells them."""
     if law.units:
         return law.units
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity, 0)
@@ -73,7 +73,7 @@ def law_values(law: Law) -> Values:
     return {f"p{place}": number for place, number in enumerate(law.numbers)}
 
 
-def law_with(law: Law, values: Values) -> Law:
+def law_with_values(law: Law, values: Values) -> Law:
     return law.with_numbers([values[f"p{place}"] for place in range(len(law.numbers))])
 
 
@@ -99,16 +99,16 @@ def _parameter(name: str, number: float, role: Role, none: float | None) -> Para
     return Parameter(name, -LARGEST, LARGEST, None, scale="signed")
 
 
-def _replaced(law: Law) -> str:
+def _left_hand_side(law: Law) -> str:
     return {"force": "F =", "command": f"command on {law.axis} =", "response": f"response {law.axis} ="}[law.acts_on]
 
 
-def _remembers(law: Law) -> bool:
+def _has_memory(law: Law) -> bool:
     return any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree))
 
 
 def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
-    """What a formula calls the axes: by the ends of their channels where these are x, y, z, else in their order."""
+    """Letters of the axes in a formula: the ends of their channels' names where these are x, y, z, else in order."""
     ends = tuple(channel[-1:] for channel in channels)
     if len(set(ends)) == len(ends) and set(ends) <= set(LETTERS):
         return ends
@@ -116,7 +116,7 @@ def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def force_signals(channels: Channels) -> dict[str, int]:
-    """Where the compiled law finds each signal."""
+    """Column of each signal among those of the compiled law."""
     return {"t": 0, **{name: 1 + place for name, place in _motion_signals(channels)}}
 
 
@@ -132,7 +132,7 @@ def _motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
         yield name, PER_AXIS * axis + len(DERIVATIVES)
 
 
-def _on_force(law: Law, channels: Channels) -> AxisForce:
+def _force_action(law: Law, channels: Channels) -> AxisForce:
     signals = force_signals(channels)
     program, axes = program_of(law.tree, signals), len(channels.inputs)
     heavy = any((signals[name] - 1) % PER_AXIS == 2 for name in law.variables if name != "t")
@@ -140,33 +140,33 @@ def _on_force(law: Law, channels: Channels) -> AxisForce:
     def pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
         if model.inputs != axes:
             raise ValueError(f"the law {law.text} is for {axes} axes; the model has {model.inputs}")
-        return np.concatenate([[axes, heavy], program.with_numbers(law_with(law, values).numbers)])
+        return np.concatenate([[axes, heavy], program.with_numbers(law_with_values(law, values).numbers)])
 
     memory = DEEPEST + 1 + PER_AXIS * axes + program.memory
     return AxisForce(law_force, pack, memory=memory, acceleration=heavy, sees=True)
 
 
-def _on_command(law: Law, channels: Channels) -> OnCommand:
+def _command_action(law: Law, channels: Channels) -> OnCommand:
     signals = {COMMAND + letter: axis for axis, letter in enumerate(axis_names(channels.inputs))}
     signals |= {name: axis for axis, name in enumerate(channels.inputs)}
     program_of(law.tree, {**signals, "t": -1})
 
     def of_all(commands: FloatArray, channel: int, step_s: float, values: Values) -> tuple[FloatArray, FloatArray]:
-        of = {name: commands[:, number] for name, number in signals.items()}
-        held = evaluate_held(law_with(law, values), of, 1 / step_s)
+        signal_values = {name: commands[:, number] for name, number in signals.items()}
+        held = evaluate_held(law_with_values(law, values), signal_values, 1 / step_s)
         return np.asarray(held.mean(axis=0)), held[1]
 
-    return OnCommand(lambda commands, step_s, values: commands, fine=_remembers(law), of_all=of_all)
+    return OnCommand(lambda commands, step_s, values: commands, fine=_has_memory(law), of_all=of_all)
 
 
-def _on_response(law: Law, channels: Channels) -> OnResponse:
+def _response_action(law: Law, channels: Channels) -> OnResponse:
     signals = _response_signals(channels)
     program_of(law.tree, {**signals, "t": -1})
 
     def change(response: FloatArray, sample_rate_hz: float, sites: tuple[int, ...], values: Values) -> FloatArray:
         read = response.copy()
-        of = {name: response[:, number] for name, number in signals.items()}
-        read[:, list(sites)] = evaluate(law_with(law, values), of, sample_rate_hz)[:, None]
+        signal_values = {name: response[:, number] for name, number in signals.items()}
+        read[:, list(sites)] = evaluate(law_with_values(law, values), signal_values, sample_rate_hz)[:, None]
         return read
 
     return OnResponse(change)

@@ -1,4 +1,4 @@
-"""What an effect is to the simulator and to a diagnosis: its equation, its numbers, where it acts and how.
+"""Definition of a physical effect, for simulation and diagnosis: its equation, parameters, where and how it acts.
 
 An effect acts in one of five ways: it changes the linear structure, adds a force that depends on the motion at a
 driven axis or within a joint, changes the command before it becomes a force, or changes the response after it was
@@ -33,7 +33,7 @@ class Parameter:
     lower: float
     upper: float
     none: float | None
-    """Where all numbers that have such a value are at it, the effect is not there; None: it does not matter."""
+    """Value at which the effect vanishes, if all parameters that have such a value are at it; None: does not count."""
     scale: Literal["log", "linear", "signed"] = "log"
     """signed: either sign, and the size is not known beforehand; a fit moves it by a share of its start."""
     step: float = 0.01
@@ -55,9 +55,9 @@ class AxisForce:
     """A force along a driven axis, from its motion."""
 
     law: Any
-    """Compiled: law(of, memory, at) gives newtons; see `equalizer.effects.simulation.instant` for what `at` holds."""
+    """Compiled: law(numbers, memory, at) gives newtons; `equalizer.effects.simulation.instant` says what `at` holds."""
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
-    """What the law finds in `of`."""
+    """The law's `numbers` from model, axis and values."""
     memory: int = 0
     """How many numbers the law keeps between instants; they start at zero."""
     steps: int = STEPS
@@ -92,10 +92,11 @@ class OnCommand:
     fine: bool = False
     """It moves between samples, so that it must be followed more finely than they come."""
     at_end: Callable[[FloatArray, float, Values], FloatArray] | None = None
-    """Such a one's force at the end of each step, from the same means; else `change` does for both."""
+    """The force at the end of each step from the same means, where it moves between samples; else `change` gives
+    both."""
     of_all: Callable[[FloatArray, int, float, Values], tuple[FloatArray, FloatArray]] | None = None
-    """In place of the above where it hangs on other channels too: samples (n, m), channel, seconds, values; the force
-    (n,) over each step and at its end."""
+    """Instead of the above where it depends on other channels too: samples (n, m), channel, seconds, values; returns
+    the force (n,), mean over each step and at its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,22 +104,22 @@ class OnResponse:
     """What becomes of the response."""
 
     change: Callable[[FloatArray, float, tuple[int, ...], Values], FloatArray]
-    """Samples (n, p), sample rate, the channels that it befalls, values."""
+    """Samples (n, p), sample rate, the affected channels, values."""
     after_filter: bool = True
     """Comes after the sensor's own low pass."""
     stage: int = 0
     """Orders those on the same side of the low pass: alignment, range, what is added, numbers, clock."""
     shared: bool = False
-    """It cannot befall one channel alone."""
+    """It cannot affect a single channel alone."""
     of_whole: bool = False
-    """It hangs on how long the recording is, so that a part of it must know."""
+    """It depends on the recording's length, which must therefore be known for an excerpt."""
     bandwidth_hz: Callable[[float, Values], float] | None = None
     """Of its channels' low pass, from what the model says it is; 0 = none."""
     on_position: Callable[[FloatArray, float, Values], FloatArray] | None = None
     """What becomes of the positions (n, p) where the same clock reads them: sample rate, values."""
     given: Callable[[FloatArray, FloatArray, FloatArray, tuple[int, ...], Values], FloatArray] | None = None
-    """Where chance decides, what was read given what was measured: samples (n, p), measured (n, p), its noise (p,),
-    channels, values. Without a measurement `change` plays some chance."""
+    """For a random effect, the response conditioned on a measurement: samples (n, p), measured (n, p), its noise (p,),
+    channels, values. Without a measurement `change` draws a realisation."""
     given_position: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray] | None = None
     """The same of the position: response before and after, position (n, p), as measured (n, p)."""
 
@@ -134,7 +135,7 @@ class Effect:
     equation: str
     source: str
     signature: str
-    """What a reader sees in the data where it is the cause; ends the sentence that names it."""
+    """How the effect shows in the data, as the end of a sentence that names it."""
     parameters: tuple[Parameter, ...]
     acts: Acts
     starts: Callable[[Evidence, int], tuple[Values, ...]]
@@ -144,13 +145,13 @@ class Effect:
     simpler: tuple[str, ...] = ()
     """Effects that it contains as a special case."""
     report: Callable[[Values], Values] = dict
-    """The vocabulary's numbers from the fitted ones, where these say more than a reader wants."""
+    """The vocabulary's parameters from the fitted ones, where those are more than a reader needs."""
     alike: Callable[[Values], tuple[Values, ...]] = lambda values: ()
-    """Other numbers that do almost the same as given ones, so that a fit may have ended at the wrong of them."""
+    """Other values with almost the same effect, at which a fit may have ended by mistake."""
     law: Law | None = None
     """Of an effect that has no name of its own: its formula."""
     of_time: bool = False
-    """It hangs on when in a recording a sample was taken, or on rare events: no part of a recording stands for all."""
+    """It depends on time within a recording, or on rare events: no excerpt represents the whole recording."""
 
     def __post_init__(self) -> None:
         _living[id(self)] = self
@@ -160,7 +161,7 @@ _living: WeakValueDictionary[int, Effect] = WeakValueDictionary()
 
 
 def living_effects() -> dict[int, Effect]:
-    """All that there are, by their address: of the catalogue, and of laws without a name.
+    """All effects that exist, by address (`id`): those of the catalogue and those of discovered laws.
 
     Effects hold functions, which cannot be sent to another process; a forked process has them at the same addresses.
     """
@@ -170,7 +171,7 @@ def living_effects() -> dict[int, Effect]:
 
 @dataclass(frozen=True, slots=True)
 class PlacedEffect:
-    """An effect with its numbers, at the axes or channels that it befalls, all with the same numbers."""
+    """An effect with its values and the axes or channels it acts on, all with the same values."""
 
     effect: Effect
     sites: tuple[int, ...]

@@ -1,29 +1,29 @@
-"""A stop that the motion runs into."""
+"""End stop: a one-sided spring at the end of the travel."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import Beside, Moving, beside_linear, moving
+from equalizer.effects.starts.starting_values import AxisMotion, PartialRegression, axis_motion, regress_beside_linear
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 SHARES, FINER = np.linspace(0.3, 0.98, 18), np.linspace(-0.04, 0.04, 9)
-"""Of the farthest position, where a stop may stand; and around the likeliest place."""
+"""Positions of a stop that are tried: shares of the farthest position, then offsets around the likeliest."""
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The mean of the force at the step's start and end; a stop pushes back only, and how far one is in it at the end
     depends on the force."""
     force = last = 0.0
     for side in range(2):
-        way = of[2 + side]
-        stiffness = of[1] if side == 0 else of[1] * of[4]
-        start = max(way * at[X] - of[0], 0.0)
-        end = way * (at[X_FREE] + at[X_PER_N] * force) - of[0]
+        way = numbers[2 + side]
+        stiffness = numbers[1] if side == 0 else numbers[1] * numbers[4]
+        start = max(way * at[X] - numbers[0], 0.0)
+        end = way * (at[X_FREE] + at[X_PER_N] * force) - numbers[0]
         # Towards the force at the end for a stop that is too stiff for the step, which would kick otherwise.
         slack = stiffness * at[X_PER_N]
         late = (0.5 + slack) / (1 + slack)
@@ -42,22 +42,24 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = moving(evidence, axis)
-    beside, farthest = beside_linear(of), float(np.abs(of.position).max())
+    motion = axis_motion(evidence, axis)
+    beside, farthest = regress_beside_linear(motion), float(np.abs(motion.position).max())
     found = []
     for way in (1.0, -1.0):
-        coarse = _best(of, beside, way, SHARES * farthest)
+        coarse = _best_stop(motion, beside, way, SHARES * farthest)
         if coarse is not None:
-            fine = _best(of, beside, way, abs(coarse[1]["position"]) + FINER * farthest)
+            fine = _best_stop(motion, beside, way, abs(coarse[1]["position"]) + FINER * farthest)
             found.append(coarse if fine is None else fine)
     return tuple(values for _, values in sorted(found, key=lambda item: -item[0]))
 
 
-def _best(of: Moving, beside: Beside, way: float, stops: FloatArray) -> tuple[float, Values] | None:
-    """What a stop on one side explains, with another opposite that is no stiffer, and its numbers."""
+def _best_stop(
+    motion: AxisMotion, beside: PartialRegression, way: float, stops: FloatArray
+) -> tuple[float, Values] | None:
+    """Explained share and values of the best stop on one side, with another opposite that is not stiffer."""
     tried: list[tuple[float, Values]] = []
     for stop in stops.tolist():
-        inside, outside = (np.maximum(side * of.position - stop, 0.0) for side in (way, -way))
+        inside, outside = (np.maximum(side * motion.position - stop, 0.0) for side in (way, -way))
         if not (inside > 0).any():
             continue
         laws = (-way * inside, way * outside) if (outside > 0).any() else (-way * inside,)

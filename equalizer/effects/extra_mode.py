@@ -1,9 +1,15 @@
-"""A part that swings on a spring of its own, which the model takes for stiff."""
+"""Extra mode: a lightly damped oscillator on the axis, where the model assumes a rigid part."""
 
 import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
-from equalizer.effects.starts.attached_oscillator import Hung, hung, missing_mass, with_oscillator, without
+from equalizer.effects.starts.attached_oscillator import (
+    AttachedOscillator,
+    likely_oscillators,
+    missing_mass,
+    subtract_oscillator,
+    with_oscillator,
+)
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -30,16 +36,18 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     seen, starts = missing_mass(evidence, axis), []
     natural = np.geomspace(LOWEST_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
     for _ in range(STARTS):
-        coarse = hung(seen, axis, natural, RATIOS)[:1]
+        coarse = likely_oscillators(seen, axis, natural, RATIOS)[:1]
         for each in coarse:
-            near = hung(seen, axis, (each.natural_hz * FINER).tolist(), (each.damping_ratio * COARSER).tolist())
-            starts.append(_values(near[0], axis, evidence.model.inputs))
+            near = likely_oscillators(
+                seen, axis, (each.natural_hz * FINER).tolist(), (each.damping_ratio * COARSER).tolist()
+            )
+            starts.append(_mode_values(near[0], axis, evidence.model.inputs))
             # The next is looked for in what this one leaves.
-            seen = without(seen, near[0])
+            seen = subtract_oscillator(seen, near[0])
     return tuple(starts)
 
 
-def _values(each: Hung, axis: int, m: int) -> Values:
+def _mode_values(each: AttachedOscillator, axis: int, m: int) -> Values:
     tilts = [float(np.clip(each.by_axis[(axis + place) % m], -1, 1)) if place < m else 0.0 for place in (1, 2)]
     # The pull on the own axis is that of the whole mass, less what its tilt takes away.
     mass = each.mass * (1 + tilts[0] ** 2 + tilts[1] ** 2)

@@ -1,4 +1,4 @@
-"""An actuator that does not answer small commands, and larger ones with that much less, or with a jump."""
+"""Dead band of an actuator: no force for small commands; larger ones are reduced by its width, or start with a jump."""
 
 import numpy as np
 
@@ -8,9 +8,9 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 
-def _beyond(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    width = of["width"]
-    jump = of.get("jump", 0.0) * width * np.sign(commands) * (np.abs(commands) > width)
+def _apply_deadband(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    width = values["width"]
+    jump = values.get("jump", 0.0) * width * np.sign(commands) * (np.abs(commands) > width)
     return np.asarray(commands - np.clip(commands, -width, width) + jump)
 
 
@@ -21,17 +21,17 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     for jump in (0.0, 1.0):
 
         def change(commands: FloatArray, step_s: float, width: float, jump: float = jump) -> FloatArray:
-            return _beyond(commands, step_s, {"width": width, "jump": jump})
+            return _apply_deadband(commands, step_s, {"width": width, "jump": jump})
 
         width = likeliest_value(evidence, axis, change, grid, True)
         found += [] if width is None else [{"width": width, "jump": jump}]
     return tuple(found)
 
 
-def _without_jump(of: Values) -> tuple[Values, ...]:
-    """Beyond the band both command the same; few samples lie between."""
-    jump = of.get("jump", 0.0)
-    return ({"width": of["width"] * (1 - jump), "jump": 0.0},) if 0.0 < jump < 1.0 else ()
+def _without_jump(values: Values) -> tuple[Values, ...]:
+    """The dead band without a jump that gives the same force beyond the band; few samples lie between the two."""
+    jump = values.get("jump", 0.0)
+    return ({"width": values["width"] * (1 - jump), "jump": 0.0},) if 0.0 < jump < 1.0 else ()
 
 
 EFFECT = Effect(
@@ -44,7 +44,7 @@ EFFECT = Effect(
         Parameter("width", 1e-6, 1e4, none=0.0),
         Parameter("jump", 0.0, 1.0, none=None, scale="linear", step=0.05),
     ),
-    acts=OnCommand(_beyond),
+    acts=OnCommand(_apply_deadband),
     starts=_starts,
     sites=("one", "all"),
     alike=_without_jump,

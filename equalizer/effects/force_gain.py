@@ -1,4 +1,4 @@
-"""An actuator that gives another force than the command says: a wrong force constant."""
+"""Force gain: an actuator whose force is a constant multiple of its command, as with a wrong force constant."""
 
 import numpy as np
 
@@ -9,8 +9,8 @@ from equalizer.signals.signal import FloatArray
 LEAST = 1e-4
 
 
-def _scaled(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    return np.asarray(of["gain"] * commands)
+def _scale_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    return np.asarray(values["gain"] * commands)
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -31,7 +31,7 @@ EFFECT = Effect(
     signature="the missing force is proportional to the command at every frequency and level, in position and response "
     "alike",
     parameters=(Parameter("gain", 0.05, 20.0, none=1.0),),
-    acts=OnCommand(_scaled),
+    acts=OnCommand(_scale_force),
     starts=_starts,
     sites=("one", "all"),
 )

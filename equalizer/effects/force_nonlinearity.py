@@ -1,24 +1,24 @@
-"""An actuator whose gain changes with the size of its command: propellers, coils without bias, drives in pulses."""
+"""Nonlinear actuator characteristic: the gain changes with the size of the command, as of propellers or coils."""
 
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnCommand, Parameter, Values
-from equalizer.effects.starts.command_starts import of_square
+from equalizer.effects.starts.command_starts import fit_square_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 
-def bent(commands: FloatArray, square: float, reference: float) -> FloatArray:
-    """(n,), as commanded where |commands| is the reference."""
+def square_law_force(commands: FloatArray, square: float, reference: float) -> FloatArray:
+    """Force (n,) of commands (n,): square is the quadratic share; at |command| = reference, force equals command."""
     return np.asarray(commands * (1 - square + square * np.abs(commands) / reference))
 
 
-def _bent(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    return bent(commands, of["square"], of["reference"])
+def _bend_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    return square_law_force(commands, values["square"], values["reference"])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    found = of_square(evidence, axis)
+    found = fit_square_law(evidence, axis)
     return () if found is None else ({"square": found[0], "reference": found[1]},)
 
 
@@ -33,7 +33,7 @@ EFFECT = Effect(
         Parameter("square", -1.0, 1.0, none=0.0, scale="signed"),
         Parameter("reference", 1e-6, 1e6, none=None),
     ),
-    acts=OnCommand(_bent),
+    acts=OnCommand(_bend_force),
     starts=_starts,
     sites=("one", "all"),
 )

@@ -1,4 +1,4 @@
-"""An actuator that gives no more than so much force."""
+"""Force saturation: an actuator whose force is limited."""
 
 import math
 
@@ -10,8 +10,8 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 
-def _limited(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    return np.clip(commands, -of["limit"], of["limit"])
+def _clip_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    return np.clip(commands, -values["limit"], values["limit"])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -28,7 +28,7 @@ EFFECT = Effect(
     signature="force is missing only where more than the limit is commanded, and all that is above it; odd harmonics "
     "at the top level alone",
     parameters=(Parameter("limit", 1e-4, 1e4, none=math.inf),),
-    acts=OnCommand(_limited),
+    acts=OnCommand(_clip_force),
     starts=_starts,
     sites=("one", "all"),
 )

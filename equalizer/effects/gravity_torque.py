@@ -1,26 +1,26 @@
-"""The weight of a body off the axis that it turns about: a pendulum's torque."""
+"""Gravity torque: the weight of a body off its axis of rotation, as of a pendulum."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import beside_linear, moving
+from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 LEAST_TRAVEL_RAD = 0.5
-"""Over less, it is a spring."""
+"""Over a smaller travel it cannot be told from a spring."""
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The mean of the torque at the step's start and end, where the angle at its end depends on it."""
-    start, torque = np.sin(at[X] + of[1]), 0.0
+    start, torque = np.sin(at[X] + numbers[1]), 0.0
     for _ in range(4):
-        torque = -0.5 * of[0] * (start + np.sin(at[X_FREE] + at[X_PER_N] * torque + of[1]))
-    at[F_END] = -of[0] * np.sin(at[X_FREE] + at[X_PER_N] * torque + of[1])
+        torque = -0.5 * numbers[0] * (start + np.sin(at[X_FREE] + at[X_PER_N] * torque + numbers[1]))
+    at[F_END] = -numbers[0] * np.sin(at[X_FREE] + at[X_PER_N] * torque + numbers[1])
     return float(torque)
 
 
@@ -29,10 +29,11 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = moving(evidence, axis)
-    if not evidence.model.rotational or not np.ptp(of.position) > LEAST_TRAVEL_RAD:
+    motion = axis_motion(evidence, axis)
+    if not evidence.model.rotational or not np.ptp(motion.position) > LEAST_TRAVEL_RAD:
         return ()
-    sine, cosine = beside_linear(of).fit(-np.sin(of.position), -np.cos(of.position)).strengths.tolist()
+    fit = regress_beside_linear(motion).fit(-np.sin(motion.position), -np.cos(motion.position))
+    sine, cosine = fit.strengths.tolist()
     torque = float(np.hypot(sine, cosine))
     return ({"torque": torque, "angle": float(np.arctan2(cosine, sine))},) if torque > 0 else ()
 

@@ -1,4 +1,4 @@
-"""A hand on the handle: a mass, a damper and a spring to the ground along each axis."""
+"""Hand impedance: a mass, a damper and a spring to the ground along each axis of the handle."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import Beside, moving, own
+from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, value_along
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -26,11 +26,11 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = moving(evidence, axis)
-    beside = Beside(of.force, np.ones((len(of.force), 1)))
-    found = beside.fit(-of.acceleration, -of.velocity, -of.position).strengths.tolist()
+    motion = axis_motion(evidence, axis)
+    beside = PartialRegression(motion.force, np.ones((len(motion.force), 1)))
+    found = beside.fit(-motion.acceleration, -motion.velocity, -motion.position).strengths.tolist()
     along, model = driven_axes(evidence.model)[:, axis], evidence.model
-    known = [_GUESS * own(matrix, along) for matrix in (model.mass, model.damping, model.stiffness)]
+    known = [_GUESS * value_along(matrix, along) for matrix in (model.mass, model.damping, model.stiffness)]
     values = [each if each > 0 else 0.1 * other for each, other in zip(found, known, strict=True)]
     names = ("mass", "damping", "stiffness")
     return tuple(dict(zip(names, numbers, strict=True)) for numbers in (values, known))

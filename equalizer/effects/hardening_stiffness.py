@@ -1,26 +1,26 @@
-"""A spring that gets stiffer the further it is pushed, either way."""
+"""Cubic (Duffing) stiffness: a spring that stiffens with deflection in either direction."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import beside_linear, moving
+from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The mean of the force at the step's start and end, where the position at its end depends on it."""
-    half, start = 0.5 * of[0], at[X] ** 3
+    half, start = 0.5 * numbers[0], at[X] ** 3
     force = -half * (start + at[X_FREE] ** 3)
     for _ in range(4):
         end = at[X_FREE] + at[X_PER_N] * force
         off = force + half * (start + end**3)
         force -= off / (1 + 3 * half * at[X_PER_N] * end * end)
-    at[F_END] = -of[0] * (at[X_FREE] + at[X_PER_N] * force) ** 3
+    at[F_END] = -numbers[0] * (at[X_FREE] + at[X_PER_N] * force) ** 3
     return float(force)
 
 
@@ -29,8 +29,8 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = moving(evidence, axis)
-    k3 = float(beside_linear(of).fit(-(of.position**3)).strengths[0])
+    motion = axis_motion(evidence, axis)
+    k3 = float(regress_beside_linear(motion).fit(-(motion.position**3)).strengths[0])
     return ({"k3": k3},) if k3 > 0 else ()
 
 

@@ -1,4 +1,4 @@
-"""A logger that started at another time than the commands: the response comes late or early, the position does not."""
+"""Time offset of a logger: the response comes late or early by a constant, the position does not."""
 
 import numpy as np
 
@@ -12,8 +12,8 @@ LONGEST_S = 1.0
 LEAST_SAMPLES = 1e-3
 
 
-def _read(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
-    return read_other_times(response, 1.0, -of["offset"] * sample_rate_hz, of.get("interpolated", 0.0))
+def _read_shifted(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
+    return read_other_times(response, 1.0, -values["offset"] * sample_rate_hz, values.get("interpolated", 0.0))
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
@@ -30,7 +30,7 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 
 def _misfit(evidence: Evidence, values: Values) -> float:
-    read = _read(evidence.predicted, evidence.sample_rate_hz, (), values)
+    read = _read_shifted(evidence.predicted, evidence.sample_rate_hz, (), values)
     return float(np.sum((((evidence.response - read) / evidence.noise) ** 2)[evidence.used > 0]))
 
 
@@ -43,7 +43,7 @@ EFFECT = Effect(
         Parameter("offset", -LONGEST_S, LONGEST_S, none=0.0, scale="linear", step=1e-5),
         Parameter("interpolated", 0.0, 1.0, none=None, scale="linear", step=0.05),
     ),
-    acts=OnResponse(_read, stage=4, shared=True),
+    acts=OnResponse(_read_shifted, stage=4, shared=True),
     starts=_starts,
     sites=("all",),
 )

@@ -1,18 +1,18 @@
-"""A bolted joint that is loose: within a gap it only rubs, beyond it is stiff."""
+"""Loose joint: dry friction alone within a gap, a spring beyond it."""
 
 from itertools import product
 
 import numpy as np
 
 from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values
-from equalizer.effects.simulation.bodies import bodies_of, moved
-from equalizer.effects.simulation.command_path import Driven
-from equalizer.effects.simulation.dry_friction_kernel import rubbing
+from equalizer.effects.simulation.bodies import bodies_of, simulate_bodies
+from equalizer.effects.simulation.command_path import ActuatorForce
+from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.instant import F_END, V_FREE, V_PER_N, X_FREE, X_PER_N, X
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
-from equalizer.effects.simulation.sensor_path import low_passed
+from equalizer.effects.simulation.mechanism_kernel import compile_law
+from equalizer.effects.simulation.sensor_path import low_pass
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import own
+from equalizer.effects.starts.starting_values import value_along
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -20,16 +20,18 @@ from equalizer.signals.signal import FloatArray
 STEPS = 8
 """Per sample."""
 GAPS, STIFFNESSES, SLIPS = (0.2, 0.5, 1.2, 3.0, 8.0), (0.05, 0.2, 0.6), (0.01, 0.1, 0.4)
-"""Tried: over the rms travel of the joint in the model; over its own stiffness; over the product of the two."""
+"""Values that are tried: gaps relative to the joint's rms travel in the model; stiffnesses relative to its own; slips
+relative to the product of the two."""
 TRIED_S, SETTLING, FINER = 2.0, 4, 4
-"""On how much of the record, of which one in so many is left out, because it did not begin at rest."""
+"""Seconds of the record that are simulated; its first 1/SETTLING is left out, because it did not begin at rest; how
+many of the best pairs are tried with every slip."""
 _FAST: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The spring beyond the gap, between its force at the step's start and end; then what friction can stop."""
-    half, stiffness, slip = 0.5 * of[0], of[1], of[2]
+    half, stiffness, slip = 0.5 * numbers[0], numbers[1], numbers[2]
     spring = last = 0.0
     for way in (1.0, -1.0):
         start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
@@ -44,14 +46,14 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
             last = -way * stiffness * max(end + way * at[X_PER_N] * spring, 0.0)
             break
     at[V_FREE] += at[V_PER_N] * spring
-    slipped = rubbing(slip, slip, memory[0], memory, at)
+    slipped = friction_force(slip, slip, memory[0], memory, at)
     at[F_END] += last
     return float(spring + slipped)
 
 
-def joint_at(model: MechanicalModel, axis: int) -> FloatArray:
-    """(n,): how a joint near a driven axis moves: against the heaviest body that hangs on it, or against the ground
-    where nothing does."""
+def joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
+    """(n,): direction of motion of a joint near a driven axis: against the heaviest body attached to the axis, or
+    against the ground where there is none."""
     along, axes = driven_axes(model)[:, axis], driven_axes(model)
     carried = np.linalg.norm(axes, axis=1) < 1e-9
     if not carried.any():
@@ -68,7 +70,7 @@ def joint_at(model: MechanicalModel, axis: int) -> FloatArray:
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[MechanicalModel, FloatArray]:
-    return model, joint_at(model, axis)
+    return model, joint_direction(model, axis)
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
@@ -76,14 +78,15 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """The best of a coarse net, by what it leaves of a part of the record: first gaps and stiffnesses, then slips."""
-    part, joint = _part(evidence, axis), joint_at(evidence.model, axis)
-    travel = float(np.std(_played(evidence, axis, _FAST, part)[1]))
-    held = max(abs(own(evidence.model.stiffness, joint)) / float(joint @ joint) ** 2, 1e-6)
+    """The best of a coarse grid, by the residual on an excerpt of the record: first gaps and stiffnesses, then
+    slips."""
+    part, joint = _strongest_part(evidence, axis), joint_direction(evidence.model, axis)
+    travel = float(np.std(_simulate_part(evidence, axis, _FAST, part)[1]))
+    held = max(abs(value_along(evidence.model.stiffness, joint)) / float(joint @ joint) ** 2, 1e-6)
     measured = evidence.response[part]
 
     def left(values: Values) -> float:
-        off = (_played(evidence, axis, values, part)[0] - measured) / evidence.noise
+        off = (_simulate_part(evidence, axis, values, part)[0] - measured) / evidence.noise
         return float(np.mean(off[len(off) // SETTLING :] ** 2))
 
     def at(gap: float, stiffness: float, slip: float) -> Values:
@@ -97,8 +100,8 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     return tuple(values for _, values in sorted(found, key=lambda item: item[0])[:2])
 
 
-def _part(evidence: Evidence, axis: int) -> slice:
-    """Where the axis shakes most, and with it the joint."""
+def _strongest_part(evidence: Evidence, axis: int) -> slice:
+    """The excerpt in which the axis, and with it the joint, is accelerated most."""
     length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
     shaken = np.gradient(evidence.axis_velocity[:, axis])
     power = np.cumsum(np.append(0.0, shaken**2 * evidence.used))
@@ -106,14 +109,14 @@ def _part(evidence: Evidence, axis: int) -> slice:
     return slice(first, first + length)
 
 
-def _played(evidence: Evidence, axis: int, values: Values, part: slice) -> tuple[FloatArray, FloatArray]:
+def _simulate_part(evidence: Evidence, axis: int, values: Values, part: slice) -> tuple[FloatArray, FloatArray]:
     """The response (n, p), and the joint's travel (n,)."""
     bodies = bodies_of(evidence.model, (PlacedEffect(EFFECT, (axis,), values),))
     commands, rate_hz = evidence.command[part], evidence.sample_rate_hz
-    looked, _ = moved(bodies, Driven(commands, commands), (len(commands), STEPS), 1 / rate_hz / STEPS)
+    looked, _ = simulate_bodies(bodies, ActuatorForce(commands, commands), (len(commands), STEPS), 1 / rate_hz / STEPS)
     ports = bodies.ports.shape[1]
     response = looked[:, 3 * ports : 3 * ports + evidence.model.outputs]
-    return low_passed(response, rate_hz, evidence.model.sensor.bandwidth_hz), looked[:, ports - 1]
+    return low_pass(response, rate_hz, evidence.model.sensor.bandwidth_hz), looked[:, ports - 1]
 
 
 EFFECT = Effect(

@@ -1,7 +1,7 @@
-"""Samples that did not arrive: the last one read stands in their place. Which, is chance.
+"""Lost samples: the last sample that arrived is repeated in place of each, at random.
 
-Played without a measurement, some samples are lost by the fraction. Given one, those are lost for which the sample
-before is the likelier origin of what was measured.
+Simulated without a measurement, samples are drawn at random with the given fraction. Conditioned on one, those are lost
+that the measurement explains better by the sample before (likelihood ratio).
 """
 
 import math
@@ -19,28 +19,31 @@ LEAST_EVENTS = 8
 LARGEST = 0.3
 ROUNDS = 4
 CONTROL = 3.0
-"""A repeated sample must be so many times as frequent as one that came early, which nothing physical does."""
+"""Negative control: repeats must be this many times as frequent as samples that equal the next one, which no physical
+cause produces."""
 
 
-def _played(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
-    lost = np.random.default_rng(len(response)).random(len(response)) < of["fraction"]
+def _lose_at_random(
+    response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
+) -> FloatArray:
+    lost = np.random.default_rng(len(response)).random(len(response)) < values["fraction"]
     read, held = response.copy(), np.empty((len(response), len(channels)))
     repeat_where(np.ascontiguousarray(response[:, channels]), lost, held)
     read[:, channels] = held
     return read
 
 
-def _given(
-    response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], of: Values
+def _lose_as_measured(
+    response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    if not 0 < of["fraction"] < 1:
+    if not 0 < values["fraction"] < 1:
         return response
     which, read = list(channels), response.copy()
-    read[:, which] = _repeated(response[:, which], measured[:, which], noise[which], of["fraction"])[0]
+    read[:, which] = _repeat_by_likelihood(response[:, which], measured[:, which], noise[which], values["fraction"])[0]
     return read
 
 
-def _repeated(
+def _repeat_by_likelihood(
     samples: FloatArray, measured: FloatArray, noise: FloatArray, fraction: float
 ) -> tuple[FloatArray, Flags]:
     read, lost = np.empty(samples.shape), np.zeros(len(samples), dtype=np.bool_)
@@ -55,8 +58,10 @@ def _repeated(
     return read, lost
 
 
-def _given_position(before: FloatArray, after: FloatArray, position: FloatArray, measured: FloatArray) -> FloatArray:
-    """Repeats where the response does, if the measured position was read by the same logger and shows it."""
+def _lose_positions_as_measured(
+    before: FloatArray, after: FloatArray, position: FloatArray, measured: FloatArray
+) -> FloatArray:
+    """Repeat positions where the response repeats, if the measured position shows that the same logger read it."""
     lost = np.any(after != before, axis=1)
     if not lost.any():
         return position
@@ -68,14 +73,17 @@ def _given_position(before: FloatArray, after: FloatArray, position: FloatArray,
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     which = [channel]
-    found = _fraction(evidence, which, 1)
+    found = _estimate_fraction(evidence, which, 1)
     return (
-        ({"fraction": found},) if found is not None and found > CONTROL * (_fraction(evidence, which, -1) or 0) else ()
+        ({"fraction": found},)
+        if found is not None and found > CONTROL * (_estimate_fraction(evidence, which, -1) or 0)
+        else ()
     )
 
 
-def _fraction(evidence: Evidence, which: list[int], forwards: int) -> float | None:
-    """Of the samples for which it can be told; backwards, of those that look like the next one."""
+def _estimate_fraction(evidence: Evidence, which: list[int], forwards: int) -> float | None:
+    """Share of lost samples among those where it can be told; backwards (-1), of those that equal the next one. None
+    for too few events."""
     samples, measured = evidence.predicted[::forwards, which], evidence.response[::forwards, which]
     noise, used = evidence.noise[which], evidence.used[::forwards] > 0
     apart = np.sum((np.diff(samples, axis=0, prepend=samples[:1]) / noise) ** 2, axis=1) > CLEAR**2
@@ -84,7 +92,7 @@ def _fraction(evidence: Evidence, which: list[int], forwards: int) -> float | No
         return None
     fraction = 0.01
     for _ in range(ROUNDS):
-        lost = _repeated(samples, measured, noise, fraction)[1]
+        lost = _repeat_by_likelihood(samples, measured, noise, fraction)[1]
         events = int(np.count_nonzero(lost & clear))
         if events < LEAST_EVENTS:
             return None
@@ -99,7 +107,7 @@ EFFECT = Effect(
     signature="single samples repeat the one before, scattered at random, in the response and in nothing "
     "that another logger read",
     parameters=(Parameter("fraction", 1e-6, LARGEST, none=0.0, fixed=True),),
-    acts=OnResponse(_played, stage=5, given=_given, given_position=_given_position),
+    acts=OnResponse(_lose_at_random, stage=5, given=_lose_as_measured, given_position=_lose_positions_as_measured),
     starts=_starts,
     of_time=True,
     sites=("all", "one"),

@@ -1,4 +1,4 @@
-"""A tone of the mains, or another, that no command asked for."""
+"""Mains hum: a steady tone in the response, at mains frequency or another, that no command contains."""
 
 import math
 
@@ -17,15 +17,15 @@ ROUNDS = 4
 BLOCKS, STEADY = 12, 0.8
 """Parts of a recording in which a tone must have the same amplitude and phase, and how nearly."""
 PLAYED = 0.1
-"""Of a command's rms, that a tone in it must have to be meant."""
+"""Amplitude of a tone in a command, over its rms, from which the tone counts as commanded."""
 MAINLY, MOST_TIMES = 0.5, 9
-"""The same for half of a command's power; such a tone distorted has lines at up to so many times its frequency."""
+"""Likewise for a tone that holds half of a command's power, whose harmonics up to this order count as commanded."""
 
 
-def _hummed(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+def _add_tone(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
     time_s = np.arange(len(response)) / sample_rate_hz
     read = response.copy()
-    tone = of["amplitude"] * np.sin(2 * np.pi * of["frequency"] * time_s + of.get("phase", 0.0))
+    tone = values["amplitude"] * np.sin(2 * np.pi * values["frequency"] * time_s + values.get("phase", 0.0))
     read[:, channels] += tone[:, None]
     return read
 
@@ -44,27 +44,26 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
         near = np.abs(lines_hz - lines_hz[top]) < NEIGHBOURS_HZ
         if power[top] < ABOVE * float(np.median(power[near])):
             continue
-        tone = _tone(residual[:, channel], evidence, float(lines_hz[top]))
-        steady = _steadiness(residual[:, _loudest(residual, evidence, top)], evidence, tone["frequency"])
+        tone = _fit_tone(residual[:, channel], evidence, float(lines_hz[top]))
+        steady = _steadiness(residual[:, _loudest_channel(residual, evidence, top)], evidence, tone["frequency"])
         if (
             steady > STEADY
-            and not _played(evidence, tone["frequency"])
+            and not _is_commanded(evidence, tone["frequency"])
             and not any(abs(tone["frequency"] - other["frequency"]) < lines_hz[1] for other in found)
         ):
             found.append(tone)
     return tuple(found)
 
 
-def _played(evidence: Evidence, frequency_hz: float) -> bool:
-    """Whether a command holds the tone throughout, or is little else than a tone of which it is a harmonic: then it is
-    no hum."""
-    return _holds(evidence, frequency_hz, PLAYED) or any(
-        _holds(evidence, frequency_hz / times, MAINLY) for times in range(2, MOST_TIMES + 1)
+def _is_commanded(evidence: Evidence, frequency_hz: float) -> bool:
+    """Whether a command contains the tone throughout, or consists mainly of a tone of which it is a harmonic."""
+    return _commands_hold_tone(evidence, frequency_hz, PLAYED) or any(
+        _commands_hold_tone(evidence, frequency_hz / times, MAINLY) for times in range(2, MOST_TIMES + 1)
     )
 
 
-def _holds(evidence: Evidence, frequency_hz: float, least: float) -> bool:
-    """least: amplitude of the tone, a half of it, over the command's rms."""
+def _commands_hold_tone(evidence: Evidence, frequency_hz: float, least: float) -> bool:
+    """Whether a command contains the tone throughout. least: half its amplitude over the command's rms."""
     turn = np.exp(-2j * np.pi * frequency_hz * np.arange(len(evidence.command)) / evidence.sample_rate_hz)
     share = (
         np.abs(turn @ evidence.command) / len(turn) / np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-300)
@@ -73,14 +72,14 @@ def _holds(evidence: Evidence, frequency_hz: float, least: float) -> bool:
     return any(each > least and two > STEADY for each, two in zip(share, steady, strict=True))
 
 
-def _loudest(residual: FloatArray, evidence: Evidence, line: int) -> int:
-    """The channel with most of a line."""
+def _loudest_channel(residual: FloatArray, evidence: Evidence, line: int) -> int:
+    """The channel in which a spectral line is strongest against the noise."""
     turn = np.exp(-2j * np.pi * line * np.arange(len(residual)) / len(residual))
     return int(np.argmax(np.abs(turn @ residual) / evidence.noise))
 
 
 def _steadiness(residual: FloatArray, evidence: Evidence, frequency_hz: float) -> float:
-    """Of a tone's amplitude and phase throughout the recording: 1 for one that nothing stops or starts."""
+    """Constancy of a tone's amplitude and phase over the recording's blocks, 0 to 1."""
     turn = np.exp(-2j * np.pi * frequency_hz * np.arange(len(residual)) / evidence.sample_rate_hz) * residual
     sums = np.array([part.sum() for part in np.array_split(turn, BLOCKS)])
     counts = np.array([part.sum() for part in np.array_split(evidence.used, BLOCKS)])
@@ -89,7 +88,7 @@ def _steadiness(residual: FloatArray, evidence: Evidence, frequency_hz: float) -
     return float(np.abs(each.mean())) / size if size > 0 else 0.0
 
 
-def _tone(residual: FloatArray, evidence: Evidence, frequency_hz: float) -> Values:
+def _fit_tone(residual: FloatArray, evidence: Evidence, frequency_hz: float) -> Values:
     """Least squares for amplitude and phase; the phase's drift then corrects the frequency."""
     time_s = np.arange(len(residual)) / evidence.sample_rate_hz
     # About the middle of the recording, so that frequency and phase do not compete.
@@ -125,7 +124,7 @@ EFFECT = Effect(
         Parameter("frequency", 0.1, 1e5, none=None, scale="linear", step=1e-4),
         Parameter("phase", -20.0, 20.0, none=None, scale="linear", step=0.02),
     ),
-    acts=OnResponse(_hummed, stage=2),
+    acts=OnResponse(_add_tone, stage=2),
     starts=_starts,
     of_time=True,
     sites=("each", "one"),

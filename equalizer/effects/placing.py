@@ -1,10 +1,10 @@
-"""Effects as a model's file names them, by axis and parameters, and as a simulation plays them, both ways."""
+"""Converts effects between a model file's form (axis names, parameters) and the simulation's (sites, values)."""
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.discovered_law import Channels, law_effect, law_values, law_with
+from equalizer.effects.discovered_law import Channels, law_effect, law_values, law_with_values
 from equalizer.effects.effect import Effect, PlacedEffect
 from equalizer.laws.law import Law
 from equalizer.laws.parse import LawError
@@ -12,38 +12,38 @@ from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME, L
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, suggest_word
 
 SHORT = 2
-"""Letters of a channel's name that say no more than quantity and axis."""
+"""Longest channel name that is quantity and axis alone, such as `fx`."""
 
 
 class PlacingError(ValueError):
     """An effect that cannot be placed in this model. Says which and why."""
 
 
-def placed_effects(
+def place_effects(
     model: MechanicalModel, input_channels: tuple[str, ...], output_channels: tuple[str, ...]
 ) -> tuple[PlacedEffect, ...]:
-    """`model.effects`, at the axes and channels that they name: where they name none, at all.
+    """`model.effects` at the axes and channels that they name; an effect that names none acts on all.
 
-    An axis is named by its channel ('fx', 'ax') or by its letter ('x'). A number that a file leaves out is as if
-    what it says were not there. Raises PlacingError.
+    An axis is named by its channel ('fx', 'ax') or by its letter ('x'). A parameter that a file leaves out takes its
+    default. Raises PlacingError for an unknown effect or axis, or a value that must not be negative.
     """
     channels = Channels(input_channels, output_channels, model.quantity)
-    return tuple(_placed(effect, channels) for effect in model.effects)
+    return tuple(_place_effect(effect, channels) for effect in model.effects)
 
 
 def model_effects(
     placed: tuple[PlacedEffect, ...], input_channels: tuple[str, ...], output_channels: tuple[str, ...]
 ) -> tuple[ModelEffect, ...]:
-    """As `placed_effects` reads them back: one per site, or one without an axis where all share it."""
+    """The inverse of `place_effects`: an entry per site, or one without an axis where all share the effect."""
     return tuple(
         _model_effect(each, axis)
         for each in placed
-        for axis in _axes(each, output_channels if place_of_effect(each.effect) == "sensor" else input_channels)
+        for axis in _axis_names(each, output_channels if place_of_effect(each.effect) == "sensor" else input_channels)
     )
 
 
 def place_of_effect(effect: Effect) -> Place:
-    """Where it sits: a law without a name, by what it acts on."""
+    """Where an effect sits (mechanism, hand, actuator, sensor); of a discovered law, by what it acts on."""
     return EFFECTS_BY_NAME[effect.name].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
 
 
@@ -51,7 +51,7 @@ def _model_effect(placed: PlacedEffect, axis: str | None) -> ModelEffect:
     law = placed.effect.law
     if law is None or axis is None:
         return ModelEffect(placed.effect.name, axis, dict(placed.effect.report(placed.values)))
-    return ModelEffect(DISCOVERED_LAW, axis, {}, replace(law_with(law, placed.values), axis=axis))
+    return ModelEffect(DISCOVERED_LAW, axis, {}, replace(law_with_values(law, placed.values), axis=axis))
 
 
 def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
@@ -61,7 +61,7 @@ def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
     return channel[-1:] if short and len(set(ends)) == len(ends) and all(end.isalpha() for end in ends) else channel
 
 
-def _axes(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
+def _axis_names(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
     shared = placed.effect.law is None and set(placed.sites) == set(range(len(channels)))
     if shared and (len(channels) > 1 or "one" not in placed.effect.sites):
         yield None
@@ -72,9 +72,9 @@ def _axes(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | Non
         yield axis_letter(channels[site], channels)
 
 
-def _placed(effect: ModelEffect, channels: Channels) -> PlacedEffect:
+def _place_effect(effect: ModelEffect, channels: Channels) -> PlacedEffect:
     if effect.law is not None:
-        return _placed_law(effect, effect.law, channels)
+        return _place_law(effect, effect.law, channels)
     entry = EFFECTS.get(effect.kind)
     if entry is None:
         raise PlacingError(
@@ -85,22 +85,26 @@ def _placed(effect: ModelEffect, channels: Channels) -> PlacedEffect:
         value = effect.parameters.get(parameter.name, 0.0)
         if parameter.scale == "log" and value < 0:
             raise PlacingError(f"{effect.kind}.{parameter.name} is {value:g}; it must not be negative")
-    return PlacedEffect(entry, _sites(effect, _channels(place_of_effect(entry), channels)), effect.parameters)
+    return PlacedEffect(
+        entry, _find_sites(effect, _channels_of_place(place_of_effect(entry), channels)), effect.parameters
+    )
 
 
-def _placed_law(effect: ModelEffect, law: Law, channels: Channels) -> PlacedEffect:
+def _place_law(effect: ModelEffect, law: Law, channels: Channels) -> PlacedEffect:
     try:
         entry = law_effect(law, channels)
     except LawError as error:
         raise PlacingError(f"{effect.kind} on {effect.axis}: {error}") from error
-    return PlacedEffect(entry, _sites(effect, _channels(place_of_effect(entry), channels)), law_values(law))
+    return PlacedEffect(
+        entry, _find_sites(effect, _channels_of_place(place_of_effect(entry), channels)), law_values(law)
+    )
 
 
-def _channels(place: Place, channels: Channels) -> tuple[str, ...]:
+def _channels_of_place(place: Place, channels: Channels) -> tuple[str, ...]:
     return channels.outputs if place == "sensor" else channels.inputs
 
 
-def _sites(effect: ModelEffect, channels: tuple[str, ...]) -> tuple[int, ...]:
+def _find_sites(effect: ModelEffect, channels: tuple[str, ...]) -> tuple[int, ...]:
     if effect.axis is None:
         return tuple(range(len(channels)))
     exact = tuple(number for number, channel in enumerate(channels) if channel == effect.axis)

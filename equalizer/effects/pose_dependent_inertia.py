@@ -1,39 +1,39 @@
-"""A mass that depends on where the axis is, as of a linkage."""
+"""Pose-dependent inertia: a mass that changes with position, as of a linkage."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import STEP_S, V_FREE, V_PER_N, X_FREE, V, X
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import beside_linear, moving, own
+from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear, value_along
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 LAGRANGE = 0.5
-"""Share of M per_m v^2 that comes with a mass that depends on the place; other sums of forces leave it out."""
+"""Share of M per_m v^2 that Lagrange's equation gives for a mass that depends on position."""
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """With the step's mean acceleration, which itself depends on the force."""
     middle, speed = 0.5 * (at[X] + at[X_FREE]), 0.5 * (at[V] + at[V_FREE])
-    more = of[0] * middle
+    more = numbers[0] * middle
     free, per_newton = (at[V_FREE] - at[V]) / at[STEP_S], at[V_PER_N] / at[STEP_S]
-    return float(-(more * free + of[0] * of[1] * speed * speed) / max(1 + more * per_newton, 0.1))
+    return float(-(more * free + numbers[0] * numbers[1] * speed * speed) / max(1 + more * per_newton, 0.1))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    mass = own(model.mass, driven_axes(model)[:, axis])
+    mass = value_along(model.mass, driven_axes(model)[:, axis])
     return np.array([values["per_m"] * mass, values.get("speed_share", LAGRANGE)])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = moving(evidence, axis)
-    mass = own(evidence.model.mass, driven_axes(evidence.model)[:, axis])
-    by_place, by_speed = -mass * of.position * of.acceleration, -mass * of.velocity**2
-    beside = beside_linear(of)
+    motion = axis_motion(evidence, axis)
+    mass = value_along(evidence.model.mass, driven_axes(evidence.model)[:, axis])
+    by_place, by_speed = -mass * motion.position * motion.acceleration, -mass * motion.velocity**2
+    beside = regress_beside_linear(motion)
     free, bound = beside.fit(by_place, by_speed), beside.fit(by_place + LAGRANGE * by_speed)
     per_m, momentum = free.strengths.tolist()
     together = float(bound.strengths[0])

@@ -1,23 +1,23 @@
-"""Dry friction that changes along the way: a bent screw, a rack, a cable that lies differently."""
+"""Position-dependent dry friction, as of a bent screw, a rack, or a cable that lies differently."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.simulation.dry_friction_kernel import rubbing
+from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.instant import X_FREE, X
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import beside_linear, sliding
+from equalizer.effects.starts.starting_values import regress_beside_linear, sliding_motion
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """With the friction at the step's mean position."""
     mean = 0.5 * (at[X] + at[X_FREE])
-    level = max(of[0] * (1 + of[1] * mean + of[2] * mean * mean), 0.0)
-    return float(rubbing(level, level, memory[0], memory, at))
+    level = max(numbers[0] * (1 + numbers[1] * mean + numbers[2] * mean * mean), 0.0)
+    return float(friction_force(level, level, memory[0], memory, at))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
@@ -25,9 +25,9 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = sliding(evidence, axis)
-    sign = -np.sign(of.velocity)
-    found = beside_linear(of).fit(sign, sign * of.position, sign * of.position**2)
+    motion = sliding_motion(evidence, axis)
+    sign = -np.sign(motion.velocity)
+    found = regress_beside_linear(motion).fit(sign, sign * motion.position, sign * motion.position**2)
     level, slope, bend = found.strengths.tolist()
     if level <= 0:
         return ()

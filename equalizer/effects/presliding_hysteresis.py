@@ -1,27 +1,27 @@
-"""Dry friction through bristles that bend before they slip, so that small motions meet a spring with a loop."""
+"""Presliding hysteresis: Dahl's bristle model of friction, a spring with a hysteresis loop for small motions."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.simulation.bristle_kernel import bent
+from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import beside_linear, best_of, moving
+from equalizer.effects.starts.starting_values import axis_motion, best_trial, regress_beside_linear
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 BENDS = np.geomspace(3e-4, 1.0, 15)
-"""Where the bristle slips, over the rms position."""
+"""Deflections at which the bristle slips that are tried, over the rms position."""
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Dahl's bristle, bent by the travel that its own force allows. Its force is between that of the step's middle,
     exact for a soft bristle, and that of its end, stable for a stiff one. memory: the bend."""
-    if of[0] <= 0:
+    if numbers[0] <= 0:
         return 0.0
-    stiffness, longest, start = of[1], of[0] / of[1], memory[0]
+    stiffness, longest, start = numbers[1], numbers[0] / numbers[1], memory[0]
     slack = stiffness * at[X_PER_N]
     late = (0.5 + slack) / (1 + slack)
     allowed = at[X_FREE] - at[X]
@@ -49,10 +49,12 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = moving(evidence, axis)
+    motion = axis_motion(evidence, axis)
     path, used = evidence.axis_position[:, axis], evidence.used > 0
-    rms = float(np.sqrt(np.mean(of.position**2)))
-    longest, found = best_of(beside_linear(of), (BENDS * rms).tolist(), lambda slip: (-bent(path, slip)[used],))
+    rms = float(np.sqrt(np.mean(motion.position**2)))
+    longest, found = best_trial(
+        regress_beside_linear(motion), (BENDS * rms).tolist(), lambda slip: (-bristle_bend(path, slip)[used],)
+    )
     level = float(found.strengths[0])
     return ({"level": level, "stiffness": level / longest},) if level > 0 else ()
 

@@ -1,24 +1,24 @@
-"""Drag that grows with the square of the velocity: air, oil, iron losses."""
+"""Quadratic damping: drag that grows with the square of the velocity, as of air or oil."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import F_END, V_FREE, V_PER_N, V
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import beside_linear, moving
+from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The mean of the drag at the step's start and end, where the velocity at its end depends on it."""
-    reach = 0.5 * of[0] * at[V_PER_N]
+    reach = 0.5 * numbers[0] * at[V_PER_N]
     aim = at[V_FREE] - reach * at[V] * abs(at[V])
     end = 2 * aim / (1 + np.sqrt(1 + 4 * reach * abs(aim)))
-    at[F_END] = -of[0] * end * abs(end)
-    return float(-0.5 * of[0] * (at[V] * abs(at[V]) + end * abs(end)))
+    at[F_END] = -numbers[0] * end * abs(end)
+    return float(-0.5 * numbers[0] * (at[V] * abs(at[V]) + end * abs(end)))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
@@ -26,8 +26,8 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = moving(evidence, axis)
-    coefficient = float(beside_linear(of).fit(-of.velocity * np.abs(of.velocity)).strengths[0])
+    motion = axis_motion(evidence, axis)
+    coefficient = float(regress_beside_linear(motion).fit(-motion.velocity * np.abs(motion.velocity)).strengths[0])
     return ({"coefficient": coefficient},) if coefficient > 0 else ()
 
 

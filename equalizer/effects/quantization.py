@@ -1,4 +1,4 @@
-"""A converter's steps: the response takes only whole multiples of one.
+"""Quantization: the response takes only whole multiples of a converter's step.
 
 Where the recording itself lies on such a lattice, what was read before rounding is known to half a step. The residual
 is then the quantile of the noise at which it must have been (Dunn and Smyth 1996, J. Comput. Graph. Stat. 5:236), so
@@ -18,25 +18,29 @@ FAR = 1e-12
 """Probability beyond which a quantile is not looked up."""
 
 
-def _rounded(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+def _round_response(
+    response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
+) -> FloatArray:
     read = response.copy()
-    if of["step"] > 0:
-        read[:, channels] = of["step"] * np.round(response[:, channels] / of["step"])
+    if values["step"] > 0:
+        read[:, channels] = values["step"] * np.round(response[:, channels] / values["step"])
     return read
 
 
-def _given(
-    response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], of: Values
+def _round_as_measured(
+    response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    read, step = _rounded(response, 0.0, channels, of), of["step"]
+    read, step = _round_response(response, 0.0, channels, values), values["step"]
     for channel in channels:
         if lattice_offset(measured[:, channel], step) is not None:
-            read[:, channel] = _within_step(response[:, channel], measured[:, channel], float(noise[channel]), step)
+            read[:, channel] = _quantile_response(
+                response[:, channel], measured[:, channel], float(noise[channel]), step
+            )
     return read
 
 
-def _within_step(response: FloatArray, measured: FloatArray, noise: float, step: float) -> FloatArray:
-    """What must have been predicted for the residual to be the noise's quantile."""
+def _quantile_response(response: FloatArray, measured: FloatArray, noise: float, step: float) -> FloatArray:
+    """The prediction for which the residual is the noise's quantile (randomised quantile residual)."""
     missing = measured - response
     # From the side of the shorter tail, where probabilities keep their digits.
     side = np.where(missing > 0, -1.0, 1.0)
@@ -65,7 +69,7 @@ EFFECT = Effect(
     signature="the response takes whole multiples of one step, with as much error at every level, while the position "
     "agrees",
     parameters=(Parameter("step", 1e-12, 1e9, none=0.0, fixed=True),),
-    acts=OnResponse(_rounded, stage=3, given=_given),
+    acts=OnResponse(_round_response, stage=3, given=_round_as_measured),
     starts=_starts,
     sites=("all", "one"),
 )

@@ -1,4 +1,4 @@
-"""A sensor that reads no more than so much."""
+"""Sensor clipping: readings are limited to the sensor's range."""
 
 import math
 
@@ -10,9 +10,11 @@ from equalizer.effects.starts.response_starts import channels_of, likeliest_read
 from equalizer.signals.signal import FloatArray
 
 
-def _clipped(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+def _clip_response(
+    response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
+) -> FloatArray:
     read = response.copy()
-    read[:, channels] = np.clip(response[:, channels], -of["limit"], of["limit"])
+    read[:, channels] = np.clip(response[:, channels], -values["limit"], values["limit"])
     return read
 
 
@@ -36,7 +38,7 @@ EFFECT = Effect(
     signature="the peaks of the response are cut off flat at one height, at the top level alone, while the position "
     "agrees",
     parameters=(Parameter("limit", 1e-9, 1e9, none=math.inf),),
-    acts=OnResponse(_clipped, stage=1),
+    acts=OnResponse(_clip_response, stage=1),
     starts=_starts,
     sites=("one", "all"),
 )

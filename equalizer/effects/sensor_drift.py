@@ -1,4 +1,4 @@
-"""A sensor whose zero wanders away while it is recorded: warming up."""
+"""Sensor drift: the zero of a sensor moves slowly during a recording, as while it warms up."""
 
 import numpy as np
 
@@ -9,23 +9,24 @@ from equalizer.signals.signal import FloatArray
 
 LEAST_SIGMA = 5.0
 STEEPEST = 3.0
-"""Bend, and start, as shares of the total, beyond which this would hardly be called a drift."""
+"""Largest bend and start, as shares of the total."""
 
 
-def _shape(samples: int, bend: float, start: float = 0.0) -> FloatArray:
+def _drift_shape(samples: int, bend: float, start: float = 0.0) -> FloatArray:
     share = np.linspace(0.0, 1.0, samples)
     return np.asarray(start + share + 4 * bend * share * (1 - share))
 
 
-def _drifted(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+def _add_drift(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
     read = response.copy()
-    read[:, channels] += (of["total"] * _shape(len(response), of.get("bend", 0.0), of.get("start", 0.0)))[:, None]
+    shape = _drift_shape(len(response), values.get("bend", 0.0), values.get("start", 0.0))
+    read[:, channels] += (values["total"] * shape)[:, None]
     return read
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     residual, n = (evidence.response - evidence.predicted)[:, channel], len(evidence.response)
-    basis = np.column_stack([_shape(n, 0.0), _shape(n, 1.0) - _shape(n, 0.0), np.ones(n)])
+    basis = np.column_stack([_drift_shape(n, 0.0), _drift_shape(n, 1.0) - _drift_shape(n, 0.0), np.ones(n)])
     total, middle, first = shares_of(residual, basis, evidence.used).tolist()
     straight, zero = shares_of(residual, basis[:, [0, 2]], evidence.used).tolist()
     size = float(np.sqrt(np.mean((residual - straight * basis[:, 0] - zero)[evidence.used > 0] ** 2)))
@@ -53,7 +54,7 @@ EFFECT = Effect(
         Parameter("bend", -STEEPEST, STEEPEST, none=None, scale="linear", step=0.02),
         Parameter("start", -STEEPEST, STEEPEST, none=None, scale="linear", step=0.02),
     ),
-    acts=OnResponse(_drifted, stage=2, of_whole=True),
+    acts=OnResponse(_add_drift, stage=2, of_whole=True),
     starts=_starts,
     of_time=True,
     sites=("one", "each"),

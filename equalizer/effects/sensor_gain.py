@@ -1,4 +1,4 @@
-"""A sensor whose sensitivity is not what its sheet says."""
+"""Sensor gain: a sensitivity that differs from the data sheet's."""
 
 import numpy as np
 
@@ -10,9 +10,11 @@ from equalizer.signals.signal import FloatArray
 LEAST = 1e-4
 
 
-def _scaled(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+def _scale_response(
+    response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
+) -> FloatArray:
     read = response.copy()
-    read[:, channels] *= of["gain"]
+    read[:, channels] *= values["gain"]
     return read
 
 
@@ -31,7 +33,7 @@ EFFECT = Effect(
     source="Analog Devices ADXL335 data sheet: sensitivity 270 to 330 mV/g, in proportion to the supply",
     signature="the response is off by one factor at every frequency and level, while the position agrees",
     parameters=(Parameter("gain", 0.01, 100.0, none=1.0),),
-    acts=OnResponse(_scaled),
+    acts=OnResponse(_scale_response),
     starts=_starts,
     sites=("one", "all"),
 )

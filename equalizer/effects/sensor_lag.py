@@ -1,11 +1,11 @@
-"""A sensor, or the filter of one channel, that is slower or faster than the model says."""
+"""Sensor lag: the low pass of a sensor or channel has another bandwidth than the model's."""
 
 import math
 
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.simulation.sensor_path import before_low_pass, low_passed
+from equalizer.effects.simulation.sensor_path import low_pass, undo_low_pass
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import likeliest_reading
 from equalizer.signals.signal import FloatArray
@@ -14,13 +14,15 @@ SLOWEST, FASTEST = 0.002, 1.5
 """Bandwidths worth a try, as shares of the sample rate."""
 
 
-def _as_filtered(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
-    """The low pass is the model's own, with another bandwidth."""
+def _keep_response(
+    response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
+) -> FloatArray:
+    """The response as it is: the model's own low pass takes the other bandwidth."""
     return response
 
 
-def _bandwidth_hz(known_hz: float, of: Values) -> float:
-    return known_hz if math.isinf(of["bandwidth"]) else of["bandwidth"]
+def _bandwidth_hz(known_hz: float, values: Values) -> float:
+    return known_hz if math.isinf(values["bandwidth"]) else values["bandwidth"]
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
@@ -28,7 +30,7 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     bandwidth = likeliest_reading(
         evidence,
         channel,
-        lambda samples, value: low_passed(before_low_pass(samples, rate, known_hz), rate, value),
+        lambda samples, value: low_pass(undo_low_pass(samples, rate, known_hz), rate, value),
         list(np.geomspace(SLOWEST * rate, FASTEST * rate, 10)),
     )
     return () if bandwidth is None else ({"bandwidth": bandwidth},)
@@ -40,7 +42,7 @@ EFFECT = Effect(
     source="Analog Devices ADXL335 data sheet: bandwidth set by an RC filter of 32 kOhm +-15 %",
     signature="the response falls short and late at high frequencies, at every level alike, while the position agrees",
     parameters=(Parameter("bandwidth", 1e-2, 1e5, none=math.inf),),
-    acts=OnResponse(_as_filtered, bandwidth_hz=_bandwidth_hz),
+    acts=OnResponse(_keep_response, bandwidth_hz=_bandwidth_hz),
     starts=_starts,
     sites=("all", "one"),
 )

@@ -1,6 +1,6 @@
-"""A sensor that is mounted at an angle: what it reads is turned, lengths stay.
+"""Sensor misalignment: a sensor mounted at an angle, whose readings are rotated.
 
-Two or three channels turn together; with two, about an axis that stands upright on both.
+Two or three channels are rotated together; two, about the axis perpendicular to both.
 """
 
 import math
@@ -16,23 +16,25 @@ LARGEST_DEG = 120.0
 LEAST_DEG = 0.01
 
 
-def _turned(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+def _rotate_response(
+    response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
+) -> FloatArray:
     if len(channels) not in (2, 3):
         raise ValueError(f"sensor_misalignment turns two or three channels together, not {len(channels)}")
-    rotation = _matrix(np.radians(_vector(of)))
+    rotation = _rotation_matrix(np.radians(_rotation_degrees(values)))
     read = response.copy()
     read[:, channels] = response[:, channels] @ rotation[: len(channels), : len(channels)].T
     return read
 
 
-def _vector(of: Values) -> list[float]:
-    """Degrees about each axis; about the last where only the angle is known."""
-    about = [of.get(name, 0.0) for name in ABOUT]
-    return about if any(name in of for name in ABOUT) else [0.0, 0.0, of["degrees"]]
+def _rotation_degrees(values: Values) -> list[float]:
+    """Rotation vector, degrees about each axis; about the last one where only the angle is known."""
+    about = [values.get(name, 0.0) for name in ABOUT]
+    return about if any(name in values for name in ABOUT) else [0.0, 0.0, values["degrees"]]
 
 
-def _matrix(vector: FloatArray) -> FloatArray:
-    """Rodrigues' formula; radians."""
+def _rotation_matrix(vector: FloatArray) -> FloatArray:
+    """Rotation matrix of a rotation vector in radians (Rodrigues' formula)."""
     angle = float(np.linalg.norm(vector))
     x, y, z = vector / angle if angle > 0 else vector
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -40,7 +42,7 @@ def _matrix(vector: FloatArray) -> FloatArray:
 
 
 def _rotation_vector(matrix: FloatArray) -> FloatArray:
-    """Its inverse, for angles well below half a turn; zero for none."""
+    """Rotation vector in radians of a rotation matrix, for angles well below half a turn; zero for the identity."""
     across = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
     twice_sine = float(np.linalg.norm(across))
     angle = math.atan2(twice_sine, float(np.trace(matrix)) - 1)
@@ -63,8 +65,9 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     return (dict(zip(ABOUT, vector.tolist(), strict=True)),)
 
 
-def _report(of: Values) -> Values:
-    return {"degrees": math.hypot(*_vector(of)), **{name: of[name] for name in ABOUT if name in of}}
+def _report(values: Values) -> Values:
+    about = {name: values[name] for name in ABOUT if name in values}
+    return {"degrees": math.hypot(*_rotation_degrees(values)), **about}
 
 
 EFFECT = Effect(
@@ -74,7 +77,7 @@ EFFECT = Effect(
     signature="each channel reads a constant share of the others at every frequency and level, with opposite signs "
     "both ways, while the position agrees",
     parameters=tuple(Parameter(name, -LARGEST_DEG, LARGEST_DEG, none=0.0, scale="linear", step=0.05) for name in ABOUT),
-    acts=OnResponse(_turned, stage=-2, shared=True),
+    acts=OnResponse(_rotate_response, stage=-2, shared=True),
     starts=_starts,
     sites=("all",),
     report=_report,

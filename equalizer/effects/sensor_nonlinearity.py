@@ -1,4 +1,4 @@
-"""A sensor whose sensitivity changes with what it reads, alike both ways."""
+"""Cubic sensor nonlinearity: the sensitivity changes with the reading, symmetrically."""
 
 import numpy as np
 
@@ -8,9 +8,9 @@ from equalizer.effects.starts.response_starts import channels_of, shares_of
 from equalizer.signals.signal import FloatArray
 
 
-def _bent(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+def _add_cubic(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
     read = response.copy()
-    read[:, channels] += of["cubic"] * response[:, channels] ** 3
+    read[:, channels] += values["cubic"] * response[:, channels] ** 3
     return read
 
 
@@ -32,7 +32,7 @@ EFFECT = Effect(
     signature="what the response is off by grows with its cube at every frequency, with odd harmonics that rise with "
     "the level, while the position agrees",
     parameters=(Parameter("cubic", -1e12, 1e12, none=0.0, scale="signed"),),
-    acts=OnResponse(_bent),
+    acts=OnResponse(_add_cubic),
     starts=_starts,
     sites=("one", "all"),
 )

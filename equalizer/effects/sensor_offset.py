@@ -1,4 +1,4 @@
-"""A sensor that does not read zero at rest."""
+"""Sensor offset (bias): the reading at rest is not zero."""
 
 import numpy as np
 
@@ -10,9 +10,9 @@ LEAST_SIGMA = 4.0
 """Standard errors of a mean below which there is no offset to speak of."""
 
 
-def _shifted(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+def _add_offset(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
     read = response.copy()
-    read[:, channels] += of["offset"]
+    read[:, channels] += values["offset"]
     return read
 
 
@@ -29,7 +29,7 @@ EFFECT = Effect(
     source="IEEE Std 1293, single-axis accelerometers: bias",
     signature="the response is off by the same amount all the time, at rest as in motion, while the position agrees",
     parameters=(Parameter("offset", -1e12, 1e12, none=0.0, scale="signed"),),
-    acts=OnResponse(_shifted, stage=2),
+    acts=OnResponse(_add_offset, stage=2),
     starts=_starts,
     sites=("one", "each"),
 )

@@ -1,34 +1,34 @@
-"""An actuator whose force cannot change faster than so: voltage over inductance, or a ramp in its software."""
+"""Slew-rate limit: an actuator's force changes at a limited rate, by voltage over inductance or a software ramp."""
 
 import math
 
 import numpy as np
 
 from equalizer.effects.effect import ALL_SITES, Effect, OnCommand, Parameter, Values
-from equalizer.effects.simulation.slew_kernel import follow
+from equalizer.effects.simulation.slew_kernel import limit_rate
 from equalizer.effects.starts.command_starts import likeliest_value
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 SELDOM = (0.3, 0.5, 0.75)
-"""Of the command's fastest change."""
+"""Rates to start from, as shares of the command's fastest change, where a limit is seldom reached."""
 ERRS = 1.05
-"""Times its noise that a channel must err by for a guess to be tried."""
+"""RMS residual of a channel, over its noise, from which these guesses are tried."""
 
 
-def _followed(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    return np.asarray(_both(commands, step_s, of["rate"])[0])
+def _limit_rate(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    return np.asarray(_mean_and_end(commands, step_s, values["rate"])[0])
 
 
-def _followed_at_end(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    return np.asarray(_both(commands, step_s, of["rate"])[1])
+def _limit_rate_at_end(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    return np.asarray(_mean_and_end(commands, step_s, values["rate"])[1])
 
 
-def _both(commands: FloatArray, step_s: float, rate: float) -> FloatArray:
+def _mean_and_end(commands: FloatArray, step_s: float, rate: float) -> FloatArray:
     if math.isinf(rate):
         return np.array([commands, commands])
     found = np.empty((2, len(commands)))
-    follow(np.asarray(commands, dtype=np.float64), rate * step_s, found[0], found[1])
+    limit_rate(np.asarray(commands, dtype=np.float64), rate * step_s, found[0], found[1])
     return found
 
 
@@ -40,18 +40,18 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     rate = likeliest_value(
         evidence,
         axis,
-        lambda u, step_s, value: _followed(u, step_s, {"rate": value}),
+        lambda u, step_s, value: _limit_rate(u, step_s, {"rate": value}),
         list(np.geomspace(0.01 * fastest, fastest, 12)),
         True,
     )
     likeliest = () if rate is None else ({"rate": rate},)
-    if not _unexplained(evidence):
+    if not _has_unexplained_error(evidence):
         return likeliest
     # Seldom exceeded, a limit hides in what re-tuning did: then it must be tried.
     return likeliest + tuple({"rate": share * fastest} for share in (SELDOM if axis == ALL_SITES else SELDOM[1:2]))
 
 
-def _unexplained(evidence: Evidence) -> bool:
+def _has_unexplained_error(evidence: Evidence) -> bool:
     """Whether any channel errs by more than its noise."""
     left = (evidence.response - evidence.predicted)[evidence.used > 0]
     return bool((np.sqrt(np.nanmean(left**2, axis=0)) > ERRS * evidence.noise).any())
@@ -63,7 +63,7 @@ EFFECT = Effect(
     source="Isermann, Mechatronic Systems, Springer 2005, ch. 10: limits of actuators",
     signature="force is missing where the command changes fast, more at high frequencies and high levels",
     parameters=(Parameter("rate", 1e-2, 1e7, none=math.inf),),
-    acts=OnCommand(_followed, fine=True, at_end=_followed_at_end),
+    acts=OnCommand(_limit_rate, fine=True, at_end=_limit_rate_at_end),
     starts=_starts,
     sites=("one", "all"),
 )

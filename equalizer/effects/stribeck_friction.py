@@ -1,29 +1,29 @@
-"""Dry friction that is strongest at rest and weakens as the motion gets faster."""
+"""Stribeck friction: dry friction that falls from its static to its Coulomb level as the velocity rises."""
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.simulation.dry_friction_kernel import rubbing
+from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.instant import V_FREE, V_PER_N, V
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import beside_linear, best_of, sliding
+from equalizer.effects.starts.starting_values import best_trial, regress_beside_linear, sliding_motion
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 SPEEDS = np.geomspace(0.03, 1.5, 12)
-"""Of the rms velocity."""
+"""Stribeck velocities that are tried, over the rms velocity."""
 _MORE = 1.2
 """Static over Coulomb friction, where the data show none."""
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """With the friction at the step's mean velocity, which itself depends on the force."""
     mean, force, start = at[V], 0.0, memory[0]
     for _ in range(3):
-        level = of[0] + (of[1] - of[0]) * np.exp(-((mean / of[2]) ** 2))
-        force = rubbing(level, level, start, memory, at)
+        level = numbers[0] + (numbers[1] - numbers[0]) * np.exp(-((mean / numbers[2]) ** 2))
+        force = friction_force(level, level, start, memory, at)
         mean = 0.5 * (at[V] + at[V_FREE] + at[V_PER_N] * force)
     return float(force)
 
@@ -33,12 +33,12 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = sliding(evidence, axis)
-    sign, rms = np.sign(of.velocity), float(np.sqrt(np.mean(of.velocity**2)))
-    speed, found = best_of(
-        beside_linear(of),
+    motion = sliding_motion(evidence, axis)
+    sign, rms = np.sign(motion.velocity), float(np.sqrt(np.mean(motion.velocity**2)))
+    speed, found = best_trial(
+        regress_beside_linear(motion),
         (SPEEDS * rms).tolist(),
-        lambda slow: (-sign, -sign * np.exp(-((of.velocity / slow) ** 2))),
+        lambda slow: (-sign, -sign * np.exp(-((motion.velocity / slow) ** 2))),
     )
     coulomb, more = found.strengths.tolist()
     if coulomb <= 0 and coulomb + more <= 0:

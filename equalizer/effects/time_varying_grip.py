@@ -1,13 +1,13 @@
-"""A grip that tightens and loosens: the damping and the stiffness towards the ground come and go."""
+"""Time-varying grip: damping and stiffness to the ground change sinusoidally with time."""
 
 import numpy as np
 from scipy.fft import fft, ifft, next_fast_len
 
 from equalizer.effects.effect import ALL_SITES, AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import STEP_S, TIME_S, V_FREE, V_PER_N, X_FREE, X_PER_N, V, X
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import Beside, beside_linear, moving
+from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, regress_beside_linear
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.lockin import ComplexArray
@@ -17,17 +17,18 @@ FASTEST_HZ, STARTS = 15.0, 2
 _FINER = 16
 
 
-@compiled_law
-def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The mean over the step, in which the motion at its end depends on the force."""
-    swing = of[1] * np.sin(of[0] * (at[TIME_S] + 0.5 * at[STEP_S]) + of[2])
-    damping, stiffness = swing * of[3], swing * of[4]
+    swing = numbers[1] * np.sin(numbers[0] * (at[TIME_S] + 0.5 * at[STEP_S]) + numbers[2])
+    damping, stiffness = swing * numbers[3], swing * numbers[4]
     force = -0.5 * (damping * (at[V] + at[V_FREE]) + stiffness * (at[X] + at[X_FREE]))
     return float(force / max(1 + 0.5 * (damping * at[V_PER_N] + stiffness * at[X_PER_N]), 0.2))
 
 
-def grounded(matrix: FloatArray, axes: FloatArray, axis: int) -> float:
-    """Of a damping or stiffness, what holds a driven axis to the ground: bodies that hang on it go along."""
+def value_to_ground(matrix: FloatArray, axes: FloatArray, axis: int) -> float:
+    """Damping or stiffness that ties a driven axis to the ground; attached bodies are condensed out (static
+    condensation, Guyan 1965). matrix: (n, n), axes: (n, m)."""
     carried = np.linalg.norm(axes, axis=1) < 1e-9
     rest = matrix[np.ix_(~carried, ~carried)]
     if carried.any():
@@ -39,7 +40,7 @@ def grounded(matrix: FloatArray, axes: FloatArray, axis: int) -> float:
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
     axes = driven_axes(model)
-    damping, stiffness = grounded(model.damping, axes, axis), grounded(model.stiffness, axes, axis)
+    damping, stiffness = value_to_ground(model.damping, axes, axis), value_to_ground(model.stiffness, axes, axis)
     turning, share = 2 * np.pi * values["rate_hz"], values.get("stiffness_share", 0.0)
     return np.array([turning, values["depth"], values.get("phase", 0.0), damping, share * stiffness])
 
@@ -51,19 +52,21 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     pull = np.zeros((n, len(sites)))
     axes, used = driven_axes(evidence.model), evidence.used > 0
     for column, site in enumerate(sites):
-        force[used, column] = beside_linear(moving(evidence, site)).force
-        drag[used, column] = -grounded(evidence.model.damping, axes, site) * evidence.axis_velocity[used, site]
-        pull[used, column] = -grounded(evidence.model.stiffness, axes, site) * evidence.axis_position[used, site]
+        force[used, column] = regress_beside_linear(axis_motion(evidence, site)).force
+        drag[used, column] = -value_to_ground(evidence.model.damping, axes, site) * evidence.axis_velocity[used, site]
+        pull[used, column] = -value_to_ground(evidence.model.stiffness, axes, site) * evidence.axis_position[used, site]
     found = []
-    for rate_hz in _rates(force, drag, rate):
+    for rate_hz in _likely_rates(force, drag, rate):
         angle = 2 * np.pi * rate_hz * np.arange(n)[:, None] / rate
         shapes = [part * wave for part in (drag, pull) for wave in (np.sin(angle), np.cos(angle))]
-        fit = Beside(force.ravel(), np.column_stack([drag.ravel(), pull.ravel()])).fit(*(s.ravel() for s in shapes))
-        found.append((fit.explained, _values(rate_hz, fit.strengths)))
+        fit = PartialRegression(force.ravel(), np.column_stack([drag.ravel(), pull.ravel()])).fit(
+            *(s.ravel() for s in shapes)
+        )
+        found.append((fit.explained, _grip_values(rate_hz, fit.strengths)))
     return tuple(values for _, values in sorted(found, key=lambda item: -item[0]))
 
 
-def _values(rate_hz: float, strengths: FloatArray) -> Values:
+def _grip_values(rate_hz: float, strengths: FloatArray) -> Values:
     sine, cosine, stiff_sine, stiff_cosine = strengths.tolist()
     depth = float(np.hypot(sine, cosine))
     share = (stiff_sine * sine + stiff_cosine * cosine) / max(depth**2, np.finfo(float).tiny)
@@ -73,7 +76,7 @@ def _values(rate_hz: float, strengths: FloatArray) -> Values:
 
 
 def _slow_lines(samples: FloatArray, size: int, count: int) -> ComplexArray:
-    """The first lines of a transform of so many samples, the last of them zeros: of all lines they are few."""
+    """The first `count` lines of the DFT of samples zero-padded to `size`."""
     # Bluestein's chirp transform (Rabiner, Schafer and Rader 1969, Bell Syst. Tech. J. 48:1249).
     n, last = len(samples), max(len(samples), count)
     chirp = np.exp(-1j * np.pi / size * np.arange(last) ** 2)
@@ -83,8 +86,9 @@ def _slow_lines(samples: FloatArray, size: int, count: int) -> ComplexArray:
     return np.asarray(mixed[n - 1 : n - 1 + count] * chirp[:count])
 
 
-def _rates(force: FloatArray, drag: FloatArray, rate: float) -> list[float]:
-    """How often the damping comes and goes: the missing force against the drag, times a wave, at every rate."""
+def _likely_rates(force: FloatArray, drag: FloatArray, rate: float) -> list[float]:
+    """Likeliest modulation frequencies in Hz: regression of the missing force on the modulated drag, at every
+    frequency."""
     n = len(force)
     size = _FINER * n
     # Its square is needed at twice as high a line, which a slow clock does not hold.

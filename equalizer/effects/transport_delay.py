@@ -1,9 +1,9 @@
-"""Commands that take effect later than was assumed: a bus, a servo tick."""
+"""Transport delay: commands take effect later than assumed, as by a bus or a servo tick."""
 
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnCommand, Parameter, Values
-from equalizer.effects.simulation.command_path import delayed, delayed_at_end
+from equalizer.effects.simulation.command_path import delay_at_end, delay_mean
 from equalizer.effects.starts.command_starts import likeliest_value
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import starts_for_lateness
@@ -11,27 +11,27 @@ from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05
 BEYOND = 0.15
-"""Of the time that a command is held. What follows a force at once jumps where the delay passes a whole such time: from
-one side of it no small step leads to the other."""
+"""Of the hold time. An acceleration follows a force at once, so that the misfit jumps where the delay passes a whole
+number of hold times: a gradient search does not cross from one side to the other."""
 
 
-def _late(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    return delayed(commands, step_s, of["delay"])
+def _delay_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    return delay_mean(commands, step_s, values["delay"])
 
 
-def _late_at_end(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    return delayed_at_end(commands, step_s, of["delay"])
+def _delay_force_at_end(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    return delay_at_end(commands, step_s, values["delay"])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    fitting = likeliest_value(evidence, axis, delayed, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False)
+    fitting = likeliest_value(evidence, axis, delay_mean, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False)
     starts = starts_for_lateness(evidence, axis, fitting, LONGEST_S)
-    beside = tuple(_across(late, 1 / evidence.sample_rate_hz) for late in starts[:1])
+    beside = tuple(_across_nearest_step(late, 1 / evidence.sample_rate_hz) for late in starts[:1])
     return tuple({"delay": late} for late in (*starts, *beside))
 
 
-def _across(late_s: float, held_s: float) -> float:
-    """On the other side of the nearest whole number of times that a command is held."""
+def _across_nearest_step(late_s: float, held_s: float) -> float:
+    """A delay on the other side of the nearest whole number of hold times."""
     whole = max(round(late_s / held_s), 1)
     return (whole + (BEYOND if late_s < whole * held_s else -BEYOND)) * held_s
 
@@ -42,7 +42,7 @@ EFFECT = Effect(
     source="Diolaiti et al., IEEE Trans. Robot. 22 (2006) 256: delay in a haptic loop",
     signature="the phase falls in proportion to frequency while the gain stays, in position and response alike",
     parameters=(Parameter("delay", 1e-6, 1.0, none=0.0),),
-    acts=OnCommand(_late, fine=True, at_end=_late_at_end),
+    acts=OnCommand(_delay_force, fine=True, at_end=_delay_force_at_end),
     starts=_starts,
     sites=("all", "one"),
 )

@@ -1,4 +1,4 @@
-"""More damping than the model has: a bearing, eddy currents, a motor on a voltage drive."""
+"""Viscous damping beyond the model's, as of a bearing, eddy currents, or a motor on a voltage drive."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import Beside, moving, own
+from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, value_along
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -20,10 +20,11 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    of = moving(evidence, axis)
-    fit = Beside(of.force, np.column_stack([of.position, of.acceleration, np.ones_like(of.position)])).fit(-of.velocity)
+    motion = axis_motion(evidence, axis)
+    nuisances = np.column_stack([motion.position, motion.acceleration, np.ones_like(motion.position)])
+    fit = PartialRegression(motion.force, nuisances).fit(-motion.velocity)
     damping = float(fit.strengths[0])
-    known = own(evidence.model.damping, driven_axes(evidence.model)[:, axis])
+    known = value_along(evidence.model.damping, driven_axes(evidence.model)[:, axis])
     guesses = (damping, _GUESS * known)
     return tuple({"damping": guess} for guess in guesses if guess > 0)
 

@@ -7,7 +7,7 @@ import numpy as np
 from analysis.diagnosis.forces.missing_force import missing_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.simulation.simulator import Played, simulate_mechanism
+from equalizer.effects.simulation.simulator import SimulationResult, simulate_mechanism
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits
 
@@ -78,7 +78,7 @@ def silent_odd_lines() -> np.ndarray:
 @dataclass(frozen=True, slots=True)
 class Measured:
     command: np.ndarray
-    played: Played
+    played: SimulationResult
     response: np.ndarray
     position: np.ndarray
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equalizer.effects.force_nonlinearity import bent
+from equalizer.effects.force_nonlinearity import square_law_force
 from equalizer.signals.signal import FloatArray
 
 DEAD, FULL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
@@ -60,7 +60,7 @@ def closer(law: CommandLaw) -> Iterator[CommandLaw]:
 
 
 def _bent(command: FloatArray, of: dict[str, float]) -> FloatArray:
-    return bent(command, of["square"], of["reference"])[:, None]
+    return square_law_force(command, of["square"], of["reference"])[:, None]
 
 
 def _sizes(size: FloatArray, shares: Sequence[float]) -> list[float]:

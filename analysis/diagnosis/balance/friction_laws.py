@@ -16,7 +16,7 @@ from analysis.diagnosis.balance.law import (
     through_lines,
 )
 from analysis.diagnosis.balance.motion import Motion
-from equalizer.effects.simulation.bristle_kernel import bent
+from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 SHARP = 0.01
@@ -36,7 +36,7 @@ def friction_laws(c: int, of: Scales) -> Iterator[Law]:
     widths = np.geomspace(0.003, 0.5, 7) if of.turns else of.travel * np.geomspace(0.001, 0.3, 9)
     for width in widths:
         yield Law(
-            "presliding_hysteresis", c, (float(width),), lambda m, n: bent(m.position[:, c], n[0])[:, None],
+            "presliding_hysteresis", c, (float(width),), lambda m, n: bristle_bend(m.position[:, c], n[0])[:, None],
             _presliding_values, bounded=((0.1 * widths[0], widths[-1]),),
         )  # fmt: skip
     yield Law("asymmetric_friction", c, (), _asymmetric(c, sharp), _asymmetric_values)

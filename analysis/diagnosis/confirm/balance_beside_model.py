@@ -22,8 +22,8 @@ from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.forces.needed_force import band_motion, needed_force
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import PlacedEffect, Structure
-from equalizer.effects.placing import placed_effects
-from equalizer.effects.simulation.along_motion import entered_force, force_along
+from equalizer.effects.placing import place_effects
+from equalizer.effects.simulation.along_motion import actuator_force, force_along
 from equalizer.effects.simulation.bodies import bodies_of
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
@@ -79,11 +79,11 @@ class _Seen:
 
 def _seen(record: Observed, motion: Motion, model: MechanicalModel) -> _Seen:
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
-    known = placed_effects(model, recording.command.channels, recording.response.channels)
+    known = place_effects(model, recording.command.channels, recording.response.channels)
     at = _structure(carrying(model, recording), known)
     whole = needed_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     course = whole.axis_position, whole.axis_velocity, whole.axis_acceleration
-    entered = entered_force(model, motion.force, rate_hz, known, recording.hold)
+    entered = actuator_force(model, motion.force, rate_hz, known, recording.hold)
     added = force_along(at, known, course, (motion.force, entered - whole.force), rate_hz)
     every = max(int(rate_hz / (FINEST * motion.band_hz)), 1)
     position, velocity, acceleration = (each[::every] for each in course)

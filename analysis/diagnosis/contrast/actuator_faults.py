@@ -8,8 +8,8 @@ from scipy.fft import irfft, rfft
 
 from analysis.diagnosis.contrast.fault import Fault, Numbers, Told, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
-from equalizer.effects.simulation.sensor_path import one_pole
-from equalizer.effects.simulation.slew_kernel import follow
+from equalizer.effects.simulation.sensor_path import filter_one_pole
+from equalizer.effects.simulation.slew_kernel import limit_rate
 from equalizer.signals.band_limited import end_to_end_line, odd_extension
 from equalizer.signals.signal import FloatArray
 
@@ -109,7 +109,7 @@ def _slow(axis: _Axis, limit: float) -> Variant:
 def _followed(command: FloatArray, reach: float) -> FloatArray:
     """As near to the command as it comes by steps of `reach` at most."""
     mean, end = np.empty_like(command), np.empty_like(command)
-    follow(command - command[0], reach, mean, end)
+    limit_rate(command - command[0], reach, mean, end)
     return np.asarray(end + command[0])
 
 
@@ -160,5 +160,5 @@ def lagged(samples: FloatArray, constant: float) -> FloatArray:
     """A low pass of the first order; constant: in samples."""
     share = 1 - np.exp(-1 / constant)
     passed = np.empty((len(samples), 1))
-    one_pole((samples - samples[0])[:, None], 1 - share, passed)
+    filter_one_pole((samples - samples[0])[:, None], 1 - share, passed)
     return np.asarray(samples[0] + passed[:, 0])

@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.contrast.taken import Taken
 from analysis.diagnosis.settings import STEP_FACTOR
-from equalizer.effects.starts.lattice import lattice_step, own_step
+from equalizer.effects.starts.lattice import confirm_lattice_step, lattice_step
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.signal import FloatArray
 
@@ -79,7 +79,7 @@ def steps_of(faulty: Sequence[Taken], clean: Sequence[Taken]) -> Line | None:
         here, usual = (np.concatenate([part.command[:, channel] for part in parts]) for parts in (faulty, clean))
         step = lattice_step(here)
         many = len(np.unique(usual)) > 2 * len(np.unique(here))
-        if many and step is not None and step > STEP_FACTOR * own_step(usual, step):
+        if many and step is not None and step > STEP_FACTOR * confirm_lattice_step(usual, step):
             return Line("force_quantization", "actuator", (channel,), {"step": step})
     return None
 

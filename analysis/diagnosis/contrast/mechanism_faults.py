@@ -10,7 +10,7 @@ from analysis.diagnosis.balance.law import sliding
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.fault import Fault, Numbers, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
-from equalizer.effects.simulation.bristle_kernel import bent
+from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 Shape = Callable[[Motion], FloatArray]
@@ -97,7 +97,7 @@ def _one_sided(axis: _Axis, wide: float) -> Variant:
 
 def _giving(axis: _Axis, give: float) -> Variant:
     numbers: Numbers = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / give}  # noqa: E731
-    return Variant((axis.of(lambda m: bent(m.position[:, axis.channel], give)),), numbers, least=0.0)
+    return Variant((axis.of(lambda m: bristle_bend(m.position[:, axis.channel], give)),), numbers, least=0.0)
 
 
 def _ripple(axis: _Axis, pitch: float) -> Variant:

@@ -9,7 +9,7 @@ import numpy as np
 from analysis.diagnosis.contrast.actuator_faults import AROUND, BEGUN, GRID, at_times, late_times, later, middle_hz
 from analysis.diagnosis.contrast.fault import EVERY, Fault, Numbers, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
-from equalizer.effects.simulation.bristle_kernel import bent
+from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 Read = Callable[[FloatArray, float], FloatArray]
@@ -106,7 +106,7 @@ def _play(channel: _Channel, gap: float) -> Variant:
 def _driven(y: FloatArray, gap: float) -> FloatArray:
     """What drives a reading through a gap: half of it ahead. It turns round at the reading's extreme, at first slowly,
     and has crossed the gap where the reading turns round, too."""
-    side = np.sign(bent(y, TURNED * gap))
+    side = np.sign(bristle_bend(y, TURNED * gap))
     ahead = 0.5 * side
     turns = np.flatnonzero(side[1:] * side[:-1] < 0) + 1
     for begin, turn in pairwise([0, *turns.tolist()]):

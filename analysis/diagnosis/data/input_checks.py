@@ -21,7 +21,7 @@ from analysis.diagnosis.settings import (
     SHORTEST_S,
     SHORTEST_SAMPLES,
 )
-from equalizer.effects.placing import PlacingError, placed_effects
+from equalizer.effects.placing import PlacingError, place_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -240,7 +240,7 @@ def _fast(model: MechanicalModel, recording: Recording) -> Iterator[str]:
 
 def _effects(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     try:
-        placed_effects(model, recording.command.channels, recording.response.channels)
+        place_effects(model, recording.command.channels, recording.response.channels)
     except PlacingError as problem:
         yield str(problem)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from equalizer.effects.simulation.sensor_path import before_low_pass
+from equalizer.effects.simulation.sensor_path import undo_low_pass
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -33,7 +33,7 @@ def measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFl
         assert recording.position is not None
         noise = floor.position if floor.position is not None else floor.response
         return MeasuredMotion(filled_gaps(recording.position.samples[:, :m]), noise.density[:, :m])
-    samples = before_low_pass(filled_gaps(recording.response.samples[:, :m]), rate_hz, model.sensor.bandwidth_hz)
+    samples = undo_low_pass(filled_gaps(recording.response.samples[:, :m]), rate_hz, model.sensor.bandwidth_hz)
     density = floor.response.density[:, :m]
     if DERIVATIVE_OF_QUANTITY[model.quantity] == 0:
         return MeasuredMotion(samples, density)

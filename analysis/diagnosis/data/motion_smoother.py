@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit, types
 
 from analysis.diagnosis.data.observed import Observed
-from equalizer.effects.simulation.sensor_path import before_low_pass
+from equalizer.effects.simulation.sensor_path import undo_low_pass
 from equalizer.plant.linear_simulation import LinearSteps, linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -122,7 +122,7 @@ def _looks(steps: LinearSteps, channels: int) -> tuple[FloatArray, FloatArray]:
 def _without_direct(model: MechanicalModel, record: Observed, forces: FloatArray, direct: FloatArray) -> FloatArray:
     seen, p = np.array(record.measured), model.outputs
     if model.sensor.bandwidth_hz > 0:
-        seen[:, :p] = before_low_pass(seen[:, :p], record.recording.sample_rate_hz, model.sensor.bandwidth_hz)
+        seen[:, :p] = undo_low_pass(seen[:, :p], record.recording.sample_rate_hz, model.sensor.bandwidth_hz)
     seen[1:] -= forces[:-1] @ direct.T
     return seen
 

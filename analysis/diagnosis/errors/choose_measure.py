@@ -41,7 +41,7 @@ from analysis.diagnosis.settings import (
     UNKNOWN_NOISE_SHARE,
 )
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.placing import placed_effects
+from equalizer.effects.placing import place_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -89,7 +89,7 @@ def measure_of(
     choice = choose_measure((*records, *others), model)
     if compared == "motion" and choice.measure == "predicted force":
         choice = Choice("windows", ASKED_MOTION)
-    known = placed_effects(model, recordings[0].command.channels, recordings[0].response.channels)
+    known = place_effects(model, recordings[0].command.channels, recordings[0].response.channels)
     remarks = (*((choice.why,) if choice.why else ()), *_of_known(known))
     if choice.measure == "free simulation":
         return Chosen(FreeSimulation(records, unit, noise, known=known), floors, remarks)
@@ -108,7 +108,7 @@ def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, ba
     """The force that the model needs along the measured motion, up to a frequency, whatever the rule says; see
     `has_motion`."""
     records = observed_parts(recordings, model.outputs)
-    known = placed_effects(model, recordings[0].command.channels, recordings[0].response.channels)
+    known = place_effects(model, recordings[0].command.channels, recordings[0].response.channels)
     floors = [noise_floor(record.recording) for record in records]
     return _by_force(records, model, floors, (BY_FORCE, *_of_known(known)), band_hz)
 
@@ -120,7 +120,7 @@ def _by_force(
     remarks: tuple[str, ...],
     band_hz: float | None = None,
 ) -> Chosen:
-    known = placed_effects(model, records[0].recording.command.channels, records[0].recording.response.channels)
+    known = place_effects(model, records[0].recording.command.channels, records[0].recording.response.channels)
     views = force_views(records, model, floors, band_hz)
     said = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
     return Chosen(replace(views.measure, known=known), views.floors, tuple(filter(None, (*remarks, said))))

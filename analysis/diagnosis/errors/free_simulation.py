@@ -10,7 +10,7 @@ from analysis.diagnosis.data.carried_weight import carrying
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.unexplained_motion import evidence_of
 from equalizer.effects.effect import Effect, PlacedEffect
-from equalizer.effects.simulation.simulator import Played, Seen, simulate_mechanism, simulate_response
+from equalizer.effects.simulation.simulator import Measurement, SimulationResult, simulate_mechanism, simulate_response
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -50,11 +50,15 @@ class FreeSimulation:
             )
 
     def _played(
-        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, simulate: Callable[..., Played]
-    ) -> Played:
+        self,
+        model: MechanicalModel,
+        effects: Sequence[PlacedEffect],
+        record: Observed,
+        simulate: Callable[..., SimulationResult],
+    ) -> SimulationResult:
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
-        seen = Seen(record.measured[:, :p], self.noise[:p], position, len(record.recording))
+        seen = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
         model = carrying(model, signals)
         return simulate(model, record.command, signals.sample_rate_hz, (*self.known, *effects), signals.hold, seen)
 
@@ -69,7 +73,7 @@ class FreeSimulation:
         return tuple(found)
 
 
-def _less(measured: FloatArray, played: Played) -> FloatArray:
+def _less(measured: FloatArray, played: SimulationResult) -> FloatArray:
     """What was played taken off."""
     p, rest = played.response.shape[1], measured.copy()
     rest[:, :p] -= played.response
@@ -77,6 +81,6 @@ def _less(measured: FloatArray, played: Played) -> FloatArray:
     return rest
 
 
-def channels(played: Played, count: int) -> FloatArray:
+def channels(played: SimulationResult, count: int) -> FloatArray:
     """(n, c): the response and, where there are so many channels, the position."""
     return np.hstack([played.response, played.position])[:, :count]

@@ -4,7 +4,7 @@ import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.forces.missing_force import missing_force
-from equalizer.effects.simulation.simulator import Played
+from equalizer.effects.simulation.simulator import SimulationResult
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -16,7 +16,7 @@ EXPECTED = 0.1
 def evidence_of(
     model: MechanicalModel,
     record: Observed,
-    played: Played,
+    played: SimulationResult,
     left: FloatArray,
     scales: tuple[FloatArray, FloatArray],
 ) -> Evidence:
@@ -45,7 +45,7 @@ def evidence_of(
     )
 
 
-def without_gaps(measured: FloatArray, left: FloatArray, played: Played) -> tuple[FloatArray, FloatArray]:
+def without_gaps(measured: FloatArray, left: FloatArray, played: SimulationResult) -> tuple[FloatArray, FloatArray]:
     """Measured and predicted, (n, c) each. Estimators look at whole courses: where nothing was measured, what was
     played stands for both, so that nothing differs."""
     known = np.isfinite(measured)

@@ -15,10 +15,10 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.free_simulation import channels
 from analysis.diagnosis.errors.unexplained_motion import without_gaps
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
-from equalizer.effects.simulation.along_motion import entered_force
+from equalizer.effects.simulation.along_motion import actuator_force
 from equalizer.effects.simulation.bodies import Restarts, bodies_of
-from equalizer.effects.simulation.sensor_path import low_passed
-from equalizer.effects.simulation.simulator import Played, Seen, simulate_windows
+from equalizer.effects.simulation.sensor_path import low_pass
+from equalizer.effects.simulation.simulator import Measurement, SimulationResult, simulate_windows
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -84,7 +84,7 @@ class Windows:
 
     def _seen(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
-    ) -> tuple[Played, FloatArray]:
+    ) -> tuple[SimulationResult, FloatArray]:
         """And what is left, (n, c)."""
         recording, p = record.recording, model.outputs
         model = carrying(model, recording)
@@ -95,7 +95,7 @@ class Windows:
             record.command,
             (recording.sample_rate_hz, recording.hold),
             effects,
-            Seen(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
+            Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
             Restarts(length, states),
         )
         with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
@@ -132,7 +132,7 @@ class Windows:
         played, left = self._seen(model, effects, record, states)
         recording, p = record.recording, model.outputs
         model = carrying(model, recording)
-        entered = entered_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
+        entered = actuator_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
         found = smoothed_motion(model, record, entered + played.axis_force, self.unit)
         measured, predicted = without_gaps(record.measured, left * self.unit, played)
         seen = measured.shape[1] > p
@@ -164,7 +164,7 @@ def windows_of(
     states = []
     for record in records:
         rate_hz = record.recording.sample_rate_hz
-        entered = entered_force(model, record.command, rate_hz, (), record.recording.hold)
+        entered = actuator_force(model, record.command, rate_hz, (), record.recording.hold)
         motion: SmoothedMotion = smoothed_motion(carrying(model, record.recording), record, entered, unit)
         states.append(motion.states[:: samples_of(window_s, rate_hz)])
     return Windows(records, tuple(states), unit, noise, window_s)
@@ -181,7 +181,7 @@ def _free(structure: MechanicalModel, sample_rate_hz: float, length: int, count:
     states[0] = np.eye(len(steps.advance))
     for k in range(1, length):
         states[k] = steps.advance @ states[k - 1]
-    response = low_passed(states.transpose(0, 2, 1) @ steps.response.T, sample_rate_hz, structure.sensor.bandwidth_hz)
+    response = low_pass(states.transpose(0, 2, 1) @ steps.response.T, sample_rate_hz, structure.sensor.bandwidth_hz)
     seen = np.concatenate([response, states.transpose(0, 2, 1) @ steps.position.T], axis=2)
     return np.asarray(seen[:, :, :count].transpose(0, 2, 1))
 

@@ -12,7 +12,7 @@ from analysis.diagnosis.forces.needed_force import band_motion
 from analysis.diagnosis.forces.predicted_force import PredictedForce, edge_samples
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from equalizer.effects.simulation.along_motion import entered_force
+from equalizer.effects.simulation.along_motion import actuator_force
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import filter_low_pass, low_pass_gain
 from equalizer.signals.signal import FloatArray, Signal
@@ -42,7 +42,7 @@ def force_views(
     """records: with motion, see `has_motion`. band_hz: up to which forces are compared; None = by the noise."""
     motions = [measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)]
     entered = [
-        entered_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)
+        actuator_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)
         for record in records
     ]
     band_hz = band_hz or _band(records, motions, entered, floors, model)

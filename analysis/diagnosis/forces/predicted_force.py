@@ -10,7 +10,7 @@ from analysis.diagnosis.data.carried_weight import carrying
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.forces.needed_force import BandMotion, NeededForce, band_motion, needed_force
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
-from equalizer.effects.simulation.along_motion import entered_force, force_along
+from equalizer.effects.simulation.along_motion import actuator_force, force_along
 from equalizer.effects.simulation.bodies import bodies_of
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -113,7 +113,7 @@ class PredictedForce:
         changed = [effect for effect in effects if isinstance(effect.effect.acts, OnCommand)]
 
         def found() -> _Entered:
-            force = entered_force(model, record.command, rate_hz, changed, hold)
+            force = actuator_force(model, record.command, rate_hz, changed, hold)
             late = filter_low_pass(force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
             return _Entered(force, filter_low_pass(force, rate_hz, self.band_hz), late)
 

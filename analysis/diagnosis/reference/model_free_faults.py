@@ -10,7 +10,7 @@ from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, clai
 from analysis.diagnosis.settings import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST, STEP_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Effect, Values
-from equalizer.effects.starts.lattice import lattice_step, own_step
+from equalizer.effects.starts.lattice import confirm_lattice_step, lattice_step
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -61,7 +61,9 @@ def _steps(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
     found = {}
     for c in range(new.shape[1]):
         step = lattice_step(new[:, c])
-        if step is not None and all(step > STEP_FACTOR * own_step(readings[:, c], step) for readings in references):
+        if step is not None and all(
+            step > STEP_FACTOR * confirm_lattice_step(readings[:, c], step) for readings in references
+        ):
             found[c] = step
     alike = bool(found) and min(found.values()) > (1 - ALIKE) * max(found.values())
     return _where(found, alike and len(found) == new.shape[1], new.shape[1], "step")

@@ -24,7 +24,7 @@ from analysis.diagnosis.settings import (
     MOST_RIVALS,
     PROBABILITY_SCALE,
 )
-from equalizer.effects.discovered_law import Channels, law_units, law_with
+from equalizer.effects.discovered_law import Channels, law_units, law_with_values
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.placing import axis_letter, place_of_effect
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -164,7 +164,7 @@ def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, s
 
 def _units(effect: Effect, values: Values, said: Said) -> dict[str, str]:
     if effect.law is not None:
-        law = law_with(effect.law, values)
+        law = law_with_values(effect.law, values)
         units = law_units(law, Channels(said.inputs, said.outputs, said.quantity), said.system)
         return dict(zip(values, units, strict=True))
     return {p.name: p.unit_in(said.system, said.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
@@ -174,7 +174,7 @@ def law_of_claim(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw |
     law = whole.claims[number].effect.law
     if law is None:
         return None
-    found = law_with(law, _groups(whole, number, whole.point)[0])
+    found = law_with_values(law, _groups(whole, number, whole.point)[0])
     return found_law(replace(found, axis=axis or found.axis))
 
 

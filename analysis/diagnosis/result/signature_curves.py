@@ -12,7 +12,7 @@ from analysis.diagnosis.forces.missing_force import missing_force
 from analysis.diagnosis.result.findings import Signature
 from analysis.diagnosis.result.signature_bins import binned, binned_law, running_rms
 from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
-from equalizer.effects.simulation.simulator import Played, simulate_mechanism
+from equalizer.effects.simulation.simulator import SimulationResult, simulate_mechanism
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
@@ -111,7 +111,7 @@ def _course(position: FloatArray, velocity: FloatArray, along: Along, rate_hz: f
     return velocity if along == "velocity" else position
 
 
-def _equivalent_force(evidence: Evidence, played: Played, hold: Hold) -> FloatArray:
+def _equivalent_force(evidence: Evidence, played: SimulationResult, hold: Hold) -> FloatArray:
     """The force on the model without it that would do what another structure does: found as the missing one is."""
     without = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (), hold)
     change, unit = [played.response - without.response], [evidence.noise]

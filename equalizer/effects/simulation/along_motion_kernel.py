@@ -1,4 +1,4 @@
-"""Forces that depend on the motion, along a motion that is known, compiled."""
+"""Motion-dependent forces along a known motion, compiled."""
 
 from typing import Any
 
@@ -41,8 +41,10 @@ Motion = tuple[FloatArray, FloatArray, FloatArray]
 
 
 @njit(inline="always")
-def _see(k: int, axis: int, motion: Motion, commands: FloatArray, per_newton: FloatArray, at: FloatArray) -> None:
-    """How all axes move. What a force at one of them does to the others is in their motion already."""
+def _write_seen_axes(
+    k: int, axis: int, motion: Motion, commands: FloatArray, per_newton: FloatArray, at: FloatArray
+) -> None:
+    """Write the motion of all axes into `at`. What a force at one does to the others is in their motion already."""
     for other in range(commands.shape[1]):
         begin, own = LENGTH + SEEN * other, 1.0 if other == axis else 0.0
         at[begin + SEEN_X], at[begin + SEEN_V] = motion[0][k, other], motion[1][k, other]
@@ -56,8 +58,8 @@ def _see(k: int, axis: int, motion: Motion, commands: FloatArray, per_newton: Fl
     types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, READ_ONLY, _MATRIX, _MATRIX, types.float64),
     cache=True, nogil=True, error_model="numpy",
 )  # fmt: skip
-def follow(  # noqa: PLR0913 - a kernel takes flat arrays
-    laws: Any, places: Integers, of: FloatArray, memory: FloatArray,
+def run_laws_along(  # noqa: PLR0913 - a kernel takes flat arrays
+    laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray,
     motion: Motion, commands: FloatArray, per_newton: FloatArray,
     force: FloatArray, step_s: float,
 ) -> None:  # fmt: skip
@@ -85,12 +87,12 @@ def follow(  # noqa: PLR0913 - a kernel takes flat arrays
             at[A_FREE] = acceleration[k, axis] + at[A_PER_N] * pushing[axis]
             at[F_END] = np.nan
             if sees:
-                _see(k, axis, motion, commands, per_newton, at)
+                _write_seen_axes(k, axis, motion, commands, per_newton, at)
                 at[LENGTH + SEEN * axis + SEEN_X_END] = at[X_FREE]
                 at[LENGTH + SEEN * axis + SEEN_V_END] = at[V_FREE]
                 at[LENGTH + SEEN * axis + SEEN_A] = at[A_FREE]
             kept = memory[places[item, 4] : places[item, 5]]
-            added = laws[places[item, 0]](of[places[item, 2] : places[item, 3]], kept, at)
+            added = laws[places[item, 0]](numbers[places[item, 2] : places[item, 3]], kept, at)
             force[k, axis] += added
             pushing[axis] += added
     force[len(position) - 1] = force[len(position) - 2]

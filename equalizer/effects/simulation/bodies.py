@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Structure
-from equalizer.effects.simulation.command_path import Driven
+from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.mechanism_kernel import LAWS, no_force
-from equalizer.effects.simulation.stepping import Forces, coasting, pushed
+from equalizer.effects.simulation.stepping import Forces, forced_stepping, unforced_stepping
 from equalizer.plant.linear_simulation import LinearSteps, driven_axes, linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -16,7 +16,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bodies:
-    """What moves, and what pushes it."""
+    """The linear structure with the effects' joints, and the forces that act on it."""
 
     structure: MechanicalModel
     axes: int
@@ -27,7 +27,7 @@ class Bodies:
     """One per force."""
     port: tuple[int, ...]
     numbers: tuple[FloatArray, ...]
-    """What each force's law finds in `of`."""
+    """Parameters of each force's law."""
 
     @property
     def sees(self) -> bool:
@@ -36,7 +36,7 @@ class Bodies:
 
 
 def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies:
-    """Raises ValueError where an effect befalls an axis that is not there."""
+    """Bodies of a model with its effects on structure and motion. Raises ValueError for an axis that is not there."""
     structure = model
     for placed in effects:
         for site in placed.sites if isinstance(placed.effect.acts, (Structure, AxisForce, JointForce)) else ():
@@ -68,7 +68,7 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Restarts:
-    """Where a motion goes on from another state than that which was reached."""
+    """Restarts of a simulation from given states at regular intervals (multiple shooting)."""
 
     every: int
     """Samples, from the first on."""
@@ -76,21 +76,23 @@ class Restarts:
     """(windows, 2n), of the model without effects: positions, then velocities."""
 
 
-def moved(
-    bodies: Bodies, driven: Driven, size: tuple[int, int], step_s: float, motion: bool = True,
+def simulate_bodies(
+    bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float, motion: bool = True,
     restarts: Restarts | None = None,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """(n, 3 r + 2 p): the ports' positions, velocities and accelerations, the response and its rows' positions; and
-    (n, r), the forces. Without the motion (n, 2 p) and (n, 0). driven: n or n steps; size: n and steps. From rest where
-    there are no restarts."""
+    """Simulate the bodies, from rest where there are no restarts. Returns (n, 3 r + 2 p): the ports' positions,
+    velocities and accelerations, the response and its rows' positions; and (n, r), the forces. Without the motion
+    (n, 2 p) and (n, 0). driven: n or n steps; size: n and steps."""
     linear = linear_steps(bodies.structure, step_s, bodies.ports)
     ports = tuple(sorted({*bodies.port, *range(bodies.axes if bodies.sees else 0)}))
     steps, stride = size[1], len(driven.mean) // size[0]
     commanded = driven.mean if driven.commanded is None else driven.commanded
     stepping = (
-        pushed(linear, forces_of(bodies, ports), steps, stride, commanded) if ports else coasting(linear, steps, stride)
+        forced_stepping(linear, kernel_forces(bodies, ports), steps, stride, commanded)
+        if ports
+        else unforced_stepping(linear, steps, stride)
     )
-    look = _looked_at(linear, stepping.outward, ports, motion)
+    look = _output_matrix(linear, stepping.outward, ports, motion)
     looked, added = np.empty((size[0], look.shape[1])), np.zeros((size[0], bodies.ports.shape[1] if motion else 0))
     inner, rows = len(look) - driven.end.shape[1], stepping.rows
     drive, last = driven.mean.reshape(size[0] * rows, -1), driven.end[stride - 1 :: stride]
@@ -99,7 +101,7 @@ def moved(
     with np.errstate(over="ignore", invalid="ignore"):
         for first, end in _blocks(size[0], stepping.block, restarts):
             if restarts is not None and first % restarts.every == 0:
-                stepping.begin(grown_state(bodies.structure, restarts.states[first // restarts.every]))
+                stepping.begin(extend_state(bodies.structure, restarts.states[first // restarts.every]))
             course = spare[: (end - first) * rows]
             np.matmul(drive[first * rows : end * rows], stepping.into, out=course[:, :inner])
             stepping.run(course, first)
@@ -119,8 +121,9 @@ def _blocks(n: int, longest: int, restarts: Restarts | None) -> Iterator[tuple[i
             yield first, min(first + longest, stop)
 
 
-def grown_state(structure: MechanicalModel, state: FloatArray) -> FloatArray:
-    """Of a structure to which effects have added bodies, the last coordinates: they follow the others as if at rest."""
+def extend_state(structure: MechanicalModel, state: FloatArray) -> FloatArray:
+    """State (2n,) of a structure to which effects have added bodies, its last coordinates: those take their static
+    equilibrium. state: without them."""
     known, n = len(state) // 2, structure.coordinates
     if n == known:
         return state
@@ -130,8 +133,8 @@ def grown_state(structure: MechanicalModel, state: FloatArray) -> FloatArray:
     return np.concatenate([positions, follows @ positions, velocities, follows @ velocities])
 
 
-def _looked_at(linear: LinearSteps, outward: FloatArray, ports: tuple[int, ...], motion: bool) -> FloatArray:
-    """(s + r + m, rows): of what is kept of each instant, the state, the forces at the ports and the commands."""
+def _output_matrix(linear: LinearSteps, outward: FloatArray, ports: tuple[int, ...], motion: bool) -> FloatArray:
+    """(s + r + m, rows): output matrix for each instant's state, forces at the ports, and commands."""
     p, (m, r) = len(linear.position), (linear.by_command.shape[1], linear.by_axis_force.shape[1])
     first = 0 if motion else 3 * r
     of_state = np.vstack((linear.motion, linear.response, linear.position))[first:]
@@ -140,7 +143,7 @@ def _looked_at(linear: LinearSteps, outward: FloatArray, ports: tuple[int, ...],
     return np.vstack([(of_state @ outward).T, of_force.T[list(ports)], of_command.T])
 
 
-def forces_of(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
+def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
     laws: list[object] = []
     places: list[tuple[int, ...]] = []
     used = kept = 0

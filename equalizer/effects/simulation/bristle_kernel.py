@@ -1,4 +1,4 @@
-"""How a bristle bends that is dragged along a measured path, compiled."""
+"""Deflection of a Dahl bristle along a measured path, compiled."""
 
 import numpy as np
 from numba import njit, types
@@ -9,8 +9,8 @@ _PATH = types.Array(types.float64, 1, "A", readonly=True)
 
 
 @njit(types.float64[::1](_PATH, types.float64), cache=True)
-def bent(position: FloatArray, longest: float) -> FloatArray:
-    """(n,): its bend over `longest`, at which it slips (Dahl's equation). position: (n,), any unit."""
+def bristle_bend(position: FloatArray, longest: float) -> FloatArray:
+    """(n,): deflection over `longest`, at which the bristle slips (Dahl's equation). position: (n,), any unit."""
     bend = np.zeros(position.shape[0])
     for k in range(1, position.shape[0]):
         travel = (position[k] - position[k - 1]) / longest

@@ -1,5 +1,5 @@
-"""What an actuator makes of a held command: the mean over each step, which moves masses, and the value at its end,
-which an acceleration that is sampled there shows at once."""
+"""Actuator force for held commands: the mean over each step, which moves masses, and the value at its end, which an
+acceleration sampled there shows at once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.effects.effect import OnCommand, PlacedEffect
-from equalizer.effects.simulation.sensor_path import one_pole
+from equalizer.effects.simulation.sensor_path import filter_one_pole
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Driven:
+class ActuatorForce:
     mean: FloatArray
     """(n steps, m): over each step."""
     end: FloatArray
@@ -29,10 +29,12 @@ def moves_between_samples(model: MechanicalModel, effects: Sequence[PlacedEffect
     return fine or hold is not Hold.ZERO_ORDER or model.actuator.delay_s > 0 or model.actuator.bandwidth_hz > 0
 
 
-def driven_by(model: MechanicalModel, commands: Driven, step_s: float, effects: Sequence[PlacedEffect]) -> Driven:
-    """First the left-out effects, in their order, then what the model knows of its actuators.
+def drive_actuators(
+    model: MechanicalModel, commands: ActuatorForce, step_s: float, effects: Sequence[PlacedEffect]
+) -> ActuatorForce:
+    """Force of the actuators: first the effects in their order, then the model's own bandwidth, delay and limit.
 
-    Raises ValueError where an effect befalls a channel that is not there.
+    Raises ValueError where an effect acts on a channel that is not there.
     """
     mean, end = commands.mean, commands.end
     if any(isinstance(placed.effect.acts, OnCommand) for placed in effects):
@@ -53,62 +55,62 @@ def driven_by(model: MechanicalModel, commands: Driven, step_s: float, effects: 
     known = model.actuator
     if known.bandwidth_hz > 0:
         time_constant_s = 1 / (2 * np.pi * known.bandwidth_hz)
-        mean, end = lagged(mean, step_s, time_constant_s), lagged_at_end(mean, step_s, time_constant_s)
+        mean, end = lag_mean(mean, step_s, time_constant_s), lag_at_end(mean, step_s, time_constant_s)
     if known.delay_s > 0:
-        mean, end = delayed(mean, step_s, known.delay_s), delayed_at_end(end, step_s, known.delay_s)
+        mean, end = delay_mean(mean, step_s, known.delay_s), delay_at_end(end, step_s, known.delay_s)
     if known.limit > 0:
         mean, end = np.clip(mean, -known.limit, known.limit), np.clip(end, -known.limit, known.limit)
-    return Driven(mean, end, commands.mean)
+    return ActuatorForce(mean, end, commands.mean)
 
 
-def finer(commands: FloatArray, steps: int, hold: Hold) -> Driven:
-    """From (n, m), by how the command moves between its samples."""
+def subdivide_commands(commands: FloatArray, steps: int, hold: Hold) -> ActuatorForce:
+    """Commands (n, m) divided into `steps` per sample, by how they move between samples."""
     if steps == 1 or hold is Hold.ZERO_ORDER:
         commands = np.asarray(commands, dtype=np.float64)
         held = np.repeat(commands, steps, axis=0) if steps > 1 else commands
-        return Driven(held, held)
+        return ActuatorForce(held, held)
     if hold is Hold.LINEAR:
         change = np.diff(commands, axis=0, append=commands[-1:])
         places = (np.arange(steps) + 0.5) / steps, (np.arange(steps) + 1.0) / steps
         mean, end = (
             (commands[:, None] + share[:, None] * change[:, None]).reshape(-1, commands.shape[1]) for share in places
         )
-        return Driven(mean, end)
+        return ActuatorForce(mean, end)
     # Takes longer to import than a diagnosis without it.
     from scipy.signal import resample_poly
 
     samples = resample_poly(commands, 2 * steps, 1, axis=0)
     # Every other one stands in the middle of a step, the ones between at its ends.
-    return Driven(samples[1::2], np.vstack([samples[2::2], samples[-1:]]))
+    return ActuatorForce(samples[1::2], np.vstack([samples[2::2], samples[-1:]]))
 
 
-def lagged(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
-    """One pole, mean over each step; exact for commands (n, …) that are held over a step."""
+def lag_mean(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
+    """First-order lag, mean over each step; exact for commands (n, …) that are held over a step."""
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
-    at_end = _one_pole(commands, decay)
+    at_end = _filter_one_pole(commands, decay)
     before = np.concatenate([np.zeros_like(at_end[:1]), at_end[:-1]])
     left = (1 - decay) * time_constant_s / step_s
     return np.asarray(commands + (before - commands) * left)
 
 
-def lagged_at_end(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
-    """The same at each step's end."""
+def lag_at_end(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
+    """First-order lag at each step's end; commands (n, …)."""
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
-    return _one_pole(commands, decay)
+    return _filter_one_pole(commands, decay)
 
 
-def _one_pole(commands: FloatArray, decay: float) -> FloatArray:
+def _filter_one_pole(commands: FloatArray, decay: float) -> FloatArray:
     out = np.empty(commands.shape)
-    one_pole(np.asarray(commands, dtype=np.float64).reshape(len(commands), -1), decay, out.reshape(len(out), -1))
+    filter_one_pole(np.asarray(commands, dtype=np.float64).reshape(len(commands), -1), decay, out.reshape(len(out), -1))
     return out
 
 
-def delayed(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
-    """Held commands (n, …) that arrive later, mean over each step; nothing before the first."""
+def delay_mean(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
+    """Held commands (n, …) delayed by delay_s, mean over each step; zero before the first."""
     whole, part = divmod(max(delay_s, 0.0) / step_s, 1.0)
     late = np.zeros((len(commands) + 1, *commands.shape[1:]))
     shift = min(int(whole) + 1, len(late))
@@ -116,6 +118,6 @@ def delayed(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
     return np.asarray((1 - part) * late[1:] + part * late[:-1])
 
 
-def delayed_at_end(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
-    """The same at each step's end."""
-    return delayed(commands, step_s, np.floor(max(delay_s, 0.0) / step_s) * step_s)
+def delay_at_end(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
+    """Held commands (n, …) delayed by delay_s, at each step's end."""
+    return delay_mean(commands, step_s, np.floor(max(delay_s, 0.0) / step_s) * step_s)

@@ -1,7 +1,7 @@
-"""Dry friction over one step, compiled: asperities bend, slip, spring back and bend the other way within it.
+"""Dry friction over one step, compiled: a bristle that bends, slips and springs back within the step.
 
-What slides is a bristle that gives way after tens of nanometres (LuGre, Canudas de Wit and others 1995): far less than
-any position sensor sees, but an accelerometer sees the blow with which the force turns round.
+The bristle (LuGre, Canudas de Wit and others 1995) slips after tens of nanometres: far less than a position sensor
+resolves, but an accelerometer shows the jerk with which the force reverses.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ _VECTOR = types.float64[::1]
 
 
 @njit(types.float64(types.float64, types.float64, types.float64, _VECTOR, _VECTOR), cache=True, error_model="numpy")
-def rubbing(forward: float, backward: float, start: float, memory: FloatArray, at: FloatArray) -> float:
+def friction_force(forward: float, backward: float, start: float, memory: FloatArray, at: FloatArray) -> float:
     """The mean force over a step of friction that is `forward` where v > 0 and `backward` where v < 0.
 
     start: how far the bristle was bent, in its longest bends; memory: how far it is then.

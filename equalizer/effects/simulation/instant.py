@@ -1,4 +1,4 @@
-"""Where a compiled law of force finds what it needs of the instant. "Free" is what would come to be without its force.
+"""Layout of the array `at` that a compiled force law reads at each instant. "Free" means without the law's own force.
 
 A force is held over one step; laws that are steep (friction, stops) therefore ask what it would do by the step's end
 and solve for it, which stays stable at any step (the impulse view of dry friction; Moreau 1988, Stewart 2000).
@@ -15,8 +15,8 @@ A_FREE, A_PER_N = 6, 7
 law asks for it."""
 STEP_S, TIME_S = 8, 9
 F_END = 10
-"""For the law to fill: its force at the step's very end, which an acceleration shows. Where it leaves that as it is,
-not a number, the mean over the step is taken."""
+"""Written by the law: its force at the step's end, which an acceleration shows. Where it leaves NaN, the mean over the
+step is taken."""
 LENGTH = 11
 SEEN_X, SEEN_V, SEEN_X_END, SEEN_V_END, SEEN_X_PER_N, SEEN_V_PER_N, SEEN_A, SEEN_A_PER_N, SEEN_COMMAND = range(9)
 """Of every driven axis, for effects that say that their law sees them: position and velocity at the start and, without

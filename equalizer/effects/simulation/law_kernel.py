@@ -1,4 +1,4 @@
-"""The force of a law without a name over one step, compiled.
+"""Force of a discovered law over one step, compiled: implicit solution by secant and bisection.
 
 The mean of the force at the step's start and end, where the motion at its end depends on it; with accelerations, the
 force at its end. Where the force answers so
@@ -23,25 +23,27 @@ from equalizer.effects.simulation.instant import (
     STEP_S,
     TIME_S,
 )
-from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.laws.kernel import BEGUN, END, START, commit_step, run
 from equalizer.laws.program import DEEPEST
 from equalizer.signals.signal import FloatArray
 
 AXES, ACCELERATION, PROGRAM = 0, 1, 2
-"""In `of`: how many axes are driven; whether the law reads an acceleration; where its program begins."""
+"""Places in `numbers`: how many axes are driven; whether the law reads an acceleration; where its program begins."""
 PER_AXIS = 4
 """Signals: the time, then each axis' position, velocity, acceleration and command."""
 CLOSE = 1e-7
-"""Relative: how closely a force is found that hangs on the motion it makes."""
+"""Relative tolerance of a force that depends on the motion it causes."""
 TRIES = 60
 
 
 @njit(inline="always")
-def _value(of: FloatArray, memory: FloatArray, at: FloatArray, phase: int, force: float, ahead: float) -> float:
+def _law_value(
+    numbers: FloatArray, memory: FloatArray, at: FloatArray, phase: int, force: float, ahead: float
+) -> float:
     """The law at the step's start or end, if it gives this force over the step. Accelerations are means over the step;
     ahead: 1 for those at its end."""
-    axes, step_s = int(of[AXES]), at[STEP_S]
+    axes, step_s = int(numbers[AXES]), at[STEP_S]
     signals = memory[DEEPEST : DEEPEST + 1 + PER_AXIS * axes]
     time_s = at[TIME_S] + (step_s if phase == END else 0.0)
     signals[0] = time_s
@@ -56,27 +58,27 @@ def _value(of: FloatArray, memory: FloatArray, at: FloatArray, phase: int, force
             signals[to + 2] += signals[to + 2] - at[begin + SEEN_A] - at[begin + SEEN_A_PER_N] * force
         signals[to + 3] = at[begin + SEEN_COMMAND]
     kept = memory[DEEPEST + 1 + PER_AXIS * axes :]
-    return float(run(of[PROGRAM:], signals, kept, memory[:DEEPEST], phase, time_s, step_s))
+    return float(run(numbers[PROGRAM:], signals, kept, memory[:DEEPEST], phase, time_s, step_s))
 
 
 @njit(inline="always")
-def _late(start: float, first: float, second: float) -> float:
-    """Share of the step's end in the mean: one half, more where the force is steep, all where it would swing. first:
-    the end's force if that of the start acted; second: if that acted."""
+def _end_share(start: float, first: float, second: float) -> float:
+    """Weight of the step's end in the mean: one half, more where the force is steep, all where it would oscillate.
+    first: the end's force if that of the start acted; second: if `first` acted."""
     change = first - start
     steep = (first - second) / change if change != 0.0 else 0.0
     return min(0.5 * (1.0 + max(steep, 0.0)), 1.0)
 
 
-@compiled_law
-def law_force(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    heavy = of[ACCELERATION] != 0.0
-    start = low = _value(of, memory, at, START, 0.0, 0.0)
-    kept = memory[DEEPEST + 1 + PER_AXIS * int(of[AXES]) :]
+@compile_law
+def law_force(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    heavy = numbers[ACCELERATION] != 0.0
+    start = low = _law_value(numbers, memory, at, START, 0.0, 0.0)
+    kept = memory[DEEPEST + 1 + PER_AXIS * int(numbers[AXES]) :]
     kept[0] = BEGUN
-    end = first = high = _value(of, memory, at, END, low, 0.0)
-    second = _value(of, memory, at, END, high, 0.0)
-    late = 1.0 if heavy else _late(start, first, second)
+    end = first = high = _law_value(numbers, memory, at, END, low, 0.0)
+    second = _law_value(numbers, memory, at, END, high, 0.0)
+    late = 1.0 if heavy else _end_share(start, first, second)
     low_off, high_off = low - (1 - late) * start - late * first, high - (1 - late) * start - late * second
     near, force = CLOSE * (abs(start) + abs(first) + abs(second)), high
     for turn in range(TRIES):
@@ -86,7 +88,7 @@ def law_force(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
             force = 0.5 * (low + high)
         else:
             force = high - high_off * (high - low) / across if across != 0.0 else high
-        end = _value(of, memory, at, END, force, 0.0)
+        end = _law_value(numbers, memory, at, END, force, 0.0)
         off = force - (1 - late) * start - late * end
         if not abs(off) > near or abs(high - low) <= 1e-2 * near:
             break
@@ -97,6 +99,6 @@ def law_force(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
                 low, low_off = high, high_off
             high, high_off = force, off
     # What sticks is held by a force between those of both ways.
-    at[F_END] = _value(of, memory, at, END, force, 1.0) if heavy else (force - (1 - late) * start) / late
-    commit_step(of[PROGRAM:], kept, at[TIME_S] + at[STEP_S])
+    at[F_END] = _law_value(numbers, memory, at, END, force, 1.0) if heavy else (force - (1 - late) * start) / late
+    commit_step(numbers[PROGRAM:], kept, at[TIME_S] + at[STEP_S])
     return float(force)

@@ -11,8 +11,8 @@ _MATRIX = types.float64[:, ::1]
 
 
 @njit(types.void(_MATRIX, _VECTOR, _VECTOR), cache=True, nogil=True, fastmath=FAST)
-def _go_together(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
-    """One step, of coordinates that do not come apart. advance: (s, s), transposed."""
+def _advance_dense(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
+    """One step with a full matrix. advance: (s, s), transposed."""
     before = state.copy()
     state[:] = added[: state.shape[0]]
     for j in range(state.shape[0]):
@@ -21,11 +21,12 @@ def _go_together(advance: FloatArray, added: FloatArray, state: FloatArray) -> N
 
 
 @njit(inline="always")
-def go(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
-    """One step. advance: (4, s / 2) or (s, s), see `simulation.modal_form`. added: (s, ...), by commands."""
+def advance_state(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
+    """One step of the state (s,). advance: (4, s / 2) or (s, s), see `simulation.modal_form`. added: (s, ...), by
+    commands."""
     half = state.shape[0] // 2
     if advance.shape[1] != half:
-        _go_together(advance, added, state)
+        _advance_dense(advance, added, state)
         return
     for i in range(half):
         first, second = state[i], state[half + i]
@@ -34,7 +35,7 @@ def go(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
 
 
 @njit(types.void(_MATRIX, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath=FAST)
-def coast(advance: FloatArray, rows: FloatArray, state: FloatArray) -> None:
+def advance_unforced(advance: FloatArray, rows: FloatArray, state: FloatArray) -> None:
     """Motion without further forces. rows: (n, s ...), what the commands add over each step; becomes the state before
     each. state: (s,), becomes that of the end."""
     size = state.shape[0]
@@ -43,4 +44,4 @@ def coast(advance: FloatArray, rows: FloatArray, state: FloatArray) -> None:
         for i in range(size):
             added[i] = rows[k, i]
             rows[k, i] = state[i]
-        go(advance, added, state)
+        advance_state(advance, added, state)

@@ -36,7 +36,7 @@ from equalizer.effects.simulation.instant import (
     V,
     X,
 )
-from equalizer.effects.simulation.linear_step_kernel import FAST, go
+from equalizer.effects.simulation.linear_step_kernel import FAST, advance_state
 from equalizer.signals.signal import FloatArray
 
 # Laws are passed as values, so that a changed law never runs as it was in a kept kernel; numba calls that experimental.
@@ -46,7 +46,8 @@ warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 LAWS = 6
 """How many different laws can act at once."""
 SWEEPS = 3
-"""Over all forces per step, where there are several: each is found again with the others as they have become."""
+"""Gauss-Seidel sweeps over all forces per step, where there are several: each is solved again with the others' newest
+values."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 READ_ONLY = types.Array(types.float64, 2, "C", readonly=True)
@@ -66,14 +67,14 @@ PORT_ROWS = 7
 start without forces; forces over the step and at its end."""
 
 
-def compiled_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:
+def compile_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:
     """The law, ready to be called from the kernel. Its machine code is kept on disk with its own file."""
     return njit(LAW, cache=True, error_model="numpy")(law)
 
 
 @njit(inline="always")
-def _aim(look: FloatArray, state: FloatArray, ports: FloatArray) -> None:
-    """Where a step would end without forces. look: (2 r, s)"""
+def _predict_ports(look: FloatArray, state: FloatArray, ports: FloatArray) -> None:
+    """Positions and velocities at the step's end without forces. look: (2 r, s)"""
     count = ports.shape[1]
     for port in range(count):
         x = v = 0.0
@@ -85,8 +86,8 @@ def _aim(look: FloatArray, state: FloatArray, ports: FloatArray) -> None:
 
 
 @njit(inline="always")
-def _land(by_force: FloatArray, state: FloatArray, ports: FloatArray) -> None:
-    """Lets the forces act. by_force: (r, s)"""
+def _apply_forces(by_force: FloatArray, state: FloatArray, ports: FloatArray) -> None:
+    """Add the forces' effect to the state, and move the ports to the step's end. by_force: (r, s)"""
     for port in range(ports.shape[1]):
         ports[_NOW_X, port], ports[_NOW_V, port] = ports[_NEXT_X, port], ports[_NEXT_V, port]
         force = ports[_FORCE, port]
@@ -95,7 +96,7 @@ def _land(by_force: FloatArray, state: FloatArray, ports: FloatArray) -> None:
 
 
 @njit(inline="always")
-def _keep(state: FloatArray, ports: FloatArray, row: FloatArray) -> None:
+def _store_row(state: FloatArray, ports: FloatArray, row: FloatArray) -> None:
     for i in range(state.shape[0]):
         row[i] = state[i]
     for port in range(ports.shape[1]):
@@ -103,8 +104,8 @@ def _keep(state: FloatArray, ports: FloatArray, row: FloatArray) -> None:
 
 
 @njit(inline="always")
-def _feel(look: FloatArray, added: FloatArray, state: FloatArray, ports: FloatArray) -> None:
-    """The accelerations without forces. look: (3 r, s). added: (s + r), the last r by commands."""
+def _predict_accelerations(look: FloatArray, added: FloatArray, state: FloatArray, ports: FloatArray) -> None:
+    """Accelerations at the step's start without forces. look: (3 r, s). added: (s + r), the last r by commands."""
     count = ports.shape[1]
     for port in range(count):
         total = added[state.shape[0] + port]
@@ -114,8 +115,9 @@ def _feel(look: FloatArray, added: FloatArray, state: FloatArray, ports: FloatAr
 
 
 @njit(inline="always")
-def _act(per_newton: FloatArray, port: int, mean: float, end: float, ports: FloatArray) -> None:
-    """per_newton: (r, 3 r), what 1 N at a port adds to the positions, velocities and accelerations of all."""
+def _add_force(per_newton: FloatArray, port: int, mean: float, end: float, ports: FloatArray) -> None:
+    """Add a force at a port. per_newton: (r, 3 r), what 1 N at a port adds to all positions, velocities and
+    accelerations."""
     count = ports.shape[1]
     ports[_FORCE, port] += mean
     ports[_FORCE_END, port] += end
@@ -126,8 +128,8 @@ def _act(per_newton: FloatArray, port: int, mean: float, end: float, ports: Floa
 
 
 @njit(inline="always")
-def _see(per_newton: FloatArray, port: int, ports: FloatArray, at: FloatArray) -> None:
-    """How all ports move, for the force at one of them."""
+def _write_seen_ports(per_newton: FloatArray, port: int, ports: FloatArray, at: FloatArray) -> None:
+    """Write the motion of all ports into `at`, for the force at one of them."""
     count = ports.shape[1]
     for other in range(count):
         begin = LENGTH + SEEN * other
@@ -138,17 +140,17 @@ def _see(per_newton: FloatArray, port: int, ports: FloatArray, at: FloatArray) -
         at[begin + SEEN_A], at[begin + SEEN_A_PER_N] = ports[_A, other], per_newton[port, 2 * count + other]
 
 
-@compiled_law
-def no_force(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+@compile_law
+def no_force(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     return 0.0
 
 
 @njit(inline="always")
-def _push_at(  # noqa: PLR0913 - a kernel takes flat arrays
-    law: Any, of: FloatArray, memory: FloatArray, port: int, per_newton: FloatArray, ports: FloatArray,
+def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
+    law: Any, numbers: FloatArray, memory: FloatArray, port: int, per_newton: FloatArray, ports: FloatArray,
     at: FloatArray,
 ) -> tuple[float, float]:  # fmt: skip
-    """One force, over the step and at its end, with all others as they are."""
+    """Solve for one force, over the step and at its end, with all others held."""
     count = ports.shape[1]
     at[X], at[V] = ports[_NOW_X, port], ports[_NOW_V, port]
     at[X_FREE], at[V_FREE] = ports[_NEXT_X, port], ports[_NEXT_V, port]
@@ -156,10 +158,10 @@ def _push_at(  # noqa: PLR0913 - a kernel takes flat arrays
     at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * count + port]
     at[F_END] = np.nan
     if at.shape[0] > LENGTH:
-        _see(per_newton, port, ports, at)
-    mean = law(of, memory, at)
+        _write_seen_ports(per_newton, port, ports, at)
+    mean = law(numbers, memory, at)
     end = mean if np.isnan(at[F_END]) else at[F_END]
-    _act(per_newton, port, mean, end, ports)
+    _add_force(per_newton, port, mean, end, ports)
     return mean, end
 
 
@@ -167,11 +169,11 @@ def _push_at(  # noqa: PLR0913 - a kernel takes flat arrays
     types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR),
     cache=True, nogil=True, error_model="numpy", fastmath=FAST,
 )  # fmt: skip
-def _push(  # noqa: PLR0913 - a kernel takes flat arrays
-    laws: Any, places: Integers, of: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
+def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
+    laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
     own: FloatArray, at: FloatArray,
 ) -> None:  # fmt: skip
-    """Several forces. own: (3, items), scratch. A force is not found again where no other has changed since."""
+    """Solve for several forces. own: (3, items), scratch. A force is not solved again where no other has changed."""
     before = memory.copy()
     own[:] = 0.0
     for sweep in range(SWEEPS):
@@ -181,12 +183,12 @@ def _push(  # noqa: PLR0913 - a kernel takes flat arrays
             port, kept, end = places[item, 1], places[item, 4], places[item, 5]
             mean_before, end_before = own[0, item], own[1, item]
             if sweep > 0:
-                _act(per_newton, port, -mean_before, -end_before, ports)
+                _add_force(per_newton, port, -mean_before, -end_before, ports)
                 for i in range(kept, end):
                     memory[i] = before[i]
             begin, law = places[item, 2], laws[places[item, 0]]
-            own[0, item], own[1, item] = _push_at(
-                law, of[begin : places[item, 3]], memory[kept:end], port, per_newton, ports, at
+            own[0, item], own[1, item] = _solve_force(
+                law, numbers[begin : places[item, 3]], memory[kept:end], port, per_newton, ports, at
             )
             if own[0, item] != mean_before or own[1, item] != end_before:
                 own[2] = 1.0
@@ -199,8 +201,8 @@ def _push(  # noqa: PLR0913 - a kernel takes flat arrays
     ),
     cache=True, nogil=True, error_model="numpy", fastmath=FAST,
 )  # fmt: skip
-def play(  # noqa: PLR0913 - a kernel takes flat arrays
-    laws: Any, places: Integers, of: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
+def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
+    laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
     commands: FloatArray, ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
 ) -> None:  # fmt: skip
     """Motion under forces. rows: (n stride, s + r ...): what commands add to the state over a step and to the
@@ -208,7 +210,7 @@ def play(  # noqa: PLR0913 - a kernel takes flat arrays
     then. commands: (n stride, m), or (0, 0) where no law sees them. ports: (PORT_ROWS, r) and state: (s,) become
     those of the end.
 
-    places: (items, 6) law, port, begin and end in `of`, begin and end in `memory`. step: how the state advances,
+    places: (items, 6) law, port, begin and end in `numbers`, begin and end in `memory`. step: how the state advances,
     the ports' positions and velocities (2 r, s), where laws ask with accelerations (3 r, s), what forces do to the
     state (r, s), and `per_newton`. count: steps per sample; stride, which is 1 where commands are held over all of
     them, else so many; the first sample's number.
@@ -219,7 +221,7 @@ def play(  # noqa: PLR0913 - a kernel takes flat arrays
     sees = commands.shape[0] > 0
     added, at = np.empty(size + r), np.zeros(LENGTH + SEEN * r if sees else LENGTH)
     own, law = np.zeros((3, places.shape[0])), laws[places[0, 0]]
-    its, its_memory = of[places[0, 2] : places[0, 3]], memory[places[0, 4] : places[0, 5]]
+    its, its_memory = numbers[places[0, 2] : places[0, 3]], memory[places[0, 4] : places[0, 5]]
     at[STEP_S], ports[_A] = step_s, np.nan
     for k in range(rows.shape[0] // stride):
         for now in range(steps):
@@ -229,14 +231,14 @@ def play(  # noqa: PLR0913 - a kernel takes flat arrays
                 for axis in range(commands.shape[1]):
                     at[LENGTH + SEEN * axis + SEEN_COMMAND] = commands[k * stride + now, axis]
             if now == 0:
-                _keep(state, ports, rows[k * stride])
+                _store_row(state, ports, rows[k * stride])
             if look.shape[0] > 2 * r:
-                _feel(look, added, state, ports)
-            go(advance, added, state)
-            _aim(look, state, ports)
+                _predict_accelerations(look, added, state, ports)
+            advance_state(advance, added, state)
+            _predict_ports(look, state, ports)
             at[TIME_S] = ((begun + k) * steps + now) * step_s
             if places.shape[0] == 1:
-                _push_at(law, its, its_memory, places[0, 1], per_newton, ports, at)
+                _solve_force(law, its, its_memory, places[0, 1], per_newton, ports, at)
             else:
-                _push(laws, places, of, memory, per_newton, ports, own, at)
-            _land(by_force, state, ports)
+                _solve_forces(laws, places, numbers, memory, per_newton, ports, own, at)
+            _apply_forces(by_force, state, ports)

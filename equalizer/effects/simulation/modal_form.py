@@ -1,4 +1,4 @@
-"""Coordinates in which one step of a linear motion costs least: pairs that move apart from all others."""
+"""Block-diagonal (modal) form of a linear step: pairs of coordinates that are decoupled from all others."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,9 +9,10 @@ from scipy.linalg import matrix_balance
 from equalizer.signals.signal import FloatArray
 
 LARGEST_CONDITION = 1e4
-"""Of the pairs' directions, balanced; else rounding would show, and the motion is stepped as it stands."""
+"""Largest condition number of the pairs' directions, balanced; above it rounding would show, and the full matrix is
+used."""
 LARGEST_REST = 1e-12
-"""Of what couples the pairs after all, and is left out."""
+"""Largest residual coupling between the pairs that is neglected."""
 NEARLY_ONE = 1e-3
 """Two directions of a pair this alike are found anew, as the plane that both span."""
 
@@ -30,7 +31,7 @@ class StepForm:
 
 
 def step_form(advance: FloatArray) -> StepForm:
-    """advance: (s, s), s even. In pairs where these are well apart, else as it is."""
+    """Form in which to step. advance: (s, s), s even. In pairs where these are well separated, else the full matrix."""
     size = len(advance)
     dense = StepForm(np.ascontiguousarray(advance.T), np.eye(size), np.eye(size))
     if not np.isfinite(advance).all():

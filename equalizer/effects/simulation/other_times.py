@@ -1,4 +1,4 @@
-"""A sampled response as read at other times than its own."""
+"""Reads a sampled response at other times, by windowed-sinc or linear interpolation."""
 
 from functools import cache
 
@@ -13,15 +13,15 @@ BETA = 8.0
 
 
 def read_other_times(response: FloatArray, per_sample: float, offset: float, straight: float = 0.0) -> FloatArray:
-    """(n, p) from (n, p): sample k as it was at k per_sample + offset, both in samples. straight: share (0 to 1) taken
-    on straight lines between samples, the rest by what a band-limited signal does between them."""
+    """(n, p) from (n, p): sample k is read at k per_sample + offset, in samples. straight: share (0 to 1) of linear
+    interpolation, the rest is band-limited."""
     read = np.empty(response.shape)
-    read_at(np.ascontiguousarray(response, dtype=np.float64), per_sample, offset, _between(), straight, read)
+    read_at(np.ascontiguousarray(response, dtype=np.float64), per_sample, offset, _sinc_weights(), straight, read)
     return read
 
 
 @cache
-def _between() -> FloatArray:
+def _sinc_weights() -> FloatArray:
     """(phases + 1, taps): windowed sinc."""
     part = np.arange(PHASES + 1) / PHASES
     away = part[:, None] - np.arange(1 - TAPS // 2, TAPS // 2 + 1)

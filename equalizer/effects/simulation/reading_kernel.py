@@ -1,4 +1,4 @@
-"""Where a clock runs wrong or samples are lost: what is read of a sampled response, compiled."""
+"""Reading of a sampled response with a wrong clock or with lost samples, compiled."""
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ def read_at(
     samples: FloatArray, per_sample: float, offset: float, between: FloatArray, straight: float, out: FloatArray
 ) -> None:
     """out[k] = samples at k per_sample + offset; held beyond both ends. samples, out: (n, p). between: (phases + 1,
-    taps), the weights of what lies around. straight: the share that is taken on straight lines instead."""
+    taps), interpolation weights. straight: share of linear interpolation."""
     n, p = samples.shape
     phases, taps = between.shape[0] - 1, between.shape[1]
     weights = np.empty(taps)
@@ -43,7 +43,7 @@ def read_at(
 
 @njit(types.void(_IN, _FLAGS, _MATRIX), cache=True, nogil=True)
 def repeat_where(samples: FloatArray, lost: Flags, out: FloatArray) -> None:
-    """A lost sample shows what was read before it. samples, out: (n, p), lost: (n,)"""
+    """Replace each lost sample by the one that was read before it. samples, out: (n, p), lost: (n,)"""
     out[0] = samples[0]
     for k in range(1, samples.shape[0]):
         out[k] = out[k - 1] if lost[k] else samples[k]
@@ -53,7 +53,7 @@ def repeat_where(samples: FloatArray, lost: Flags, out: FloatArray) -> None:
 def repeat_as_measured(
     samples: FloatArray, measured: FloatArray, noise: FloatArray, odds_against: float, out: FloatArray, lost: Flags
 ) -> None:
-    """Fills out (n, p) and lost (n,): each sample was lost where that is the likelier by the measurement.
+    """Fill out (n, p) and lost (n,): a sample counts as lost where the measurement makes that likelier.
     odds_against: 2 ln of the odds that a sample is not lost."""
     n, p = samples.shape
     out[0] = samples[0]

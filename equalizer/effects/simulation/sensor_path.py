@@ -1,4 +1,4 @@
-"""What a sensor makes of a true response, by the limits that a model states."""
+"""A sensor's low pass and range, applied to a true response."""
 
 import numpy as np
 from numba import njit, types
@@ -9,8 +9,8 @@ _IN = types.Array(types.float64, 2, "A", readonly=True)
 
 
 @njit(types.void(_IN, types.float64, types.float64[:, ::1]), cache=True, nogil=True)
-def one_pole(samples: FloatArray, decay: float, out: FloatArray) -> None:
-    """Fills out (n, c). samples: (n, c)"""
+def filter_one_pole(samples: FloatArray, decay: float, out: FloatArray) -> None:
+    """Fill out (n, c) with samples (n, c) through a first-order low pass. decay: its pole."""
     now, share = np.zeros(out.shape[1]), 1 - decay
     for k in range(out.shape[0]):
         for channel in range(out.shape[1]):
@@ -18,18 +18,18 @@ def one_pole(samples: FloatArray, decay: float, out: FloatArray) -> None:
             out[k, channel] = now[channel]
 
 
-def low_passed(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
-    """One pole, discrete: y += (1 - exp(-2 pi f / rate)) (x - y). response: (n, …)"""
+def low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
+    """First-order low pass, discrete: y += (1 - exp(-2 pi f / rate)) (x - y). response: (n, …); 0 Hz = none."""
     if bandwidth_hz <= 0:
         return response
     decay = float(np.exp(-2 * np.pi * bandwidth_hz / sample_rate_hz))
     passed = np.empty(response.shape)
-    one_pole(response.reshape(len(response), -1), decay, passed.reshape(len(passed), -1))
+    filter_one_pole(response.reshape(len(response), -1), decay, passed.reshape(len(passed), -1))
     return passed
 
 
-def before_low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
-    """Undoes `low_passed`."""
+def undo_low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
+    """The inverse of `low_pass`, sample by sample."""
     if bandwidth_hz <= 0:
         return response
     decay = float(np.exp(-2 * np.pi * bandwidth_hz / sample_rate_hz))
@@ -38,5 +38,5 @@ def before_low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: f
     return np.asarray(before / (1 - decay))
 
 
-def within_range(response: FloatArray, limit: float) -> FloatArray:
+def clip_to_range(response: FloatArray, limit: float) -> FloatArray:
     return np.clip(response, -limit, limit) if limit > 0 else response

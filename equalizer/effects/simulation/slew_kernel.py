@@ -1,4 +1,4 @@
-"""An actuator that cannot change its force faster than so, compiled."""
+"""Slew-rate limit of a force, compiled."""
 
 from numba import njit, types
 
@@ -8,9 +8,9 @@ _IN = types.Array(types.float64, 1, "A", readonly=True)
 
 
 @njit(types.void(_IN, types.float64, types.float64[::1], types.float64[::1]), cache=True, nogil=True)
-def follow(commands: FloatArray, reach: float, mean: FloatArray, end: FloatArray) -> None:
-    """Fills the force's mean over each step and its value at the end, for held commands. reach: the largest change in
-    one step."""
+def limit_rate(commands: FloatArray, reach: float, mean: FloatArray, end: FloatArray) -> None:
+    """Fill mean (n,) and end (n,): the force over each step and at its end, for held commands (n,). reach: largest
+    change in one step."""
     force = 0.0
     for k in range(commands.shape[0]):
         missing = commands[k] - force

@@ -1,12 +1,12 @@
-"""How a motion is stepped, block by block of samples: alone, or under forces that depend on it."""
+"""Time stepping of a linear structure in blocks of samples: unforced, or under motion-dependent forces."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.effects.simulation.linear_step_kernel import coast
-from equalizer.effects.simulation.mechanism_kernel import PORT_ROWS, Integers, play
+from equalizer.effects.simulation.linear_step_kernel import advance_unforced
+from equalizer.effects.simulation.mechanism_kernel import PORT_ROWS, Integers, step_mechanism
 from equalizer.effects.simulation.modal_form import step_form
 from equalizer.plant.linear_simulation import LinearSteps
 from equalizer.signals.signal import FloatArray
@@ -17,14 +17,14 @@ BLOCK, BLOCK_UNDER_FORCES = 4096, 32768
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forces:
-    """What the compiled kernel is told of the forces; see `equalizer.effects.simulation.mechanism_kernel.play`."""
+    """Forces in the form that the compiled kernel takes; see `mechanism_kernel.step_mechanism`."""
 
     ports: tuple[int, ...]
     """Where they act."""
     laws: tuple[object, ...]
     places: Integers
     """(items, 6)"""
-    of: FloatArray
+    numbers: FloatArray
     memory: FloatArray
     acceleration: bool
     """Some law asks for it."""
@@ -49,9 +49,9 @@ class Stepping:
     """Lets the next block begin from another state (2n,) than that which was reached."""
 
 
-def coasting(linear: LinearSteps, steps: int, stride: int) -> Stepping:
-    """Whole samples at once, whatever moves the command within them. stride: steps between two commands of a sample's
-    `steps`, which are held over all of them where it is 1."""
+def unforced_stepping(linear: LinearSteps, steps: int, stride: int) -> Stepping:
+    """Stepping without motion-dependent forces, a whole sample at once. stride: commands per sample; 1 where they are
+    held over all `steps`."""
     pushes = [linear.by_command]
     for _ in range(steps - 1):
         pushes.append(linear.advance @ pushes[-1])
@@ -60,7 +60,7 @@ def coasting(linear: LinearSteps, steps: int, stride: int) -> Stepping:
     state = np.zeros(len(form.inward))
 
     def run(course: FloatArray, first: int) -> None:
-        coast(form.advance, course, state)
+        advance_unforced(form.advance, course, state)
 
     def begin(from_: FloatArray) -> None:
         state[:] = form.inward @ from_
@@ -68,8 +68,8 @@ def coasting(linear: LinearSteps, steps: int, stride: int) -> Stepping:
     return Stepping(1, (form.inward @ by_command).T, form.outward, BLOCK, run, begin)
 
 
-def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int, commanded: FloatArray) -> Stepping:
-    """commanded: (n stride, m)"""
+def forced_stepping(linear: LinearSteps, forces: Forces, steps: int, stride: int, commanded: FloatArray) -> Stepping:
+    """Stepping under motion-dependent forces. commanded: (n stride, m), for laws that see the commands."""
     form = step_form(linear.advance)
     where, r = np.array(forces.ports), linear.by_axis_force.shape[1]
     look = linear.motion[np.concatenate([where, r + where, 2 * r + where])]
@@ -78,14 +78,14 @@ def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int, command
     per_newton[2 * len(where) :] = linear.motion_by_axis_force[2 * r + where][:, where]
     asked = look if forces.acceleration else look[: 2 * len(where)]
     outward, inward = asked @ form.outward, (form.inward @ by_force).T
-    step = (form.advance, _whole(outward), _whole(inward), _whole(per_newton.T))
+    step = (form.advance, _contiguous(outward), _contiguous(inward), _contiguous(per_newton.T))
     into = np.hstack([(form.inward @ linear.by_command).T, linear.motion_by_command[2 * r + where].T])
     seen = np.ascontiguousarray(commanded, dtype=np.float64) if forces.sees else np.empty((0, 0))
     state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(where))), forces.memory.copy()
 
     def run(course: FloatArray, first: int) -> None:
-        play(
-            forces.laws, forces.places, forces.of, memory, step, course,
+        step_mechanism(
+            forces.laws, forces.places, forces.numbers, memory, step, course,
             seen[first * stride : first * stride + len(course)], ports, state, (steps, stride, first),
             linear.step_s,
         )  # fmt: skip
@@ -97,5 +97,5 @@ def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int, command
     return Stepping(stride, into, form.outward, BLOCK_UNDER_FORCES, run, begin)
 
 
-def _whole(matrix: FloatArray) -> FloatArray:
+def _contiguous(matrix: FloatArray) -> FloatArray:
     return np.ascontiguousarray(matrix)

@@ -1,4 +1,4 @@
-"""A mass on a spring and a damper that hangs on a model, and how it shows in the missing force."""
+"""An oscillator attached to a model (mass, spring, damper), and its estimation from the missing force's spectrum."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,18 +12,18 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import cross_density, spectral_density
 
 WINDOW_S, DRIVEN, CHANCE = 2.0, 1e-4, 0.02
-"""Of a spectrum; least power of a line that counts, over the largest; share of the missing force that noise alone would
-let the best of all trials explain."""
+"""Window of a spectrum in seconds; least power of a line that counts, over the largest; share of the missing force that
+the best of all trials explains by chance."""
 
 SPANNED = 1e-9
-"""Of the largest: what directions leave of one another, below which they are the same but for rounding."""
+"""Relative singular value below which directions are linearly dependent but for rounding."""
 
 
 def with_oscillator(
     model: MechanicalModel, along: FloatArray, mass: float, damping: float, stiffness: float
 ) -> MechanicalModel:
-    """One more coordinate, the last; none for no mass. along: (n,), the direction in the coordinates to which it is
-    tied."""
+    """The model with an oscillator as its last coordinate; unchanged for mass 0. along: (n,), the direction in the
+    coordinates to which it is tied."""
     if mass <= 0:
         return model
     tie = np.append(-along, 1.0)
@@ -61,35 +61,37 @@ def missing_mass(evidence: Evidence, axis: int) -> MissingMass:
     return MissingMass(frequency[inside], power[inside], cross[inside])
 
 
-def hanging(frequency_hz: FloatArray, natural_hz: float | FloatArray, damping_ratio: float) -> ComplexArray:
-    """The force on its host per acceleration and mass of an oscillator, negative; in the shape that both have
-    together."""
+def oscillator_reaction(frequency_hz: FloatArray, natural_hz: float | FloatArray, damping_ratio: float) -> ComplexArray:
+    """Reaction force of an oscillator on its host per unit mass and host acceleration (negative); the arguments are
+    broadcast."""
     ratio = frequency_hz / natural_hz
     tied = 1 + 2j * damping_ratio * ratio
     return np.asarray(-tied / (tied - ratio**2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Hung:
-    """The oscillator that explains most."""
+class AttachedOscillator:
+    """An oscillator fitted to the missing force."""
 
     natural_hz: float
     damping_ratio: float
     mass: float
     explained: float
     by_axis: FloatArray
-    """(m,): its pull on each axis over that on the own one."""
+    """(m,): its force on each axis over that on its own axis."""
 
 
-def _span(columns: FloatArray) -> FloatArray:
-    """Orthonormal columns that span the same."""
+def _orthonormal_basis(columns: FloatArray) -> FloatArray:
+    """Orthonormal basis of the columns' span."""
     directions, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
     return np.asarray(directions[:, sizes > SPANNED * sizes[0]])
 
 
-def hung(seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_ratios: Sequence[float]) -> list[Hung]:
-    """The best of each damping ratio and natural frequency, likeliest first; only masses above zero that explain more
-    than chance would, below the highest frequency that is driven."""
+def likely_oscillators(
+    seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_ratios: Sequence[float]
+) -> list[AttachedOscillator]:
+    """Oscillators of all damping ratios and natural frequencies, likeliest first: those with positive mass that explain
+    more than chance, below the highest driven frequency. axis: index of the axis they are tied to."""
     if not len(seen.frequency_hz):
         return []
     root = np.sqrt(np.maximum(seen.power, np.finfo(float).tiny))
@@ -98,13 +100,13 @@ def hung(seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_rati
     force = seen.cross / root[:, None]
     aim = np.vstack([force.real, force.imag])
     linear = np.vstack([linear.real, linear.imag])
-    beside = _span(linear)
+    beside = _orthonormal_basis(linear)
     alone = aim - beside @ (beside.T @ aim)
     power = max(float(alone[:, axis] @ alone[:, axis]), np.finfo(float).tiny)
     natural = np.array([item for item in natural_hz if item < seen.frequency_hz[-1]])
     found = []
     for ratio in damping_ratios:
-        shape = hanging(seen.frequency_hz[:, None], natural, ratio) * root[:, None]
+        shape = oscillator_reaction(seen.frequency_hz[:, None], natural, ratio) * root[:, None]
         shapes = np.vstack([shape.real, shape.imag])
         # What the linear part cannot take: beside it, a shape's least squares are its alone.
         own = shapes - beside @ (beside.T @ shapes)
@@ -114,11 +116,11 @@ def hung(seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_rati
         for each, pull, square in zip(natural[apart].tolist(), pulls, size[apart].tolist(), strict=True):
             if pull[axis] > 0:
                 explained = float(pull[axis]) ** 2 / square / power
-                found.append(Hung(each, ratio, float(pull[axis]) / square, explained, pull / pull[axis]))
+                found.append(AttachedOscillator(each, ratio, float(pull[axis]) / square, explained, pull / pull[axis]))
     return sorted((item for item in found if item.explained > CHANCE), key=lambda item: -item.explained)
 
 
-def without(seen: MissingMass, each: Hung) -> MissingMass:
-    """What an oscillator leaves of the missing force."""
-    pull = seen.power * each.mass * hanging(seen.frequency_hz, each.natural_hz, each.damping_ratio)
+def subtract_oscillator(seen: MissingMass, each: AttachedOscillator) -> MissingMass:
+    """The missing force without an oscillator's."""
+    pull = seen.power * each.mass * oscillator_reaction(seen.frequency_hz, each.natural_hz, each.damping_ratio)
     return MissingMass(seen.frequency_hz, seen.power, seen.cross - pull[:, None] * each.by_axis)

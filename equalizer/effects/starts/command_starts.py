@@ -1,4 +1,4 @@
-"""Starting values of what changes a command, from the force that the model lacks at a driven axis."""
+"""Starting values of actuator effects, from the missing force at a driven axis."""
 
 from collections.abc import Callable, Sequence
 
@@ -11,9 +11,9 @@ from equalizer.signals.signal import FloatArray
 LEAST_SHARE = 1e-3
 """Of the missing force, that a value must explain to be worth a try."""
 SHIFTS = (0, 1)
-"""Samples by which the force may come after its command."""
+"""Delays in samples that are tried."""
 CLOSE = 3e-3
-"""A refinement is closer than this, relative."""
+"""Relative tolerance of the golden-section search."""
 GOLDEN = (5**0.5 - 1) / 2
 
 
@@ -24,14 +24,15 @@ def likeliest_value(
     grid: Sequence[float],
     nonlinear: bool,
 ) -> float | None:
-    """The value, near one of the grid's (rising, above zero), whose changed command leaves the least missing force.
+    """The parameter value whose changed command leaves the least missing force: grid search (grid rising, above zero),
+    refined by golden section. None where no value explains anything.
 
-    change: samples (n,), seconds between them, value. nonlinear: what re-tuned parameters can take up, which is in
-    line with the motion, does not count. None where none explains anything.
+    change: samples (n,), seconds between them, value. nonlinear: components proportional to the motion, which re-tuned
+    parameters absorb, do not count.
     """
     axes = range(evidence.command.shape[1]) if site == ALL_SITES else (site,)
     step_s = 1 / evidence.sample_rate_hz
-    looks = [_look(evidence, axis, nonlinear) for axis in axes]
+    looks = [_force_and_basis(evidence, axis, nonlinear) for axis in axes]
     used = np.flatnonzero(evidence.used > 0)
 
     def left(value: float) -> float:
@@ -48,13 +49,13 @@ def likeliest_value(
     return best if misfit < (1 - LEAST_SHARE) * sum(_misfit(force, basis) for force, basis in looks) else None
 
 
-def of_square(evidence: Evidence, site: int) -> tuple[float, float] | None:
-    """The share of the force that grows with the square of the command, of that at a reference, where force and
-    command agree; and the reference. None where a square explains nothing."""
+def fit_square_law(evidence: Evidence, site: int) -> tuple[float, float] | None:
+    """(square, reference) of `square_law_force` by regression of the missing force; None where a quadratic term
+    explains nothing."""
     axes = range(evidence.command.shape[1]) if site == ALL_SITES else (site,)
     used, linear, squared, gained = np.flatnonzero(evidence.used > 0), [], [], 0.0
     for axis in axes:
-        force, basis = _look(evidence, axis, True)
+        force, basis = _force_and_basis(evidence, axis, True)
         u = evidence.command[used, axis]
         rows = np.column_stack([u, u * np.abs(u)])
         rows -= basis @ (basis.T @ rows)
@@ -62,7 +63,7 @@ def of_square(evidence: Evidence, site: int) -> tuple[float, float] | None:
         gain, weights = (np.linalg.lstsq(rows[:, :k], force, rcond=None)[0] for k in (1, 2))
         linear.append(1 + float(weights[0]))
         squared.append(float(weights[1]))
-        none, left = (float(np.sum((force - rows[:, : len(of)] @ of) ** 2)) for of in (gain, weights))
+        none, left = (float(np.sum((force - rows[:, : len(part)] @ part) ** 2)) for part in (gain, weights))
         gained += (none - left) / max(none, 1e-300) / len(axes)
     first, second = float(np.mean(linear)), float(np.mean(squared))
     peak = float(np.abs(evidence.command[:, list(axes)]).max(initial=0.0))
@@ -106,8 +107,8 @@ def grid_of_peaks(evidence: Evidence, site: int, count: int = 12) -> list[float]
     return list(np.geomspace(0.03 * peak, 0.995 * peak, count)) if peak > 0 else []
 
 
-def _look(evidence: Evidence, axis: int, nonlinear: bool) -> tuple[FloatArray, FloatArray]:
-    """The missing force where samples count, and an orthonormal basis (k, columns) of what does not matter."""
+def _force_and_basis(evidence: Evidence, axis: int, nonlinear: bool) -> tuple[FloatArray, FloatArray]:
+    """The missing force (k,) where samples count, and an orthonormal basis (k, columns) of the nuisances."""
     used, v = evidence.used > 0, evidence.axis_velocity[:, axis]
     force = evidence.axis_force[used, axis]
     if not nonlinear:

@@ -1,4 +1,4 @@
-"""What an effect's starting values are drawn from: motion, commands, and what the model failed to explain."""
+"""Evidence for an effect's starting values: motion, commands, and the residuals of a re-tuned model."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Whether values lie on an evenly spaced lattice, and how wide it is."""
+"""Detection of quantization: whether values lie on an evenly spaced lattice, and its step."""
 
 import numpy as np
 
@@ -47,15 +47,15 @@ def lattice_step(values: FloatArray) -> float | None:
     return step if lattice_offset(values, step) is not None else None
 
 
-def own_step(values: FloatArray, other: float) -> float:
-    """The step of a lattice that values lie on; 0 = none. other: a step that is asked for where there are too many
-    different values to tell a lattice from them alone."""
+def confirm_lattice_step(values: FloatArray, other: float) -> float:
+    """The step of the lattice that values (n,) lie on; 0 = none. other: a step to test where there are too many
+    different values to find a lattice from them alone."""
     own = lattice_step(values)
     return own if own is not None else other if lattice_offset(values, other) is not None else 0.0
 
 
 def staircase_step(values: FloatArray, noise: float) -> float | None:
-    """The step of a staircase under noise, from the ripple that it leaves in the histogram; None without one."""
+    """The quantization step under noise, from the ripple in the histogram of values (n,); None without one."""
     span = float(np.ptp(values))
     bins = int(span / (BIN_SHARE * noise)) if noise > 0 else 0
     if not 64 <= bins <= 4_000_000:

@@ -1,4 +1,4 @@
-"""Starting values of what a sensor does, from the response as measured against the response as predicted."""
+"""Starting values of sensor effects, from measured and predicted responses."""
 
 from collections.abc import Callable, Sequence
 
@@ -28,8 +28,8 @@ def likeliest_reading(
     change: Callable[[FloatArray, float], FloatArray],
     grid: Sequence[float],
 ) -> float | None:
-    """The value, near one of the grid's (rising, above zero), that makes most of the measured response out of the
-    predicted one. change: samples (n, channels), value. None where none makes it better."""
+    """The parameter value that brings the predicted response closest to the measured one: grid search (rising, above
+    zero), refined. change: samples (n, channels), value. None where no value improves it."""
     channels = list(channels_of(evidence, site))
     used, noise = evidence.used > 0, evidence.noise[channels]
     measured, predicted = evidence.response[:, channels], evidence.predicted[:, channels]
@@ -41,7 +41,7 @@ def likeliest_reading(
     return best if misfit < (1 - LEAST_SHARE) * left(predicted) else None
 
 
-def late_at_axis(evidence: Evidence, axis: int, longest_s: float) -> float:
+def axis_lateness(evidence: Evidence, axis: int, longest_s: float) -> float:
     """Seconds by which the measured response to a driven axis comes after the predicted one. Of that axis' own
     channel, where there is one for each."""
     rate, own = evidence.sample_rate_hz, evidence.response.shape[1] == evidence.command.shape[1]
@@ -52,17 +52,17 @@ def late_at_axis(evidence: Evidence, axis: int, longest_s: float) -> float:
 
 
 def starts_for_lateness(evidence: Evidence, axis: int, fitting: float | None, longest_s: float) -> tuple[float, ...]:
-    """Seconds to start from, of what makes an axis late: as late as its response is, and what fits the missing force.
-    Re-tuned damping takes up most of a small lag, so that a fifth of a sample is always worth a try where the response
+    """Delays or time constants in seconds to start from: the response's lateness, and the value that fits the missing
+    force. Re-tuned damping absorbs most of a small lag, so that a fifth of a sample is always tried where the response
     is not early."""
-    late, least = late_at_axis(evidence, axis, longest_s), 0.2 / evidence.sample_rate_hz
+    late, least = axis_lateness(evidence, axis, longest_s), 0.2 / evidence.sample_rate_hz
     if late < -least:
         return ()
     return tuple(sorted({max(late, least), max(fitting or 0.0, least)}, reverse=True))
 
 
 def shares_of(residual: FloatArray, basis: FloatArray, used: FloatArray) -> FloatArray:
-    """(k,): how much of each of the basis' (n, k) columns the residual (n,) holds."""
+    """(k,): least-squares coefficients of the residual (n,) on the columns of basis (n, k), where used (n,) > 0."""
     columns = basis[used > 0]
     size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
     columns = columns / size
@@ -72,7 +72,8 @@ def shares_of(residual: FloatArray, basis: FloatArray, used: FloatArray) -> Floa
 
 
 def lateness(measured: FloatArray, predicted: FloatArray, longest: int) -> float:
-    """By how many samples the measured response (n, p) comes after the predicted one, at most `longest`."""
+    """Samples by which the measured response (n, p) lags the predicted one, by cross-correlation; at most
+    `longest`."""
     longest = min(longest, len(measured) - 1)
     room = next_fast_len(len(measured) + longest, True)
     total: FloatArray = np.zeros(2 * longest + 1)
@@ -82,11 +83,11 @@ def lateness(measured: FloatArray, predicted: FloatArray, longest: int) -> float
             alike = irfft(rfft(after, room) * rfft(before, room).conj(), room)
             total = total + np.concatenate([alike[room - longest :], alike[: longest + 1]]) / size
     late = int(np.argmax(total)) - longest
-    return float(late) if abs(late) == longest else _nearer(measured, predicted, float(late))
+    return float(late) if abs(late) == longest else _refine_lateness(measured, predicted, float(late))
 
 
-def _nearer(measured: FloatArray, predicted: FloatArray, late: float) -> float:
-    """By least squares on the slope, where a correlation's peak would lean to one side."""
+def _refine_lateness(measured: FloatArray, predicted: FloatArray, late: float) -> float:
+    """Refine a lateness by Gauss-Newton steps, because a correlation's peak is biased between samples."""
     for _ in range(NEARER):
         shifted = read_other_times(predicted, 1.0, -late)
         slope = np.gradient(shifted, axis=0)

@@ -1,4 +1,4 @@
-"""What several effects' starting values have in common: the missing force as a sum of laws of the motion."""
+"""Partial regression of the missing force on laws of the motion, for the starting values of several effects."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ SLOW = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moving:
-    """The samples that count, at one axis; all (n,)."""
+class AxisMotion:
+    """Motion and missing force at one axis, where samples count; all (n,)."""
 
     time_s: FloatArray
     position: FloatArray
@@ -24,13 +24,13 @@ class Moving:
     force: FloatArray
     """That is missing."""
 
-    def where(self, keep: npt.NDArray[np.bool_]) -> "Moving":
-        return Moving(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
+    def where(self, keep: npt.NDArray[np.bool_]) -> "AxisMotion":
+        return AxisMotion(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
-    """The missing force by laws of the motion."""
+class LawFit:
+    """Regression of the missing force on laws of the motion."""
 
     strengths: FloatArray
     """(k,): how much of each law."""
@@ -38,30 +38,30 @@ class Fitted:
     """Share of the missing force's power that they add to what a linear model explains."""
 
 
-def moving(evidence: Evidence, axis: int) -> Moving:
+def axis_motion(evidence: Evidence, axis: int) -> AxisMotion:
     time_s = np.arange(len(evidence.command)) / evidence.sample_rate_hz
     acceleration = np.gradient(evidence.axis_velocity[:, axis], 1 / evidence.sample_rate_hz)
-    every = Moving(
+    every = AxisMotion(
         time_s, evidence.axis_position[:, axis], evidence.axis_velocity[:, axis], acceleration,
         evidence.axis_force[:, axis],
     )  # fmt: skip
     return every.where(evidence.used > 0)
 
 
-def sliding(evidence: Evidence, axis: int) -> Moving:
-    """Only where the axis surely moves."""
-    of = moving(evidence, axis)
-    return of.where(np.abs(of.velocity) > SLOW * np.sqrt(np.mean(of.velocity**2)))
+def sliding_motion(evidence: Evidence, axis: int) -> AxisMotion:
+    """Motion of an axis, only where it surely slides."""
+    motion = axis_motion(evidence, axis)
+    return motion.where(np.abs(motion.velocity) > SLOW * np.sqrt(np.mean(motion.velocity**2)))
 
 
-def linear_part(of: Moving, constant: bool = True) -> FloatArray:
-    """(n, 3 or 4): what a re-tuned model got wrong of its mass, damping, stiffness and place of rest."""
-    shapes = [of.position, of.velocity, of.acceleration]
-    return np.column_stack([*shapes, np.ones_like(of.position)] if constant else shapes)
+def linear_part(motion: AxisMotion, constant: bool = True) -> FloatArray:
+    """(n, 3 or 4): position, velocity, acceleration and constant, the regressors of a linear model's errors."""
+    shapes = [motion.position, motion.velocity, motion.acceleration]
+    return np.column_stack([*shapes, np.ones_like(motion.position)] if constant else shapes)
 
 
-class Beside:
-    """Fits laws beside nuisances, quickly for many trials of one law."""
+class PartialRegression:
+    """Least squares of laws with nuisance regressors projected out (Frisch-Waugh), fast for many trials of a law."""
 
     def __init__(self, force: FloatArray, nuisances: FloatArray) -> None:
         """force: (n,); nuisances: (n, k)"""
@@ -75,28 +75,28 @@ class Beside:
     def _without(self, shapes: FloatArray) -> FloatArray:
         return np.asarray(shapes - self._known @ (self._known.T @ shapes))
 
-    def fit(self, *laws: FloatArray) -> Fitted:
+    def fit(self, *laws: FloatArray) -> LawFit:
         """laws: (n,) each, of strength 1."""
         shapes = self._without(np.column_stack(laws))
         size = np.linalg.norm(shapes, axis=0)
         shapes = shapes / np.where(size > 0, size, 1.0)
         seen = shapes.T @ self.force
         strengths = np.asarray(np.linalg.lstsq(shapes.T @ shapes, seen, rcond=1e-9)[0], dtype=np.float64)
-        return Fitted(strengths / np.where(size > 0, size, 1.0), float(seen @ strengths) / self._power)
+        return LawFit(strengths / np.where(size > 0, size, 1.0), float(seen @ strengths) / self._power)
 
 
-def beside_linear(of: Moving, constant: bool = True) -> Beside:
-    return Beside(of.force, linear_part(of, constant))
+def regress_beside_linear(motion: AxisMotion, constant: bool = True) -> PartialRegression:
+    return PartialRegression(motion.force, linear_part(motion, constant))
 
 
-def best_of(
-    beside: Beside, trials: Sequence[float], laws: Callable[[float], tuple[FloatArray, ...]]
-) -> tuple[float, Fitted]:
-    """The trial whose laws explain most."""
+def best_trial(
+    beside: PartialRegression, trials: Sequence[float], laws: Callable[[float], tuple[FloatArray, ...]]
+) -> tuple[float, LawFit]:
+    """The trial whose laws explain most, and its fit."""
     fits = [(trial, beside.fit(*laws(trial))) for trial in trials]
     return max(fits, key=lambda item: item[1].explained)
 
 
-def own(matrix: FloatArray, direction: FloatArray) -> float:
-    """A mass, damping or stiffness along a direction (n,)."""
+def value_along(matrix: FloatArray, direction: FloatArray) -> float:
+    """Quadratic form: a mass, damping or stiffness matrix (n, n) along a direction (n,)."""
     return float(direction @ matrix @ direction)

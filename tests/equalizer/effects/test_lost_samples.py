@@ -5,7 +5,7 @@ import pytest
 
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulation.reading_kernel import repeat_where
-from equalizer.effects.simulation.simulator import Seen, simulate_mechanism
+from equalizer.effects.simulation.simulator import Measurement, simulate_mechanism
 
 EFFECT = EFFECTS["lost_samples"]
 ALL = (0, 1, 2)
@@ -45,7 +45,7 @@ def test_given_what_was_measured_the_losses_stand_where_they_were(bench, command
     noise = np.full(3, bench.NOISE_MPS2)
     placed = bench.placed("lost_samples", {"fraction": 0.02}, *ALL)
     without = simulate_mechanism(model, command, 1000.0).response
-    given = simulate_mechanism(model, command, 1000.0, placed, seen=Seen(seen.response, noise)).response
+    given = simulate_mechanism(model, command, 1000.0, placed, measurement=Measurement(seen.response, noise)).response
     assert ((seen.response - without) / noise).std() > 1.5
     assert ((seen.response - given) / noise).std() == pytest.approx(1.0, abs=0.03)
 
@@ -59,7 +59,7 @@ def test_a_position_of_the_same_logger_is_lost_with_the_response(bench, command,
         repeat_where(seen.played.position.copy(), lost, position)
     measured = position + bench.NOISE_M * rng.standard_normal(position.shape)
     placed = bench.placed("lost_samples", {"fraction": 0.02}, *ALL)
-    given = simulate_mechanism(model, command, 1000.0, placed, seen=Seen(seen.response, noise, measured))
+    given = simulate_mechanism(model, command, 1000.0, placed, measurement=Measurement(seen.response, noise, measured))
     # A loss that the response does not show, because it hardly moved, stays in the position.
     assert ((measured - given.position) / bench.NOISE_M).std() < 1.2
     assert np.any(given.position != seen.played.position) == same_logger

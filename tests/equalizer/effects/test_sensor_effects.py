@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.simulation.simulator import Seen, simulate_mechanism
+from equalizer.effects.simulation.simulator import Measurement, simulate_mechanism
 from equalizer.plant.mechanical_model import SensorLimits
 
 ALL = (0, 1, 2)
@@ -147,5 +147,7 @@ def test_a_drift_is_one_over_the_whole_recording_also_where_its_beginning_alone_
     model, drift = bench.three_axes(), bench.placed("sensor_drift", {"total": 1.0, "bend": 0.4, "start": 0.1}, 0)
     whole = simulate_mechanism(model, command, 1000.0, drift).response
     n = len(command) // 3
-    seen = Seen(whole[:n], np.ones(3), whole=len(command))
-    assert np.allclose(simulate_mechanism(model, command[:n], 1000.0, drift, seen=seen).response, whole[:n], atol=1e-9)
+    seen = Measurement(whole[:n], np.ones(3), whole=len(command))
+    assert np.allclose(
+        simulate_mechanism(model, command[:n], 1000.0, drift, measurement=seen).response, whole[:n], atol=1e-9
+    )

@@ -7,8 +7,8 @@ import pytest
 
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import AxisForce, PlacedEffect
-from equalizer.effects.simulation.bodies import bodies_of, moved
-from equalizer.effects.simulation.command_path import Driven
+from equalizer.effects.simulation.bodies import bodies_of, simulate_bodies
+from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.instant import (
     A_FREE,
     A_PER_N,
@@ -23,7 +23,7 @@ from equalizer.effects.simulation.instant import (
     V,
     X,
 )
-from equalizer.effects.simulation.mechanism_kernel import SWEEPS, compiled_law
+from equalizer.effects.simulation.mechanism_kernel import SWEEPS, compile_law
 from equalizer.effects.simulation.modal_form import step_form
 from equalizer.effects.simulation.simulator import simulate_mechanism, simulate_response
 from equalizer.effects.simulation.stepping import BLOCK
@@ -93,15 +93,15 @@ def assert_same(model, effects, commands, steps, fine=1):
     bodies = bodies_of(model, effects)
     held = np.repeat(commands, fine, axis=0)
     ramp = held + 0.1 * np.sin(np.arange(len(held)))[:, None] if fine > 1 else held
-    driven = Driven(ramp, ramp if fine == 1 else ramp + 0.01)
+    driven = ActuatorForce(ramp, ramp if fine == 1 else ramp + 0.01)
     size, step_s = (len(commands), steps), 1 / (RATE_HZ * steps)
-    found, pushed = moved(bodies, driven, size, step_s)
+    found, pushed = simulate_bodies(bodies, driven, size, step_s)
     wanted, forced = plainly(bodies, driven, size, step_s)
     within = RUBBING if any(act.memory for act in bodies.acts) else WITHIN
     scale = np.abs(wanted).max(axis=0) + 1e-12
     np.testing.assert_array_less(np.abs(found - wanted).max(axis=0) / scale, within)
     np.testing.assert_allclose(pushed, forced, atol=within * (np.abs(forced).max() + 1e-12), rtol=0)
-    short, none = moved(bodies, driven, size, step_s, motion=False)
+    short, none = simulate_bodies(bodies, driven, size, step_s, motion=False)
     np.testing.assert_array_equal(none, np.zeros((size[0], 0)))
     np.testing.assert_allclose(
         short, found[:, 3 * bodies.ports.shape[1] :], atol=1e-12 * np.abs(found).max(), rtol=1e-12
@@ -179,7 +179,7 @@ def test_commands_are_left_as_they_are(bench):
     np.testing.assert_array_equal(commands, kept)
 
 
-@compiled_law
+@compile_law
 def _heavier(of: np.ndarray, memory: np.ndarray, at: np.ndarray) -> float:
     return -of[0] * at[A_FREE] / (1 + of[0] * at[A_PER_N])
 
