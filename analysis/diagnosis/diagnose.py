@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from analysis.diagnosis.balance.balances import balances_of
-from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.balance.balances import find_balances
+from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.confirm.confirm_laws import (
     borne_out,
     leaves_open,
@@ -72,7 +72,7 @@ class DiagnosisSettings:
     fitted: bool = False
     """The model was fitted to these recordings by the program: evidence is then weighed in the force balance."""
     balances: tuple[Balance, ...] | None = None
-    """Where they were weighed already: `balances_of` these recordings."""
+    """Where they were weighed already: `find_balances` these recordings."""
     compared: Compared = "auto"
     """What is compared: motion, force, or what suits."""
     discovery: bool = False
@@ -173,7 +173,7 @@ def _by_given_model(
 
 
 def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings) -> tuple[Balance, ...]:
-    weighed = partial(balances_of, recordings, frozenset(settings.without), settings.time_left)
+    weighed = partial(find_balances, recordings, frozenset(settings.without), settings.time_left)
     return settings.guard.part(BALANCE, "its weighing", weighed, ())
 
 

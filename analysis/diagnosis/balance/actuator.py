@@ -1,4 +1,4 @@
-"""Whether an actuator gives what it is commanded: the force balance turned round.
+"""Nonlinear laws of the actuator (dead band, saturation, curvature), found with the force balance inverted.
 
 A law of the command cannot be a column beside the commanded force, for the command would stand on both sides and take
 the noise of the motion on itself. Solved for the acceleration, the command is known exactly:
@@ -17,21 +17,21 @@ import numpy as np
 from analysis.diagnosis.balance.blocks import (
     RIDGE,
     Block,
+    block_products,
     blocks_of,
     column_scale,
-    error_of,
-    part_of_block,
-    solved,
-    total,
+    solve_normal_equations,
+    squared_error,
+    summed_products,
 )
-from analysis.diagnosis.balance.command_laws import AS_COMMANDED, CommandLaw, closer, command_laws
+from analysis.diagnosis.balance.command_laws import AS_COMMANDED, CommandLaw, command_laws, neighbouring_laws
+from analysis.diagnosis.balance.judge_laws import MOST_ALIKE, Balance, blocks_to_judge, judge_laws
+from analysis.diagnosis.balance.judged_law import JudgedLaw, bootstrap_draws, gain_with_bound
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
-from analysis.diagnosis.balance.structures import Searched
-from analysis.diagnosis.balance.weigh import MOST_ALIKE, Balance, judged_by, weigh
-from analysis.diagnosis.balance.weighed import Weighed, drawn_of, gain_of
+from analysis.diagnosis.balance.structures import StructureSearch
 from analysis.diagnosis.types import TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
@@ -50,109 +50,113 @@ NO_COLUMN = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Turned:
+class _InverseBalance:
     """A balance solved for the acceleration along its axis."""
 
-    searched: Searched
+    search: StructureSearch
 
     def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
         """(blocks,): sums of squares. judged: on what nothing was fitted to; else each fold's."""
         fit, test = self._blocks(self._rows(law, laws))
         columns = list(range(len(fit[0].pull)))
-        whole = total(fit, columns)
-        if judged and judged_by(self.searched.regression) is self.searched.regression.test:
-            weights = solved(whole, RIDGE)
-            return np.array([error_of(part_of_block(block, columns), weights, block.power) for block in test])
+        whole = summed_products(fit, columns)
+        if judged and blocks_to_judge(self.search.regression) is self.search.regression.test:
+            weights = solve_normal_equations(whole, RIDGE)
+            return np.array([squared_error(block_products(block, columns), weights, block.power) for block in test])
         found = []
         for block in fit:
-            own = part_of_block(block, columns)
-            found.append(error_of(own, solved((whole[0] - own[0], whole[1] - own[1]), RIDGE), block.power))
+            own = block_products(block, columns)
+            found.append(
+                squared_error(own, solve_normal_equations((whole[0] - own[0], whole[1] - own[1]), RIDGE), block.power)
+            )
         return np.array(found)
 
     def _blocks(self, rows: Sequence[FloatArray]) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
-        regression = self.searched.regression
+        regression = self.search.regression
         motions, own = regression.motions, regression.beside.own
         aims = [columns[:, own] for columns in regression.columns]
-        fit, test = ([motion.kept(mask) for motion, mask in zip(motions, masks, strict=True)]
+        fit, test = ([motion.valid_samples(mask) for motion, mask in zip(motions, masks, strict=True)]
                      for masks in ([m.fit for m in motions], [m.test for m in motions]))  # fmt: skip
         mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
         units = column_scale(rows, fit), mean
         return blocks_of(rows, aims, fit, units), blocks_of(rows, aims, test, units)
 
     def _rows(self, law: CommandLaw, laws: Sequence[int]) -> list[FloatArray]:
-        regression, found = self.searched.regression, []
+        regression, found = self.search.regression, []
         # Filters of the acceleration would give it back.
         filters = {regression.beside.own, *range(regression.matrices, regression.base - 1)}
-        beside = [column for column in regression.chosen(laws) if column not in filters]
+        beside = [column for column in regression.columns_of(laws) if column not in filters]
         for motion, columns in zip(regression.motions, regression.columns, strict=True):
             force = law.of(motion.force[:, regression.axis])
             others = np.delete(motion.force, regression.axis, axis=1)
             entered = np.hstack([force, np.gradient(force[:, :1], 1 / motion.rate_hz, axis=0), others])
-            found.append(np.hstack([motion.reduced(entered), columns[:, beside]]))
+            found.append(np.hstack([motion.decimate(entered), columns[:, beside]]))
         return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Actuator:
-    """What takes the most in the command's place."""
+    """The law of the command that fits best, and its test on held-out data."""
 
     law: CommandLaw
-    weighed: Weighed
+    judged: JudgedLaw
     alone: bool
     """Without laws of the motion, it leaves as little."""
 
 
-def balance_of(
+def find_balance(
     motions: Sequence[Motion], axis: int, rotational: bool, without: frozenset[str], time_left: TimeBudget
 ) -> Balance:
-    """Of laws of the motion, along what a law of the command lets through where one is named."""
-    balance = weigh(search_beside_linear(motions, axis, rotational, without, time_left))
-    actuator = actuator_of(balance, without) if balance.tested else None
+    """The balance of one axis: laws of the motion and, where one earns it, a law of the command, through which the
+    commanded force is then passed before the laws of the motion are searched again."""
+    balance = judge_laws(search_beside_linear(motions, axis, rotational, without, time_left))
+    actuator = find_actuator(balance, without) if balance.tested else None
     if actuator is None:
         return balance
-    weighed = actuator.weighed
-    if weighed.named:
-        through = [_through(motion, axis, actuator.law) for motion in motions]
-        again = weigh(search_beside_linear(through, axis, rotational, without, time_left))
-        return replace(again, laws=(weighed, *again.laws), linear=balance.linear)
-    if weighed.gain_low <= 0 or weighed.gain < NOTABLE:
+    judged = actuator.judged
+    if judged.named:
+        through = [_pass_through_law(motion, axis, actuator.law) for motion in motions]
+        again = judge_laws(search_beside_linear(through, axis, rotational, without, time_left))
+        return replace(again, laws=(judged, *again.laws), linear=balance.linear)
+    if judged.gain_low <= 0 or judged.gain < NOTABLE:
         return balance
-    if weighed.gain < MOST:
-        return replace(balance, others=tuple(sorted((*balance.others, weighed), key=lambda each: -each.gain)))
+    if judged.gain < MOST:
+        return replace(balance, others=tuple(sorted((*balance.others, judged), key=lambda each: -each.gain)))
     laws = (
         [replace(each, why_not=each.why_not or NEEDLESS) for each in balance.laws] if actuator.alone else balance.laws
     )
-    return replace(balance, laws=(weighed, *laws))
+    return replace(balance, laws=(judged, *laws))
 
 
-def _through(motion: Motion, axis: int, law: CommandLaw) -> Motion:
+def _pass_through_law(motion: Motion, axis: int, law: CommandLaw) -> Motion:
     force = motion.force.copy()
     force[:, [axis]] = law.of(force[:, axis])
     return replace(motion, force=force)
 
 
-def actuator_of(balance: Balance, without: frozenset[str]) -> Actuator | None:
-    """None where nothing in the command's place leaves less."""
-    searched = balance.searched
-    regression = searched.regression
+def find_actuator(balance: Balance, without: frozenset[str]) -> Actuator | None:
+    """The law of the command that leaves the smallest error; None where the balance has no clock, no command varies,
+    or no law of the command is allowed."""
+    search = balance.search
+    regression = search.regression
     commands = np.concatenate([motion.force[motion.fit, regression.axis] for motion in regression.motions])
     laws = [law for law in command_laws(commands) if law.effect not in without]
     if not np.isfinite(regression.motions[0].band_hz) or not laws or not np.any(commands):
         return None
-    turned = _Turned(searched)
+    turned = _InverseBalance(search)
     instead = _in_place_of_motion(turned, laws, tuple(each.place for each in balance.named))
     if instead is not None:
         return instead
-    beside = min(_sums(searched), key=lambda each: float(turned.errors(AS_COMMANDED, each, False).sum()))
+    beside = min(_sums_to_try(search), key=lambda each: float(turned.errors(AS_COMMANDED, each, False).sum()))
     best = _best_of_each(turned, laws, beside)
     law = min(best, key=lambda each: each[0])[1]
     alone, held = (float(turned.errors(law, each, False).sum()) for each in ((), beside))
     rivals = [other for _, other in best if other is not law]
-    weighed = _weighed(turned, law, rivals, (beside, beside))
-    return Actuator(law, weighed, bool(beside) and alone <= held / (1 - TOLD))
+    judged = _judge_law(turned, law, rivals, (beside, beside))
+    return Actuator(law, judged, bool(beside) and alone <= held / (1 - TOLD))
 
 
-def _in_place_of_motion(turned: _Turned, laws: Sequence[CommandLaw], named: tuple[int, ...]) -> Actuator | None:
+def _in_place_of_motion(turned: _InverseBalance, laws: Sequence[CommandLaw], named: tuple[int, ...]) -> Actuator | None:
     """A law of the command that by itself takes most of what the named laws of the motion leave: they took its part,
     as a drag does that of an actuator whose gain falls."""
     if not named:
@@ -160,51 +164,56 @@ def _in_place_of_motion(turned: _Turned, laws: Sequence[CommandLaw], named: tupl
     best = _best_of_each(turned, laws, ())
     law = min(best, key=lambda each: each[0])[1]
     rivals = [other for _, other in best if other is not law]
-    weighed = _weighed(turned, law, rivals, (named, ()))
-    return Actuator(law, weighed, True) if weighed.gain >= MOST and weighed.gain_low > 0 else None
+    judged = _judge_law(turned, law, rivals, (named, ()))
+    return Actuator(law, judged, True) if judged.gain >= MOST and judged.gain_low > 0 else None
 
 
-def _sums(searched: Searched) -> list[tuple[int, ...]]:
+def _sums_to_try(search: StructureSearch) -> list[tuple[int, ...]]:
     """No law that is linear in the motion: such a filter of the acceleration would give it back."""
-    laws = searched.regression.laws
-    plain = [each.laws for each in searched.ranked if each.laws and not any(laws[k].linear for k in each.laws)]
+    laws = search.regression.laws
+    plain = [each.laws for each in search.ranked if each.laws and not any(laws[k].linear for k in each.laws)]
     return [(), *plain[:SUMS]]
 
 
 def _best_of_each(
-    turned: _Turned, laws: Sequence[CommandLaw], beside: tuple[int, ...]
+    turned: _InverseBalance, laws: Sequence[CommandLaw], beside: tuple[int, ...]
 ) -> list[tuple[float, CommandLaw]]:
     best: dict[str, tuple[float, CommandLaw]] = {}
     for law in laws:
         error = float(turned.errors(law, beside, False).sum())
         if law.effect not in best or error < best[law.effect][0]:
             best[law.effect] = error, law
-    return [_moved(turned, *found, beside) for found in best.values()]
+    return [_refine_law(turned, *found, beside) for found in best.values()]
 
 
-def _moved(turned: _Turned, error: float, law: CommandLaw, beside: tuple[int, ...]) -> tuple[float, CommandLaw]:
+def _refine_law(
+    turned: _InverseBalance, error: float, law: CommandLaw, beside: tuple[int, ...]
+) -> tuple[float, CommandLaw]:
     for _ in range(ROUNDS):
-        tried = [(float(turned.errors(other, beside, False).sum()), other) for other in closer(law)]
+        tried = [(float(turned.errors(other, beside, False).sum()), other) for other in neighbouring_laws(law)]
         if not tried or min(tried, key=lambda each: each[0])[0] >= error * (1 - 1e-3):
             break
         error, law = min(tried, key=lambda each: each[0])
     return error, law
 
 
-def _weighed(
-    turned: _Turned, law: CommandLaw, rivals: Sequence[CommandLaw], sums: tuple[tuple[int, ...], tuple[int, ...]]
-) -> Weighed:
+def _judge_law(
+    turned: _InverseBalance,
+    law: CommandLaw,
+    rivals: Sequence[CommandLaw],
+    sums: tuple[tuple[int, ...], tuple[int, ...]],
+) -> JudgedLaw:
     """sums: laws of the motion beside the command as it is, and beside what the law makes of it."""
     plain, beside = sums
     without, held = turned.errors(AS_COMMANDED, plain, True), turned.errors(law, beside, True)
     linear = float(turned.errors(AS_COMMANDED, (), True).sum())
-    drawn = drawn_of(len(held))
+    drawn = bootstrap_draws(len(held))
     behind = [(turned.errors(rival, beside, True), rival.effect) for rival in rivals]
     alike = tuple(effect for errors, effect in behind if float(errors.sum()) <= float(held.sum()) / (1 - TOLD))
     first = [errors[drawn].sum(axis=1) >= held[drawn].sum(axis=1) for errors, _ in behind]
-    gain, low = gain_of(without, held)
-    known = Law(law.effect, turned.searched.regression.axis, (), lambda m, _: m.force, lambda w, n, mass: None)
-    return Weighed(
+    gain, low = gain_with_bound(without, held)
+    known = Law(law.effect, turned.search.regression.axis, (), lambda m, _: m.force, lambda w, n, mass: None)
+    return JudgedLaw(
         NO_COLUMN, known, dict(law.values), gain, low, float((without - held).sum()) / max(linear, 1e-300), alike,
         float(np.mean(np.all(first, axis=0))) if first else 1.0, _why_not(law, gain, low, alike),
     )  # fmt: skip

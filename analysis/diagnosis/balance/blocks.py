@@ -1,4 +1,4 @@
-"""Blocks of samples by their products, which are all that least squares needs of them."""
+"""Normal equations of blocks of samples: the Gram matrices and cross products from which least squares is solved."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,27 +12,27 @@ from equalizer.signals.signal import FloatArray
 FOLDS = 8
 """Blocks of the samples to fit, and as many of those to test by, at least."""
 MOST_SAMPLES = 20_000
-"""That numbers are fitted to, and as many to test by: of each block, the first."""
+"""Samples that numbers are fitted to at most, and as many to test by: the first ones of each block."""
 RIDGE = 1e-10
-"""Of the mean power of a column, against columns that are the same or are nothing but rounding in some blocks."""
+"""Ridge over the mean power of a column, against columns that are equal, or mere rounding errors in some blocks."""
 
 
 Prior = tuple[FloatArray, FloatArray] | None
-"""What is known of the first columns' weights: its precision and its pull (k,), as products would hold them."""
+"""Gaussian prior of the first k weights: precision (k,), and precision times mean (k,); added to the products."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """A stretch of samples: products of columns with themselves and with the force."""
+    """A stretch of consecutive samples by its products: of columns with themselves and with the force."""
 
     gram: FloatArray
     """(k, k)"""
     pull: FloatArray
     """(k,)"""
     power: float
-    """Sum of squares of the force,"""
+    """Sum of squares of the force."""
     signal: float
-    """and of what it differs by from its mean over all that is fitted."""
+    """Sum of squares of the force about its mean over all fitted samples."""
     motion: int
     rows: npt.NDArray[np.intp]
     """Of the motion's kept samples."""
@@ -60,49 +60,50 @@ def blocks_of(
     return tuple(found)
 
 
-def part_of_block(block: Block, columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+def block_products(block: Block, columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     at = list(columns)
     return block.gram[np.ix_(at, at)], block.pull[at]
 
 
-def parts_of(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    """(blocks, c, c) and (blocks, c): of some columns."""
+def products_per_block(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """(blocks, c, c) and (blocks, c): each block's Gram matrix and cross products of c columns."""
     at = np.asarray(columns, dtype=np.intp)
     grid = at[:, None], at[None, :]
     grams = np.array([block.gram[grid] for block in blocks]).reshape(-1, len(at), len(at))
     return grams, np.array([block.pull[at] for block in blocks]).reshape(-1, len(at))
 
 
-def total(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    grams, pulls = parts_of(blocks, columns)
+def summed_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    grams, pulls = products_per_block(blocks, columns)
     return np.asarray(grams.sum(axis=0)), np.asarray(pulls.sum(axis=0))
 
 
-def solved(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
-    """(..., c), of (..., c, c) and (..., c): each of many systems by itself."""
+def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
+    """Weights (..., c) of stacked systems with Gram matrices (..., c, c) and cross products (..., c). ridge: over the
+    mean diagonal element."""
     gram, pull = products
     count = gram.shape[-1]
     size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / count
     return np.asarray(np.linalg.solve(gram + (ridge * size + 1e-300) * np.eye(count), pull[..., None])[..., 0])
 
 
-def solved_without(gram: FloatArray, pull: FloatArray, fixed: Mask) -> FloatArray:
-    """As `solved`, with fixed columns of no weight."""
+def solve_without_columns(gram: FloatArray, pull: FloatArray, fixed: Mask) -> FloatArray:
+    """As `solve_normal_equations`, with the weights of `fixed` columns held at zero."""
     free = np.flatnonzero(~fixed)
     found = np.zeros_like(pull)
-    found[..., free] = solved((gram[..., free[:, None], free], pull[..., free]), RIDGE)
+    found[..., free] = solve_normal_equations((gram[..., free[:, None], free], pull[..., free]), RIDGE)
     return found
 
 
-def shrunk(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
-    """As `solved`, with columns that are not free shrunk."""
+def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
+    """As `solve_normal_equations`, with the ridge on those columns only that are not `free`."""
     gram, pull = products
     size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / gram.shape[-1]
     return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, RIDGE, ridge)) * size, pull[..., None])[..., 0])
 
 
 def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[FloatArray, FloatArray]:
-    """As if so much had been seen of the first columns' weights. products: (..., c, c) and (..., c)."""
+    """The normal equations with the prior's precision added. products: (..., c, c) and (..., c)."""
     if prior is None:
         return products
     gram, pull = products[0].copy(), products[1].copy()
@@ -112,13 +113,13 @@ def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[F
     return gram, pull
 
 
-def error_of(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
+def squared_error(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
     gram, pull = own
     return max(power - 2 * float(weights @ pull) + float(weights @ gram @ weights), 0.0)
 
 
-def errors_of(blocks: Sequence[Block], own: tuple[FloatArray, FloatArray], weights: FloatArray) -> FloatArray:
-    """(blocks,): sums of squares. own: `parts_of` these blocks. weights: (c,), or (blocks, c) for each its own."""
+def squared_errors(blocks: Sequence[Block], own: tuple[FloatArray, FloatArray], weights: FloatArray) -> FloatArray:
+    """(blocks,): residual sums of squares. own: `products_per_block` of these blocks. weights: (c,), or (blocks, c)."""
     weights = np.broadcast_to(weights, own[1].shape)
     power = np.array([block.power for block in blocks])
     squares = ((own[0] @ weights[..., None])[..., 0] * weights).sum(axis=-1)

@@ -1,7 +1,7 @@
-"""What an actuator may make of its command, over grids of the sizes that the command itself has.
+"""Static nonlinearities of an actuator, with their parameters on grids that span the amplitudes of the command.
 
-The laws of a motion are sums of columns beside the force; these change the force itself, so that they are weighed in
-the balance turned round; see `actuator`.
+Laws of the motion are columns beside the commanded force; these change the force itself, so that they are tested in
+the inverted balance; see `actuator`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -40,26 +40,26 @@ def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
     size = np.abs(command)
     for width in _sizes(size, DEAD):
         for jump in (0.0, 1.0):
-            yield CommandLaw("force_deadband", {"width": width, "jump": jump}, _beyond)
+            yield CommandLaw("force_deadband", {"width": width, "jump": jump}, _deadband_force)
     for limit in _sizes(size, FULL):
         yield CommandLaw(
             "force_saturation", {"limit": limit}, lambda u, of: np.clip(u, -of["limit"], of["limit"])[:, None]
         )
     unit = float(size.max(initial=0.0)) or 1.0
     for square in SQUARES:
-        yield CommandLaw("force_nonlinearity", {"square": square, "reference": unit}, _bent)
+        yield CommandLaw("force_nonlinearity", {"square": square, "reference": unit}, _nonlinear_force)
     yield CommandLaw("actuator_asymmetry", {}, lambda u, _: np.stack([u, np.abs(u)], axis=1))
 
 
-def closer(law: CommandLaw) -> Iterator[CommandLaw]:
-    """With its size moved a little."""
+def neighbouring_laws(law: CommandLaw) -> Iterator[CommandLaw]:
+    """The law with its parameter multiplied by each factor of `CLOSER`."""
     for name in {"width", "limit", "square"} & set(law.values):
         for factor in CLOSER:
             if name != "square" or abs(factor * law.values[name]) <= 1:
                 yield replace(law, values={**law.values, name: factor * law.values[name]})
 
 
-def _bent(command: FloatArray, of: dict[str, float]) -> FloatArray:
+def _nonlinear_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
     return square_law_force(command, of["square"], of["reference"])[:, None]
 
 
@@ -68,7 +68,7 @@ def _sizes(size: FloatArray, shares: Sequence[float]) -> list[float]:
     return [float(value) for value in found if 0 < value < size.max()]
 
 
-def _beyond(command: FloatArray, of: dict[str, float]) -> FloatArray:
+def _deadband_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
     width = of["width"]
     beyond = command - np.clip(command, -width, width)
     return np.asarray(beyond + of["jump"] * width * np.sign(beyond))[:, None]

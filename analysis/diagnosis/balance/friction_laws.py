@@ -9,18 +9,18 @@ from analysis.diagnosis.balance.law import (
     Law,
     Numbers,
     Scales,
-    named,
-    positive,
+    filter_from_rest,
+    name_positive_weight,
+    name_weights,
     relative_time,
-    sliding,
-    through_lines,
+    smooth_sign,
 )
 from analysis.diagnosis.balance.motion import Motion
 from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 SHARP = 0.01
-"""Of the rms speed: within which a dry friction's sign turns round, where nothing shows a wider one."""
+"""Width of the smoothed sign of a dry friction, over the rms speed, where nothing shows a wider one."""
 
 
 def friction_laws(c: int, of: Scales) -> Iterator[Law]:
@@ -28,28 +28,30 @@ def friction_laws(c: int, of: Scales) -> Iterator[Law]:
     spans = ((0.1 * sharp, 0.5 * of.speed),)
     for width in sharp * np.geomspace(1.0, 50.0, 7):
         yield Law(
-            "coulomb_friction", c, (float(width),), lambda m, n: sliding(m.velocity[:, c : c + 1], n[0]),
-            positive("level"), bounded=spans,
+            "coulomb_friction", c, (float(width),), lambda m, n: smooth_sign(m.velocity[:, c : c + 1], n[0]),
+            name_positive_weight("level"), bounded=spans,
         )  # fmt: skip
     for slow in of.speed * np.geomspace(0.03, 1.5, 7):
-        yield Law("stribeck_friction", c, (float(slow),), _stribeck(c, sharp), _stribeck_values, bounded=spans)
+        yield Law("stribeck_friction", c, (float(slow),), _stribeck_columns(c, sharp), _stribeck_values, bounded=spans)
     widths = np.geomspace(0.003, 0.5, 7) if of.turns else of.travel * np.geomspace(0.001, 0.3, 9)
     for width in widths:
         yield Law(
             "presliding_hysteresis", c, (float(width),), lambda m, n: bristle_bend(m.position[:, c], n[0])[:, None],
             _presliding_values, bounded=((0.1 * widths[0], widths[-1]),),
         )  # fmt: skip
-    yield Law("asymmetric_friction", c, (), _asymmetric(c, sharp), _asymmetric_values)
+    yield Law("asymmetric_friction", c, (), _asymmetric_columns(c, sharp), _asymmetric_values)
     if np.isfinite(of.band_hz):
-        yield Law("drifting_friction", c, (), _drifting(c, sharp), _drifting_values)
+        yield Law("drifting_friction", c, (), _drifting_columns(c, sharp), _drifting_values)
     if not of.turns:
-        yield Law("position_dependent_friction", c, (), _position_dependent(c, sharp), _position_dependent_values)
+        yield Law(
+            "position_dependent_friction", c, (), _position_dependent_columns(c, sharp), _position_dependent_values
+        )
 
 
-def _stribeck(c: int, sharp: float) -> Columns:
+def _stribeck_columns(c: int, sharp: float) -> Columns:
     def columns(m: Motion, n: Numbers) -> FloatArray:
         v = m.velocity[:, c : c + 1]
-        return np.hstack([sliding(v, sharp), sliding(v, sharp) * np.exp(-((v / n[0]) ** 2))])
+        return np.hstack([smooth_sign(v, sharp), smooth_sign(v, sharp) * np.exp(-((v / n[0]) ** 2))])
 
     return columns
 
@@ -64,9 +66,12 @@ def _presliding_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, floa
     return {"level": float(w[0]), "stiffness": float(w[0] / n[0])} if w[0] > 0 else None
 
 
-def _asymmetric(c: int, sharp: float) -> Columns:
+def _asymmetric_columns(c: int, sharp: float) -> Columns:
     return lambda m, _: np.hstack(
-        [np.maximum(sliding(m.velocity[:, [c]], sharp), 0.0), np.minimum(sliding(m.velocity[:, [c]], sharp), 0.0)]
+        [
+            np.maximum(smooth_sign(m.velocity[:, [c]], sharp), 0.0),
+            np.minimum(smooth_sign(m.velocity[:, [c]], sharp), 0.0),
+        ]
     )
 
 
@@ -74,22 +79,22 @@ def _asymmetric_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, floa
     return {"level_positive": float(w[0]), "level_negative": float(w[1])} if w.min() > 0 else None
 
 
-def _drifting(c: int, sharp: float) -> Columns:
+def _drifting_columns(c: int, sharp: float) -> Columns:
     def columns(m: Motion, _: Numbers) -> FloatArray:
-        rubbing = sliding(m.velocity[:, [c]], sharp)
+        rubbing = smooth_sign(m.velocity[:, [c]], sharp)
         return np.hstack([rubbing, rubbing * relative_time(m)])
 
     return columns
 
 
 def _drifting_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
-    """A friction that would push, at the beginning or at the end, is none."""
+    """None where the friction would change its sign within the part: it would push."""
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > abs(w[1]) else None
 
 
-def _position_dependent(c: int, sharp: float) -> Columns:
+def _position_dependent_columns(c: int, sharp: float) -> Columns:
     def columns(m: Motion, _: Numbers) -> FloatArray:
-        rubbing, q = sliding(m.velocity[:, [c]], sharp), m.position[:, [c]]
+        rubbing, q = smooth_sign(m.velocity[:, [c]], sharp), m.position[:, [c]]
         return np.hstack([rubbing, rubbing * q, rubbing * q**2])
 
     return columns
@@ -102,18 +107,18 @@ def _position_dependent_values(w: FloatArray, n: Numbers, mass: float) -> dict[s
 
 
 def damping_laws(c: int, of: Scales) -> Iterator[Law]:
-    """None without a clock: how fast anything moves is then not known."""
+    """Laws of the speed. Without a clock there are none, for no speed is known."""
     if not np.isfinite(of.band_hz):
         return
     yield Law(
         "quadratic_damping", c, (), lambda m, _: m.velocity[:, [c]] * np.abs(m.velocity[:, [c]]),
-        positive("coefficient"),
+        name_positive_weight("coefficient"),
     )  # fmt: skip
-    yield Law("drifting_damping", c, (), lambda m, _: m.velocity[:, [c]] * relative_time(m), named("change"))
+    yield Law("drifting_damping", c, (), lambda m, _: m.velocity[:, [c]] * relative_time(m), name_weights("change"))
     for tau in np.geomspace(0.5 / of.band_hz, of.seconds / 10, 7):
         yield Law(
             "viscoelastic_relaxation", c, (float(tau),),
-            lambda m, n: through_lines(m.velocity[:, [c]], m.rate_hz, lambda s: n[0] / (1 + n[0] * s)),
+            lambda m, n: filter_from_rest(m.velocity[:, [c]], m.rate_hz, lambda s: n[0] / (1 + n[0] * s)),
             lambda w, n, mass: {"stiffness": float(w[0]), "time_constant": n[0]} if w[0] > 0 else None,
             linear=True, bounded=((0.1 / of.band_hz, of.seconds / 4),),
         )  # fmt: skip

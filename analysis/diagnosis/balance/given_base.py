@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.everything import of_everything
+from analysis.diagnosis.balance.all_laws import fit_all_laws
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression, regression_of
@@ -23,7 +23,7 @@ FIXED = 1e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GivenBase:
-    """Of one axis."""
+    """A given model's columns along one axis, in place of free mass, damping and stiffness."""
 
     columns: tuple[FloatArray, ...]
     """Per motion, (n, 1 + numbers): the force that the model needs along the measured motion, and what one standard
@@ -34,10 +34,11 @@ class GivenBase:
     """Of the force's rms, that all laws together must take for any to be looked for."""
 
 
-def based_on(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: GivenBase) -> Regression:
-    """As `regression_of`. Numbers that hardly change the force are left out."""
-    told = _told(given)
-    columns = [each[:, told] for each in given.columns]
+def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: GivenBase) -> Regression:
+    """As `regression_of`, with the model's needed force as the base. Open numbers that hardly change the force are left
+    out."""
+    varying = _sensitive_columns(given)
+    columns = [each[:, varying] for each in given.columns]
     plain = replace(regression_of(motions, axis, laws, False, None, columns), mass=given.mass)
     scale = plain.scale[: plain.base - 1]
     precision, pull = np.zeros(len(scale)), np.zeros(len(scale))
@@ -50,22 +51,22 @@ def based_on(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: G
 
 def takes_enough(plain: Regression, least: float) -> bool:
     """Whether all laws together take so much of the force, over the folds."""
-    alone = float(plain.crossed(plain.chosen(())).sum())
-    whole = of_everything(plain, range(plain.columns[0].shape[1]))[0]
+    alone = float(plain.cross_validated_errors(plain.columns_of(())).sum())
+    whole = fit_all_laws(plain, range(plain.columns[0].shape[1]))[0]
     return alone - whole > least**2 * sum(block.signal for block in plain.fit)
 
 
-def _told(given: GivenBase) -> list[int]:
+def _sensitive_columns(given: GivenBase) -> list[int]:
     size = np.sqrt(np.mean(np.vstack(given.columns) ** 2, axis=0))
     return [0, *(k for k in range(1, len(size)) if size[k] > 1e-9 * size[0])]
 
 
 def _power_per_freedom(plain: Regression) -> float:
     """Of what the columns leave with the open numbers fitted freely: the sum of squares over its degrees of freedom."""
-    left = plain.remainder(plain.chosen(()))
+    left = plain.remainder(plain.columns_of(()))
     power, freedom = 0.0, 0.0
     for course, motion in zip(left, plain.motions, strict=True):
-        seen = np.where(motion.kept(motion.fit), course, 0.0)
+        seen = np.where(motion.valid_samples(motion.fit), course, 0.0)
         lines = np.abs(np.fft.rfft(seen)) ** 2
         power += float(seen @ seen)
         freedom += 2 * float(lines.sum()) ** 2 / max(float((lines**2).sum()), 1e-300)

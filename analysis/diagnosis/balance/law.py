@@ -38,15 +38,15 @@ class Law:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Beside:
-    """What the base of one axis's balance is beyond mass, damping and stiffness."""
+class BaseTerms:
+    """What the base of one axis's balance holds beyond mass, damping and stiffness."""
 
     own: int
     """Of the measured motions, the one that the force drives."""
     laws: tuple[Law, ...] = ()
     """Linear in the motion."""
-    late_s: float = 0.0
-    """By which the force is late in reaching the motion; the motions' forces are shifted by it already."""
+    delay_s: float = 0.0
+    """Delay from the force to the motion; the motions' forces are shifted by it already."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +56,13 @@ class Scales:
     speed: float
     """rms"""
     travel: float
-    """From end to end,"""
+    """Peak to peak, from `low` to `high`."""
     low: float
     high: float
     seconds: float
     band_hz: float
     turns: bool
-    """It goes round and round, so that no position is special but within a turn."""
+    """A shaft that makes more than two turns: no position is special but within a turn."""
     rotational: bool
 
 
@@ -81,22 +81,22 @@ def relative_time(motion: Motion) -> FloatArray:
     return np.linspace(-1.0, 1.0, len(motion.force))[:, None]
 
 
-def sliding(velocity: FloatArray, width: float) -> FloatArray:
-    """The sign of a velocity, turned round within `width` of standstill."""
+def smooth_sign(velocity: FloatArray, width: float) -> FloatArray:
+    """tanh(velocity / width): the sign of a velocity, continuous within `width` of standstill."""
     return np.asarray(np.tanh(velocity / width))
 
 
-def named(*names: str) -> Values:
+def name_weights(*names: str) -> Values:
     return lambda w, n, mass: dict(zip(names, map(float, w), strict=True))
 
 
-def positive(name: str) -> Values:
+def name_positive_weight(name: str) -> Values:
     return lambda w, n, mass: {name: float(w[0])} if w[0] > 0 else None
 
 
-def through_lines(samples: FloatArray, rate_hz: float, gain: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """A causal linear filter from rest, by lines; padded by as much again, so that its memory does not wrap round, and
-    to a length of small factors."""
+def filter_from_rest(samples: FloatArray, rate_hz: float, gain: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """(n, k): samples through a causal linear filter that starts from rest. gain: frequency response at s (rad/s).
+    Computed by FFT, zero-padded to twice the length so that the filter's memory does not wrap round."""
     count = len(samples)
     padded = next_fast_len(2 * count, real=True)
     spectrum = rfft(samples, padded, axis=0)

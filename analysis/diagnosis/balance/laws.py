@@ -9,14 +9,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from analysis.diagnosis.balance.friction_laws import damping_laws, friction_laws
-from analysis.diagnosis.balance.law import Law, Scales, named, relative_time, scales_of
+from analysis.diagnosis.balance.law import Law, Scales, name_weights, relative_time, scales_of
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.stiffness_laws import condition_laws, dynamic_laws, stiffness_laws
 from equalizer.signals.signal import FloatArray
 
 
 def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
-    """All but those that hang on pitches, which a remainder shows; see `pitched`."""
+    """All laws of all channels, but `cogging_law`, whose pitch is found from the residual of the others."""
     for channel in range(len(motions[0].channels)):
         scales = scales_of(motions, channel, rotational)
         yield from friction_laws(channel, scales)
@@ -26,16 +26,16 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
             yield from dynamic_laws(channel, scales)
         yield from condition_laws(motions, channel)
     if np.isfinite(motions[0].band_hz) and motions[0].order < 2:
-        yield Law("drifting_force", -1, (), lambda m, _: relative_time(m), named("change"))
+        yield Law("drifting_force", -1, (), lambda m, _: relative_time(m), name_weights("change"))
 
 
 def _longest_pitch(of: Scales) -> float:
-    """Twice over the travel, and twice per turn: once per turn is a weight off the axis, or an axis off its centre."""
+    """Half the travel, or half a turn: once per turn is a weight off the axis, or an axis off its centre."""
     return min(0.5 * of.travel, np.pi) if of.rotational else 0.5 * of.travel
 
 
-def pitched(channel: int, pitch: float, of: Scales) -> Law:
-    """A force that repeats along the way."""
+def cogging_law(channel: int, pitch: float, of: Scales) -> Law:
+    """A force that is periodic in the position."""
     longest = _longest_pitch(of)
     return Law(
         "cogging", channel, (pitch,),
@@ -53,9 +53,10 @@ def pitched(channel: int, pitch: float, of: Scales) -> Law:
 def likely_pitches(
     motions: Sequence[Motion], remainders: Sequence[FloatArray], channel: int, of: Scales
 ) -> list[float]:
-    """Of what is left of the force (kept samples each), the strongest lines over the position, the strongest first."""
-    q = np.concatenate([each.position[:: each.step, channel][each.kept(each.fit)] for each in motions])
-    left = np.concatenate([r[each.kept(each.fit)] for each, r in zip(motions, remainders, strict=True)])
+    """Pitches of the four strongest lines in the spectrum of the residual force over the position, the strongest first.
+    remainders: per motion, (kept samples,)."""
+    q = np.concatenate([each.position[:: each.step, channel][each.valid_samples(each.fit)] for each in motions])
+    left = np.concatenate([r[each.valid_samples(each.fit)] for each, r in zip(motions, remainders, strict=True)])
     longest = _longest_pitch(of)
     # Shorter ones pass faster than the band's end at the usual speed.
     shortest = max(of.speed / of.band_hz, longest / 400)

@@ -11,15 +11,15 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.blocks import blocks_of
-from analysis.diagnosis.balance.law import Beside
-from analysis.diagnosis.balance.motion import Motion, filtered
+from analysis.diagnosis.balance.law import BaseTerms
+from analysis.diagnosis.balance.motion import Motion, filter_spectrum
 from analysis.diagnosis.balance.plainest_structure import plainest_structure
-from analysis.diagnosis.balance.regression import Regression, of_laws, regression_of
+from analysis.diagnosis.balance.regression import Regression, keep_laws, regression_of
 from analysis.diagnosis.balance.structures import (
-    Searched,
     Structure,
-    better,
-    refined,
+    StructureSearch,
+    is_better,
+    refine_numbers,
     search_structures,
     values_of,
 )
@@ -27,17 +27,17 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 WORTH = 0.1
-"""Share of the folds' error power that a shift or a linear law must take."""
+"""Share of the cross-validated error power that a delay or a linear law must take."""
 MOST_BESIDE = 4
 """Linear laws beside mass, damping and stiffness."""
 ROUNDS = 2
-"""Searches, each beside what the one before it found."""
+"""Searches at most, each with the linear part that the one before it found."""
 LATER = 2.0 ** np.arange(-5, 2)
-"""Shifts that are tried, over the period of the band's end: up to twice that, beyond which courses repeat;"""
+"""Delays that are tried, over the period of the band's end: up to twice that, beyond which signals repeat."""
 FINER = 4
-"""and halvings of the step around the best."""
+"""Halvings of the step around the best delay."""
 LATE = ("amplifier_lag", "transport_delay")
-"""Laws that say in other words that a force is late."""
+"""Laws that describe a delay in other words."""
 
 
 def search_beside_linear(
@@ -46,119 +46,128 @@ def search_beside_linear(
     rotational: bool,
     without: frozenset[str],
     time_left: TimeBudget,
-) -> Searched:
-    """See `search_structures`."""
-    beside = Beside(driven_motion(motions)[axis])
+) -> StructureSearch:
+    """As `search_structures`, repeated beside the delay and the linear laws that the first search finds."""
+    beside = BaseTerms(driven_motion(motions)[axis])
     found = search_structures(motions, axis, rotational, without, time_left, beside)
     for _ in range(ROUNDS - 1):
         if not time_left():
             break
-        more = _linear_beside(found, beside)
-        if more.laws == beside.laws and more.late_s == beside.late_s:
+        more = _extend_base(found, beside)
+        if more.laws == beside.laws and more.delay_s == beside.delay_s:
             break
-        beside, shifted = more, [_late(motion, more.late_s) for motion in motions]
+        beside, shifted = more, [_delay_forces(motion, more.delay_s) for motion in motions]
         found = search_structures(shifted, axis, rotational, without, time_left, beside)
     return found
 
 
 def driven_motion(motions: Sequence[Motion]) -> tuple[int, ...]:
-    """Per force, the place of the motion that it drives: its own number, or, where more motions were measured, that of
-    the body whose acceleration is missed most beside all the others' motion."""
+    """Per force, the channel of the motion that it drives: its own number, or, where more motions than forces were
+    measured, the one whose acceleration the regression needs most."""
     forces, places = motions[0].force.shape[1], len(motions[0].channels)
     if places <= forces:
         return tuple(min(axis, places - 1) for axis in range(forces))
-    missed = [_missed(motions, axis, places) for axis in range(forces)]
+    missed = [_error_without_each(motions, axis, places) for axis in range(forces)]
     # Imported where it is used: the package takes longer to import than a diagnosis that does without it.
     from scipy.optimize import linear_sum_assignment
 
     return tuple(linear_sum_assignment(missed, maximize=True)[1].tolist())
 
 
-def _missed(motions: Sequence[Motion], axis: int, places: int) -> list[float]:
-    """By how much the error grows without each motion's acceleration."""
+def _error_without_each(motions: Sequence[Motion], axis: int, places: int) -> list[float]:
+    """(places,): cross-validated error over the signal power, without each motion's acceleration."""
     regression = regression_of(motions, axis, (), turns=False)
-    whole = regression.chosen(())
+    whole = regression.columns_of(())
     power = max(sum(block.signal for block in regression.fit), 1e-300)
-    return [float(regression.crossed([k for k in whole if k != place]).sum()) / power for place in range(places)]
+    return [
+        float(regression.cross_validated_errors([k for k in whole if k != place]).sum()) / power
+        for place in range(places)
+    ]
 
 
-def _linear_beside(found: Searched, beside: Beside) -> Beside:
-    """With the shift, and, where the plainest structure holds a linear law, with as many beside its others as the folds
-    ask for; whichever comes first, where the two do not agree."""
+def _extend_base(found: StructureSearch, beside: BaseTerms) -> BaseTerms:
+    """The base with a delay and, where the plainest structure holds a linear law, with as many linear laws as
+    cross-validation asks for. The delay is sought before or after these laws, whichever leaves the smaller error."""
     regression, plain = found.regression, plainest_structure(found).laws
     bent = [k for k in plain if not regression.laws[k].linear]
-    late_s = 0.0 if beside.late_s else _late_s(of_laws(regression, bent))
-    if not late_s and len(bent) == len(plain):
+    delay_s = 0.0 if beside.delay_s else _find_delay_s(keep_laws(regression, bent))
+    if not delay_s and len(bent) == len(plain):
         return beside
-    shifted, error = _completed(regression, beside, bent, late_s)
-    if not late_s:
+    shifted, error = _complete_base(regression, beside, bent, delay_s)
+    if not delay_s:
         return shifted
-    ahead, other = _completed(regression, beside, bent, 0.0)
+    ahead, other = _complete_base(regression, beside, bent, 0.0)
     return shifted if error < other else ahead
 
 
-def _completed(regression: Regression, beside: Beside, bent: Sequence[int], late_s: float) -> tuple[Beside, float]:
-    """With this shift and the linear laws that are then worth it, or, with none, the shift that is worth it beside
-    these; and the folds' error. bent: laws that are not linear."""
-    held = tuple(law for law in beside.laws if not (late_s and law.effect in LATE))
-    others = [law for law in regression.laws if law.linear and not (late_s and law.effect in LATE)]
-    motions = [_late(each, late_s) for each in regression.motions]
+def _complete_base(
+    regression: Regression, beside: BaseTerms, bent: Sequence[int], delay_s: float
+) -> tuple[BaseTerms, float]:
+    """The base with this delay and the linear laws that are then worth it (or, where the delay is zero, with the delay
+    that is worth it beside these), and its cross-validated error. bent: laws that are not linear."""
+    held = tuple(law for law in beside.laws if not (delay_s and law.effect in LATE))
+    others = [law for law in regression.laws if law.linear and not (delay_s and law.effect in LATE)]
+    motions = [_delay_forces(each, delay_s) for each in regression.motions]
     laws = [*(regression.laws[k] for k in bent), *others]
     room = regression_of(motions, regression.axis, laws, _turns(regression), replace(beside, laws=held))
-    chosen = Structure(tuple(range(len(bent))), room.crossed(room.chosen(range(len(bent)))))
+    chosen = Structure(tuple(range(len(bent))), room.cross_validated_errors(room.columns_of(range(len(bent)))))
     while len(held) + len(chosen.laws) - len(bent) < MOST_BESIDE:
-        richer = _with_linear(room, chosen)
+        richer = _add_linear_law(room, chosen)
         if richer is None:
             break
         room, chosen = richer
     more = [room.laws[k] for k in chosen.laws if room.laws[k].linear]
-    if not late_s and not beside.late_s:
-        late_s = _late_s(of_laws(room, chosen.laws))
-    return replace(beside, laws=(*held, *more), late_s=beside.late_s + late_s), chosen.error
+    if not delay_s and not beside.delay_s:
+        delay_s = _find_delay_s(keep_laws(room, chosen.laws))
+    return replace(beside, laws=(*held, *more), delay_s=beside.delay_s + delay_s), chosen.error
 
 
-def _with_linear(room: Regression, chosen: Structure) -> tuple[Regression, Structure] | None:
-    """With the linear law more that leaves least, its numbers refined; None where the folds do not ask for it."""
+def _add_linear_law(room: Regression, chosen: Structure) -> tuple[Regression, Structure] | None:
+    """One more linear law, the one that leaves the least error, its numbers refined; None where it is not worth it."""
     best: Structure | None = None
     for number, law in enumerate(room.laws):
         if not law.linear or number in chosen.laws:
             continue
         laws = (*chosen.laws, number)
-        tried = Structure(laws, room.crossed(room.chosen(laws)))
+        tried = Structure(laws, room.cross_validated_errors(room.columns_of(laws)))
         if (best is None or tried.error < best.error) and values_of(room, laws)[-1] is not None:
             best = tried
-    if best is None or not _worth(chosen, best):
+    if best is None or not _is_worth_it(chosen, best):
         return None
-    room = refined(room, [best])
-    return room, Structure(best.laws, room.crossed(room.chosen(best.laws)))
+    room = refine_numbers(room, [best])
+    return room, Structure(best.laws, room.cross_validated_errors(room.columns_of(best.laws)))
 
 
-def _worth(plain: Structure, richer: Structure) -> bool:
-    return richer.error < (1 - WORTH) * plain.error and better(plain, richer)
+def _is_worth_it(plain: Structure, richer: Structure) -> bool:
+    return richer.error < (1 - WORTH) * plain.error and is_better(plain, richer)
 
 
 def _turns(regression: Regression) -> bool:
     return regression.matrices == 2 * len(regression.motions[0].channels)
 
 
-def _late_s(small: Regression) -> float:
-    """By how much the force is late: the nearest shift at which folds' errors have a minimum; 0 where the folds do not
-    agree that it is worth it."""
-    columns = small.chosen(range(len(small.laws)))
+def _find_delay_s(small: Regression) -> float:
+    """Delay of the motion behind the force, in s: the minimum nearest to zero of the cross-validated error; 0 where it
+    is not worth it."""
+    columns = small.columns_of(range(len(small.laws)))
 
     def errors(seconds: float) -> FloatArray:
-        return _with_forces(small, [_late(each, seconds) for each in small.motions]).crossed(columns)
+        return _with_forces(small, [_delay_forces(each, seconds) for each in small.motions]).cross_validated_errors(
+            columns
+        )
 
-    none, band_hz = small.crossed(columns), small.motions[0].band_hz
+    none, band_hz = small.cross_validated_errors(columns), small.motions[0].band_hz
     if not np.isfinite(band_hz):
         return 0.0
-    late_s, best = _nearest(errors, none, 1 / band_hz)
-    return late_s if late_s and _worth(Structure((), none), Structure((), best)) else 0.0
+    delay_s, best = _nearest_minimum(errors, none, 1 / band_hz)
+    return delay_s if delay_s and _is_worth_it(Structure((), none), Structure((), best)) else 0.0
 
 
-def _nearest(errors: Callable[[float], FloatArray], none: FloatArray, period_s: float) -> tuple[float, FloatArray]:
-    """Downhill from no shift; no shift where that leads beyond all that are tried: then the motion is too uniform to
-    tell a shift from damping and stiffness. A force that acts before it is commanded is no cause."""
+def _nearest_minimum(
+    errors: Callable[[float], FloatArray], none: FloatArray, period_s: float
+) -> tuple[float, FloatArray]:
+    """Downhill from no delay, and none where that leads beyond all that are tried: then the motion is too uniform to
+    tell a delay from damping and stiffness. Negative delays are not tried: they would not be causal."""
     best_s, best = 0.0, none
     for share in LATER:
         left = errors(float(share) * period_s)
@@ -179,9 +188,9 @@ def _nearest(errors: Callable[[float], FloatArray], none: FloatArray, period_s: 
 
 
 def _with_forces(regression: Regression, motions: Sequence[Motion]) -> Regression:
-    """The same columns against other forces. motions: the same but for these."""
-    aims = [each.reduced(each.force[:, [regression.axis]])[:, 0] for each in motions]
-    fit, test = ([each.kept(mask) for each, mask in zip(motions, masks, strict=True)] for masks in (
+    """The regression of the same columns on other forces. motions: the same but for their forces."""
+    aims = [each.decimate(each.force[:, [regression.axis]])[:, 0] for each in motions]
+    fit, test = ([each.valid_samples(mask) for each, mask in zip(motions, masks, strict=True)] for masks in (
         [each.fit for each in motions], [each.test for each in motions],
     ))  # fmt: skip
     mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
@@ -192,9 +201,9 @@ def _with_forces(regression: Regression, motions: Sequence[Motion]) -> Regressio
     )  # fmt: skip
 
 
-def _late(motion: Motion, seconds: float) -> Motion:
-    """With forces that come later than they were written down."""
+def _delay_forces(motion: Motion, seconds: float) -> Motion:
+    """The motion with its forces delayed."""
     if not seconds:
         return motion
-    turned = filtered(motion.force, motion.rate_hz, lambda f: np.exp(-2j * np.pi * f * seconds))
+    turned = filter_spectrum(motion.force, motion.rate_hz, lambda f: np.exp(-2j * np.pi * f * seconds))
     return replace(motion, force=turned)

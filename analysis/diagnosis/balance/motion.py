@@ -24,9 +24,9 @@ from equalizer.signals.signal import FloatArray, Signal
 OVERSAMPLED = 4.0
 """Samples that are kept per period of the band's end."""
 MOVING = 0.99
-"""Of the speed's mean square, up to where the device moves."""
+"""Share of the speed's mean square below the end of the band in which the device moves."""
 EDGE = 0.5
-"""Periods of the band's end at either end of a part that the filter does not see whole."""
+"""Periods of the band's end that are left out at either end of a part: there the filter reaches beyond the data."""
 
 
 class NoMotionError(ValueError):
@@ -46,39 +46,39 @@ class Motion:
     order: int
     """Derivative of the position that was measured: 0, 1 or 2."""
     position: FloatArray
-    """(n, d): as measured, or the integral from the first sample on,"""
+    """(n, d): as measured, or integrated from the first sample on."""
     velocity: FloatArray
     acceleration: FloatArray
     force: FloatArray
     """(n, m): as commanded or measured."""
     condition: FloatArray
-    """(n, q): what was known beside, as deviation in standard deviations; q may be 0."""
+    """(n, q): recorded conditions such as a temperature, standardised; q may be 0."""
     fit: Mask
-    """(n,): to fit and to choose by,"""
+    """(n,): samples to fit and to choose by."""
     test: Mask
-    """and only to look at in the end."""
+    """(n,): held-out samples."""
     lowest_hz: float = 0.0
     """Where the band begins: above 0 for integrated accelerations."""
 
-    def reduced(self, columns: FloatArray) -> FloatArray:
-        """(kept samples, k): columns (n, k) with what lies outside the band taken off."""
+    def decimate(self, columns: FloatArray) -> FloatArray:
+        """(kept samples, k): columns (n, k) filtered to the band and decimated by `step`."""
         if not np.isfinite(self.band_hz):
             return columns
-        return self.within(columns)[:: self.step]
+        return self.band_pass(columns)[:: self.step]
 
-    def within(self, columns: FloatArray) -> FloatArray:
-        """(n, k): at the recording's rate."""
-        return within(columns, self.rate_hz, self.band_hz, self.lowest_hz)
+    def band_pass(self, columns: FloatArray) -> FloatArray:
+        """(n, k): columns filtered to the band, at the recording's rate."""
+        return band_pass(columns, self.rate_hz, self.band_hz, self.lowest_hz)
 
-    def kept(self, mask: Mask) -> Mask:
-        """Of the kept samples, those of a mask (n,) that the filter sees whole."""
+    def valid_samples(self, mask: Mask) -> Mask:
+        """(kept samples,): the samples of a mask (n,) that are not within a filter length of the part's ends."""
         edge = int(EDGE * self.rate_hz / self.band_hz) + 1
         inside = np.zeros(len(mask), dtype=np.bool_)
         inside[edge : len(mask) - edge] = True
         return (mask & inside)[:: self.step]
 
 
-def moving_signal(recording: Recording) -> Signal | None:
+def motion_signal(recording: Recording) -> Signal | None:
     """The measured motion of the lowest derivative, of one kind: positions before velocities before accelerations."""
     found: list[tuple[int, Signal]] = []
     for signal in (recording.position, recording.response):
@@ -96,15 +96,15 @@ def moving_signal(recording: Recording) -> Signal | None:
 
 
 def _moves(samples: FloatArray) -> bool:
-    """Whether what is known of it changes."""
+    """Whether the finite samples change."""
     known = samples[np.isfinite(samples)]
     return bool(len(known)) and float(np.ptp(known)) > 0
 
 
 def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tuple[Motion, ...]:
-    """records: alike in channels, units and rate. band_hz: None = what their noise allows. Raises NoMotionError where
-    there is none."""
-    signals = [moving_signal(record.recording) for record in records]
+    """One motion per record, with derivatives and forces. records: alike in channels, units and rate. band_hz: None =
+    what their noise allows. Raises NoMotionError where no response is a motion."""
+    signals = [motion_signal(record.recording) for record in records]
     if not signals or any(signal is None for signal in signals):
         raise NoMotionError("no response is a motion")
     moved = [signal for signal in signals if signal is not None]
@@ -115,14 +115,14 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
     if band_hz is None:
         band_hz = np.inf if untimed else band_end_hz(filled, rate_hz, order)
     lowest_hz = band_begin_hz(filled, rate_hz) if order == 2 and not untimed else 0.0
-    conditions = _conditions(records)
+    conditions = _standardised_conditions(records)
     return tuple(
         _motion(record, (samples, order), (band_hz, lowest_hz), condition, moved[0].channels)
         for record, samples, condition in zip(records, filled, conditions, strict=True)
     )
 
 
-def moving_band_hz(motions: Sequence[Motion]) -> float:
+def motion_band_hz(motions: Sequence[Motion]) -> float:
     """The highest frequency at which a channel moves to speak of; inf without a clock."""
     if not np.isfinite(motions[0].band_hz):
         return np.inf
@@ -152,7 +152,7 @@ def _motion(
     # A held command is, over its time, centred half a sample after the reading.
     early_s = 0.5 / rate_hz if hold is Hold.ZERO_ORDER and not record.recording.meta.get("imposed") else 0.0
     if not np.isfinite(band_hz):
-        return _untimed(record, samples, condition, names)
+        return _motion_without_clock(record, samples, condition, names)
     position, velocity, acceleration = (
         _derivative(samples, rate_hz, (band_hz, lowest_hz), wanted - order, early_s) for wanted in range(3)
     )
@@ -162,17 +162,19 @@ def _motion(
     )  # fmt: skip
 
 
-def within(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
-    """(n, k): with what lies outside the band taken off."""
-    return filtered(columns, rate_hz, lambda f: _within(f, band_hz, lowest_hz))
+def band_pass(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
+    """(n, k): columns with their spectrum outside the band removed, without a phase shift."""
+    return filter_spectrum(columns, rate_hz, lambda f: _band_gain(f, band_hz, lowest_hz))
 
 
-def _within(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:
+def _band_gain(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:
     shaped = low_pass_gain(frequency_hz, band_hz)
     return np.asarray(shaped * (1 - low_pass_gain(frequency_hz, lowest_hz)) if lowest_hz > 0 else shaped)
 
 
-def _untimed(record: Observed, samples: FloatArray, condition: FloatArray, names: tuple[str, ...]) -> Motion:
+def _motion_without_clock(
+    record: Observed, samples: FloatArray, condition: FloatArray, names: tuple[str, ...]
+) -> Motion:
     """Without a clock: positions, and which way each changes from sample to sample."""
     return Motion(
         record.recording.sample_rate_hz, np.inf, 1, names, 0, samples, np.gradient(samples, axis=0),
@@ -183,14 +185,14 @@ def _untimed(record: Observed, samples: FloatArray, condition: FloatArray, names
 def _derivative(
     samples: FloatArray, rate_hz: float, band: tuple[float, float], times: int, early_s: float
 ) -> FloatArray:
-    """times: below zero, integrals; those of an acceleration without what lies below the band's beginning, which the
-    force holds and the acceleration itself keeps."""
+    """The derivative of order `times`; an integral where that is negative. Integrals of an acceleration are without
+    what lies below the band's beginning; the acceleration itself keeps it, as the force does."""
     band_hz, lowest_hz = band
-    line, slope = _straight(samples, rate_hz)
+    line, slope = _end_to_end_line(samples, rate_hz)
 
     def gain(frequency_hz: FloatArray) -> FloatArray:
         turn = 2j * np.pi * np.maximum(frequency_hz, 1e-12)
-        shaped = _within(frequency_hz, band_hz, lowest_hz if times < 0 else 0.0)
+        shaped = _band_gain(frequency_hz, band_hz, lowest_hz if times < 0 else 0.0)
         return np.asarray(shaped * np.exp(turn * early_s) * turn**times)
 
     if times < 0 and lowest_hz == 0:
@@ -198,42 +200,42 @@ def _derivative(
         smooth = _derivative(samples, rate_hz, band, 0, early_s)
         return np.asarray(np.cumsum(smooth, axis=0) / rate_hz)
     if times < 0:
-        return filtered(samples, rate_hz, gain, straightened=False)
-    bent = filtered(samples - line, rate_hz, gain, straightened=False)
+        return filter_spectrum(samples, rate_hz, gain, straightened=False)
+    bent = filter_spectrum(samples - line, rate_hz, gain, straightened=False)
     if times == 0:
         return bent + line + slope * early_s
     return bent + slope if times == 1 else bent
 
 
-def low_passed(samples: FloatArray, rate_hz: float, band_hz: float) -> FloatArray:
-    return filtered(samples, rate_hz, lambda f: low_pass_gain(f, band_hz))
+def low_pass_filter(samples: FloatArray, rate_hz: float, band_hz: float) -> FloatArray:
+    return filter_spectrum(samples, rate_hz, lambda f: low_pass_gain(f, band_hz))
 
 
-def differentiated(samples: FloatArray, rate_hz: float, band_hz: float, times: int) -> FloatArray:
+def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, times: int) -> FloatArray:
     return _derivative(samples, rate_hz, (band_hz, 0.0), times, 0.0)
 
 
-def filtered(samples: FloatArray, rate_hz: float, gain: object, straightened: bool = True) -> FloatArray:
-    """Continued beyond both ends as an odd function about them."""
-    line = _straight(samples, rate_hz)[0] if straightened else np.zeros_like(samples)
+def filter_spectrum(samples: FloatArray, rate_hz: float, gain: object, straightened: bool = True) -> FloatArray:
+    """(n, k): samples times a frequency response `gain` (of Hz), continued as an odd function beyond both ends."""
+    line = _end_to_end_line(samples, rate_hz)[0] if straightened else np.zeros_like(samples)
     whole = odd_extension(samples - line)
     spectrum = rfft(whole, axis=0)
     lines = rfftfreq(len(whole), 1 / rate_hz)
     return np.asarray(irfft(gain(lines)[:, None] * spectrum, len(whole), axis=0)[: len(samples)] + line)  # type: ignore[operator]
 
 
-def _straight(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
+def _end_to_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
     along = np.linspace(0.0, 1.0, len(samples))[:, None]
     line = (1 - along) * samples[0] + along * samples[-1]
     return np.asarray(line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
 
 
-def _conditions(records: Sequence[Observed]) -> list[FloatArray]:
+def _standardised_conditions(records: Sequence[Observed]) -> list[FloatArray]:
     signals = [getattr(record.recording, "condition", None) for record in records]
     if any(signal is None for signal in signals):
         return [np.zeros((len(record.command), 0)) for record in records]
     filled = [filled_gaps(signal.samples) for signal in signals if signal is not None]
     whole = np.vstack(filled)
     spread = whole.std(axis=0)
-    told = spread > 0
-    return [(each[:, told] - whole.mean(axis=0)[told]) / spread[told] for each in filled]
+    varying = spread > 0
+    return [(each[:, varying] - whole.mean(axis=0)[varying]) / spread[varying] for each in filled]

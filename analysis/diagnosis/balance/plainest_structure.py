@@ -1,44 +1,43 @@
-"""Which of the structures that a search ranked is taken: the plainest that tells as much, by folds alone."""
+"""Model selection among the ranked structures by cross-validation: the fewest parameters at about the least error."""
 
 from collections.abc import Sequence
 
-from analysis.diagnosis.balance.everything import of_everything
+from analysis.diagnosis.balance.all_laws import fit_all_laws
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.balance.structures import Searched, Structure, better
+from analysis.diagnosis.balance.structures import Structure, StructureSearch, is_better
 
 PLAIN = 0.1
 """Share of what the best structure takes of the linear model's error that a plainer one may leave to be preferred."""
 MOST_OF_REST, NOTABLE = 0.5, 0.3
-"""Shares of what a plain structure leaves above the ceiling, and of all that it leaves, that further laws must take."""
+"""Shares that further laws must take: of the error that a plain structure leaves above that of all laws together, and
+of all that it leaves."""
 
 
-def plainest_structure(searched: Searched) -> Structure:
-    """The structure of fewest numbers that leaves hardly more than the best."""
-    allowed = searched.best.error + PLAIN * (searched.linear.error - searched.best.error)
-    enough = [each for each in searched.ranked if each.error <= allowed]
-    plain = min(
-        enough, key=lambda each: (numbers_of(searched.regression, each.laws), each.error), default=searched.linear
-    )
-    ceiling = of_everything(searched.regression, range(searched.regression.columns[0].shape[1]))[0]
-    while (richer := _further(searched, plain, ceiling)) is not None:
+def plainest_structure(search: StructureSearch) -> Structure:
+    """The structure with the fewest parameters whose cross-validated error is hardly above the best one's."""
+    allowed = search.best.error + PLAIN * (search.linear.error - search.best.error)
+    enough = [each for each in search.ranked if each.error <= allowed]
+    plain = min(enough, key=lambda each: (numbers_of(search.regression, each.laws), each.error), default=search.linear)
+    ceiling = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
+    while (richer := _further(search, plain, ceiling)) is not None:
         plain = richer
     return plain
 
 
-def _further(searched: Searched, plain: Structure, ceiling: float) -> Structure | None:
-    """With laws more that take most of what all laws together could still take."""
+def _further(search: StructureSearch, plain: Structure, ceiling: float) -> Structure | None:
+    """The structure with further laws that take most of what all laws together could still take; None = no such."""
     allowed = plain.error - max(MOST_OF_REST * (plain.error - ceiling), NOTABLE * plain.error)
     more = [
         each
-        for each in searched.ranked
-        if set(plain.laws) < set(each.laws) and each.error <= allowed and better(plain, each)
+        for each in search.ranked
+        if set(plain.laws) < set(each.laws) and each.error <= allowed and is_better(plain, each)
     ]
-    return min(more, key=lambda each: (numbers_of(searched.regression, each.laws), each.error), default=None)
+    return min(more, key=lambda each: (numbers_of(search.regression, each.laws), each.error), default=None)
 
 
 def numbers_of(regression: Regression, laws: Sequence[int]) -> int:
-    """How many laws have. The width within which a dry friction turns round counts for none; a weight on a lever takes
-    the place of the spring, whose number is then none."""
+    """Number of parameters of these laws. The width of a dry friction's smoothed sign is not counted, and a weight on a
+    lever counts for one less, for it takes the place of the spring."""
     count = 0
     for number in laws:
         law, place = regression.laws[number], regression.places[number]

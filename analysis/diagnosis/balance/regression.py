@@ -17,14 +17,14 @@ from analysis.diagnosis.balance.blocks import (
     Prior,
     blocks_of,
     column_scale,
-    errors_of,
-    parts_of,
-    solved,
-    solved_without,
-    total,
+    products_per_block,
+    solve_normal_equations,
+    solve_without_columns,
+    squared_errors,
+    summed_products,
     with_prior,
 )
-from analysis.diagnosis.balance.law import Beside, Law
+from analysis.diagnosis.balance.law import BaseTerms, Law
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
@@ -32,22 +32,22 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Regression:
-    """One axis's balance."""
+    """The force balance of one axis as a linear regression: force = columns times weights."""
 
     motions: tuple[Motion, ...]
     axis: int
     laws: tuple[Law, ...]
-    beside: Beside
+    beside: BaseTerms
     base: int
-    """Columns of mass, damping, stiffness, of laws beside them, and a constant, which come first."""
+    """How many columns come first: mass, damping, stiffness, linear laws beside them, and a constant."""
     matrices: int
-    """Of mass, damping and stiffness alone."""
+    """How many of these are mass, damping and stiffness."""
     positive: tuple[int, ...]
-    """Columns among them whose weights may not be below zero, and once more: so often a fit is solved at most."""
+    """Columns whose weights may not be negative. One is listed twice: the length also limits the active-set steps."""
     places: tuple[slice, ...]
-    """Of each law's columns."""
+    """Each law's columns."""
     scale: FloatArray
-    """(k,): rms of each column, which the products are without."""
+    """(k,): rms of each column, by which the columns are divided in the products."""
     columns: tuple[FloatArray, ...]
     """Per motion, (kept samples, k)"""
     force: tuple[FloatArray, ...]
@@ -55,34 +55,38 @@ class Regression:
     fit: tuple[Block, ...]
     test: tuple[Block, ...]
     prior: Prior = None
-    """Of a given model's numbers."""
+    """Prior of a given model's open numbers."""
     mass: float | None = None
-    """Of a given model; None = the weight of the own acceleration."""
+    """Mass of a given model in kg (kg m^2); None = the weight of the driven motion's acceleration."""
 
-    def chosen(self, laws: Sequence[int]) -> list[int]:
-        """Columns of the base and of laws; one of the command, below zero, has none."""
+    def columns_of(self, laws: Sequence[int]) -> list[int]:
+        """Numbers of the columns of the base and of these laws. A law of the command, numbered below zero, has none."""
         more = [k for law in laws if law >= 0 for k in range(self.places[law].start, self.places[law].stop)]
         return [*range(self.base), *more]
 
     def weights(self, columns: Sequence[int]) -> FloatArray:
-        """(len(columns),): fitted to all blocks to fit, in the columns' own units."""
-        return np.asarray(self._fitted(total(self.fit, columns)) / self.scale[list(columns)])
+        """(len(columns),): weights fitted to all fit blocks, in the columns' own units."""
+        return np.asarray(self._solve_nonnegative(summed_products(self.fit, columns)) / self.scale[list(columns)])
 
-    def crossed(self, columns: Sequence[int]) -> FloatArray:
-        """(blocks,): each block's sum of squares with numbers fitted to the others."""
-        own = parts_of(self.fit, columns)
-        weights = self._fitted((own[0].sum(axis=0) - own[0], own[1].sum(axis=0) - own[1]))
-        return errors_of(self.fit, own, weights)
+    def cross_validated_errors(self, columns: Sequence[int]) -> FloatArray:
+        """(blocks,): each fit block's sum of squares with weights fitted to the other blocks (leave one block out)."""
+        own = products_per_block(self.fit, columns)
+        weights = self._solve_nonnegative((own[0].sum(axis=0) - own[0], own[1].sum(axis=0) - own[1]))
+        return squared_errors(self.fit, own, weights)
 
-    def held_out(self, columns: Sequence[int]) -> FloatArray:
+    def held_out_errors(self, columns: Sequence[int]) -> FloatArray:
         """(blocks,): each test block's sum of squares."""
-        return errors_of(self.test, parts_of(self.test, columns), self._fitted(total(self.fit, columns)))
+        return squared_errors(
+            self.test,
+            products_per_block(self.test, columns),
+            self._solve_nonnegative(summed_products(self.fit, columns)),
+        )
 
-    def _fitted(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """(..., c), of (..., c, c) and (..., c): least squares in which the axis has no mass and no damping below
-        zero."""
+    def _solve_nonnegative(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Weights (..., c) from products (..., c, c) and (..., c): least squares with mass and damping of the driven
+        motion held at zero where they would be negative (active set)."""
         gram, pull = products = with_prior(products, self.prior)
-        found = solved(products, RIDGE)
+        found = solve_normal_equations(products, RIDGE)
         places = list(self.positive)
         bound: Mask = np.zeros_like(found, dtype=np.bool_)
         for _ in range(len(places) - 1):
@@ -93,11 +97,11 @@ class Regression:
             for fixed in np.unique(bound.reshape(-1, bound.shape[-1]), axis=0):
                 if fixed.any():
                     at = (bound == fixed).all(axis=-1)
-                    found[at] = solved_without(gram[at], pull[at], fixed)
+                    found[at] = solve_without_columns(gram[at], pull[at], fixed)
         return np.where(bound, 0.0, found)
 
     def remainder(self, columns: Sequence[int]) -> tuple[FloatArray, ...]:
-        """Per motion, (kept samples,): the force that the columns do not explain."""
+        """Per motion, (kept samples,): the residual force."""
         found = self.weights(columns)
         return tuple(
             force - rows[:, list(columns)] @ found for force, rows in zip(self.force, self.columns, strict=True)
@@ -109,30 +113,30 @@ def regression_of(
     axis: int,
     laws: Sequence[Law],
     turns: bool,
-    beside: Beside | None = None,
+    beside: BaseTerms | None = None,
     bases: Sequence[FloatArray] | None = None,
 ) -> Regression:
-    """turns: see `Scales`. beside: None = the force drives the motion of its own number. bases: per motion (n, k), in
-    place of mass, damping and stiffness. Laws whose columns are next to nothing, or not finite, are left out.
-    """
+    """The regression of the force of one axis on mass, damping, stiffness and laws. turns: see `Scales`. beside: None =
+    the force drives the motion of its own number. bases: per motion (n, k), in place of mass, damping and stiffness.
+    Laws whose columns vanish or are not finite are left out."""
     d = len(motions[0].channels)
-    beside = beside or Beside(min(axis, d - 1))
-    aims = [each.reduced(each.force[:, [axis]])[:, 0] for each in motions]
-    linear = [_linear(each, turns, beside.laws) for each in motions] if bases is None else bases
-    parts = [[_based(each, columns) for each, columns in zip(motions, linear, strict=True)]]
+    beside = beside or BaseTerms(min(axis, d - 1))
+    aims = [each.decimate(each.force[:, [axis]])[:, 0] for each in motions]
+    linear = [_linear_columns(each, turns, beside.laws) for each in motions] if bases is None else bases
+    parts = [[_base_columns(each, columns) for each, columns in zip(motions, linear, strict=True)]]
     kept, places, begin = [], [], parts[0][0].shape[1]
     base = begin
     for law in laws:
-        columns = _columns(motions, law)
+        columns = _law_columns(motions, law)
         if columns is not None:
             parts.append(columns)
             kept.append(law)
             places.append(slice(begin, begin + columns[0].shape[1]))
             begin = places[-1].stop
     rows = tuple(np.hstack([part[k] for part in parts]) for k in range(len(motions)))
-    fit = [each.kept(each.fit) for each in motions]
+    fit = [each.valid_samples(each.fit) for each in motions]
     scale = column_scale(rows, fit)
-    test = [each.kept(each.test) for each in motions]
+    test = [each.valid_samples(each.test) for each in motions]
     mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
     own = beside.own
     return Regression(
@@ -147,32 +151,32 @@ def signal_power(blocks: Sequence[Block]) -> float:
     return sum(block.signal for block in blocks)
 
 
-def _linear(motion: Motion, turns: bool, beside: Sequence[Law]) -> FloatArray:
-    """turns: where a shaft goes round and round, no spring holds it."""
+def _linear_columns(motion: Motion, turns: bool, beside: Sequence[Law]) -> FloatArray:
+    """(n, k): acceleration, velocity, position and linear laws. turns: a shaft that turns freely has no spring."""
     more = [law.columns(motion, law.numbers) for law in beside]
     return np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *more])
 
 
-def _based(motion: Motion, linear: FloatArray) -> FloatArray:
-    return np.hstack([motion.reduced(linear), np.ones((len(linear[:: motion.step]), 1))])
+def _base_columns(motion: Motion, linear: FloatArray) -> FloatArray:
+    return np.hstack([motion.decimate(linear), np.ones((len(linear[:: motion.step]), 1))])
 
 
-def _columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
-    """Per motion; None where they are next to nothing, or not finite."""
-    columns = [motion.reduced(law.columns(motion, law.numbers)) for motion in motions]
-    told = all(np.isfinite(each).all() for each in columns) and all(_seen(columns))
-    return columns if told else None
+def _law_columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
+    """A law's columns per motion; None where they vanish or are not finite."""
+    columns = [motion.decimate(law.columns(motion, law.numbers)) for motion in motions]
+    usable = all(np.isfinite(each).all() for each in columns) and all(_has_size(columns))
+    return columns if usable else None
 
 
-def _seen(columns: Sequence[FloatArray]) -> Mask:
+def _has_size(columns: Sequence[FloatArray]) -> Mask:
     size = np.sqrt(np.mean(np.vstack(columns) ** 2, axis=0))
     return np.asarray(size > 1e-12 * max(float(size.max(initial=0.0)), 1e-290))
 
 
-def with_law(regression: Regression, number: int, law: Law) -> Regression | None:
-    """With another law of as many columns in a law's place; None where its columns are next to nothing."""
+def replace_law(regression: Regression, number: int, law: Law) -> Regression | None:
+    """The regression with another law of as many columns in a law's place; None where its columns vanish."""
     place = regression.places[number]
-    columns = _columns(regression.motions, law)
+    columns = _law_columns(regression.motions, law)
     if columns is None or columns[0].shape[1] != place.stop - place.start:
         return None
     rows = tuple(
@@ -180,30 +184,30 @@ def with_law(regression: Regression, number: int, law: Law) -> Regression | None
         for old, new in zip(regression.columns, columns, strict=True)
     )
     scale = regression.scale.copy()
-    scale[place] = column_scale(columns, [each.kept(each.fit) for each in regression.motions])
+    scale[place] = column_scale(columns, [each.valid_samples(each.fit) for each in regression.motions])
     laws = (*regression.laws[:number], law, *regression.laws[number + 1 :])
     changed = replace(regression, laws=laws, columns=rows, scale=scale)
     return replace(
         changed,
-        fit=tuple(_again(changed, block, place) for block in regression.fit),
-        test=tuple(_again(changed, block, place) for block in regression.test),
+        fit=tuple(_renew_products(changed, block, place) for block in regression.fit),
+        test=tuple(_renew_products(changed, block, place) for block in regression.test),
     )
 
 
-def with_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
-    """With more laws after those that it has, whose columns are kept."""
+def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
+    """The regression with more laws after those that it has."""
     kept, rows = [], [[each] for each in regression.columns]
     ends = [regression.columns[0].shape[1]]
     for law in laws:
-        columns = _columns(regression.motions, law)
+        columns = _law_columns(regression.motions, law)
         if columns is not None:
             kept.append(law)
             ends.append(ends[-1] + columns[0].shape[1])
             for held, new in zip(rows, columns, strict=True):
                 held.append(new)
     more = tuple(np.hstack(each) for each in rows)
-    fit = [motion.kept(motion.fit) for motion in regression.motions]
-    test = [motion.kept(motion.test) for motion in regression.motions]
+    fit = [motion.valid_samples(motion.fit) for motion in regression.motions]
+    test = [motion.valid_samples(motion.test) for motion in regression.motions]
     scale = np.concatenate([regression.scale, column_scale([each[:, ends[0] :] for each in more], fit)])
     mean = np.concatenate([aim[mask] for aim, mask in zip(regression.force, fit, strict=True)]).mean()
     units = scale, float(mean)
@@ -218,9 +222,9 @@ def with_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
     )
 
 
-def of_laws(regression: Regression, laws: Sequence[int]) -> Regression:
-    """With these laws alone, in this order."""
-    columns = regression.chosen(laws)
+def keep_laws(regression: Regression, laws: Sequence[int]) -> Regression:
+    """The regression with these laws alone, in this order."""
+    columns = regression.columns_of(laws)
     sizes = [regression.places[k].stop - regression.places[k].start for k in laws]
     ends = np.cumsum([regression.base, *sizes]).tolist()
     return replace(
@@ -229,17 +233,17 @@ def of_laws(regression: Regression, laws: Sequence[int]) -> Regression:
         places=tuple(slice(begin, end) for begin, end in pairwise(ends)),
         scale=regression.scale[columns],
         columns=tuple(each[:, columns] for each in regression.columns),
-        fit=tuple(_part(block, columns) for block in regression.fit),
-        test=tuple(_part(block, columns) for block in regression.test),
+        fit=tuple(_select_columns(block, columns) for block in regression.fit),
+        test=tuple(_select_columns(block, columns) for block in regression.test),
     )
 
 
-def _part(block: Block, columns: Sequence[int]) -> Block:
+def _select_columns(block: Block, columns: Sequence[int]) -> Block:
     return replace(block, gram=block.gram[np.ix_(columns, columns)], pull=block.pull[list(columns)])
 
 
-def _again(regression: Regression, block: Block, place: slice) -> Block:
-    """With the products of some columns computed anew."""
+def _renew_products(regression: Regression, block: Block, place: slice) -> Block:
+    """The block with the products of the columns in `place` computed anew."""
     x = regression.columns[block.motion][block.rows] / regression.scale
     gram, pull = block.gram.copy(), block.pull.copy()
     gram[:, place] = x.T @ x[:, place]

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import Columns, Law, Numbers, Scales, Values, named, through_lines
+from analysis.diagnosis.balance.law import Columns, Law, Numbers, Scales, Values, filter_from_rest, name_weights
 from analysis.diagnosis.balance.motion import Motion
 from equalizer.effects.gravity_torque import LEAST_TRAVEL_RAD
 from equalizer.signals.signal import FloatArray
@@ -18,13 +18,13 @@ def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
         )  # fmt: skip
     if of.turns:
         return
-    yield Law("hardening_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 3, named("k3"))
-    yield Law("asymmetric_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 2, named("k2"))
+    yield Law("hardening_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 3, name_weights("k3"))
+    yield Law("asymmetric_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 2, name_weights("k2"))
     for share in (0.02, 0.05, 0.1, 0.2):
         for end, side in ((of.high - share * of.travel, 1.0), (of.low + share * of.travel, -1.0)):
             yield Law(
                 "end_stop", c, (float(end),),
-                _beyond(c, side), _stop_values(side), bounded=((of.low, of.high),),
+                _stop_columns(c, side), _stop_values(side), bounded=((of.low, of.high),),
             )  # fmt: skip
     for half in of.travel * np.geomspace(0.01, 0.3, 6):
         yield Law(
@@ -35,7 +35,7 @@ def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
 
 
 def _stop_values(side: float) -> Values:
-    """The catalogue's stop stands on its own side of zero; elsewhere, its number for that is left out."""
+    """Parameters of an end stop on one side. Only where it stands on that side of zero is there none opposite."""
 
     def values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
         own = {"opposite": 0.0} if side * n[0] > 0 else {}
@@ -44,7 +44,7 @@ def _stop_values(side: float) -> Values:
     return values
 
 
-def _beyond(c: int, side: float) -> Columns:
+def _stop_columns(c: int, side: float) -> Columns:
     return lambda m, n: side * np.maximum(side * (m.position[:, [c]] - n[0]), 0.0)
 
 
@@ -58,19 +58,19 @@ def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
     for ratio in (0.02, 0.1, 0.4):
         for f in of.band_hz * np.geomspace(0.02, 1.2, 12):
             yield Law(
-                "extra_mode", c, (float(f), ratio), lambda m, n: _carried(m, c, n), _mode_values, linear=True,
+                "extra_mode", c, (float(f), ratio), lambda m, n: _mode_force(m, c, n), _mode_values, linear=True,
                 bounded=((0.005 * of.band_hz, 1.5 * of.band_hz), (0.002, 1.0)),
             )  # fmt: skip
     yield Law(
-        "amplifier_lag", c, (), lambda m, _: through_lines(m.acceleration[:, [c]], m.rate_hz, lambda s: s),
+        "amplifier_lag", c, (), lambda m, _: filter_from_rest(m.acceleration[:, [c]], m.rate_hz, lambda s: s),
         lambda w, n, mass: {"time_constant": float(w[0] / mass)} if mass > 0 and w[0] > 0 else None, linear=True,
     )  # fmt: skip
 
 
-def _carried(m: Motion, c: int, n: Numbers) -> FloatArray:
-    """The force per mass of a body on a spring that hangs on the axis."""
+def _mode_force(m: Motion, c: int, n: Numbers) -> FloatArray:
+    """(n, 1): force per kg of a body that hangs on the axis by a spring and a damper."""
     turn, loss = 2 * np.pi * n[0], 2 * n[1] * 2 * np.pi * n[0]
-    return through_lines(
+    return filter_from_rest(
         m.acceleration[:, [c]], m.rate_hz, lambda s: (turn**2 + loss * s) / (s**2 + loss * s + turn**2)
     )
 
@@ -83,13 +83,13 @@ def condition_laws(motions: Sequence[Motion], c: int) -> Iterator[Law]:
     for k in range(motions[0].condition.shape[1]):
         yield Law(
             "condition_dependent_damping", c, (float(k),),
-            lambda m, n: m.condition[:, [int(n[0])]] * m.velocity[:, [c]], named("change"),
+            lambda m, n: m.condition[:, [int(n[0])]] * m.velocity[:, [c]], name_weights("change"),
         )  # fmt: skip
         yield Law(
             "condition_dependent_friction", c, (float(k),),
-            lambda m, n: m.condition[:, [int(n[0])]] * np.sign(m.velocity[:, [c]]), named("change"),
+            lambda m, n: m.condition[:, [int(n[0])]] * np.sign(m.velocity[:, [c]]), name_weights("change"),
         )  # fmt: skip
         yield Law(
             "condition_dependent_stiffness", c, (float(k),),
-            lambda m, n: m.condition[:, [int(n[0])]] * m.position[:, [c]], named("change"),
+            lambda m, n: m.condition[:, [int(n[0])]] * m.position[:, [c]], name_weights("change"),
         )  # fmt: skip

@@ -1,8 +1,8 @@
 """The force balance beside a model that was given: its numbers are columns under the prior of their calibration.
 
 The force that the model needs is taken along the measured motion, with everything that its file names: actuator, modes,
-effects. Laws are then weighed as beside a fitted model (`balance.weigh`), by what they take of the error on held-out
-data that re-tuning leaves.
+effects. Laws are then tested as beside a fitted model (`balance.judge_laws`), by what they take of the error on
+held-out data that re-tuning leaves.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.given_base import GivenBase
+from analysis.diagnosis.balance.judge_laws import OF_SIGNAL, Balance, judge_laws
 from analysis.diagnosis.balance.motion import OVERSAMPLED, Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.structures import search_structures
-from analysis.diagnosis.balance.weigh import OF_SIGNAL, Balance, weigh
 from analysis.diagnosis.data.carried_weight import carrying
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed
@@ -51,7 +51,7 @@ def balances_beside(
         axes = driven_axes(model)
         mass = np.einsum("nm,nk,km->m", axes, model.mass, axes)
         return tuple(
-            weigh(
+            judge_laws(
                 search_structures(
                     [_along(each.motion, axis) for each in seen], axis, model.rotational, without, time_left,
                     GivenBase(tuple(each.columns[axis] for each in seen), float(mass[axis]), OF_SIGNAL),
@@ -90,7 +90,7 @@ def _seen(record: Observed, motion: Motion, model: MechanicalModel) -> _Seen:
     thin = replace(
         motion, rate_hz=rate_hz / every, step=max(int(rate_hz / every / (OVERSAMPLED * motion.band_hz)), 1),
         channels=motion.channels[:m], position=position, velocity=velocity, acceleration=acceleration,
-        force=motion.within(entered + added)[::every], condition=motion.condition[::every],
+        force=motion.band_pass(entered + added)[::every], condition=motion.condition[::every],
         fit=motion.fit[::every], test=motion.test[::every],
     )  # fmt: skip
     changes = [*_grounded(thin, model, recording), *_of_modes(thin, model, recording, known)]

@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.actuator import NO_COLUMN
+from analysis.diagnosis.balance.judge_laws import Balance, family_of
+from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
 from analysis.diagnosis.balance.structures import values_of
-from analysis.diagnosis.balance.weigh import Balance, family_of
-from analysis.diagnosis.balance.weighed import Weighed
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
 from analysis.diagnosis.errors.output_error import evaluated
@@ -51,7 +51,7 @@ def searched_by_balance(context: SearchContext, balances: Sequence[Balance], rep
         (axis, law)
         for axis, balance in enumerate(balances)
         for law in balance.named
-        if law.law.effect != CONSTANT and _plays(balance.searched.regression.beside.own, law)
+        if law.law.effect != CONSTANT and _plays(balance.search.regression.beside.own, law)
     ]
     if not named:
         return None
@@ -122,14 +122,14 @@ def _takes_enough(context: SearchContext, found: Explanation) -> bool:
     return not left > without + np.log(1 - NOTABLE) / 2
 
 
-def _refitted(balances: Sequence[Balance], named: Sequence[tuple[int, Weighed]]) -> list[tuple[int, Weighed]]:
+def _refitted(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
     """With the numbers that the balances give these laws alone."""
     found = []
     for axis, law in named:
         if law.place == NO_COLUMN:
             found.append((axis, law))
             continue
-        regression = balances[axis].searched.regression
+        regression = balances[axis].search.regression
         places = [other.place for of, other in named if of == axis and other.place != NO_COLUMN]
         values = values_of(regression, places)[places.index(law.place)]
         found.append((axis, law if values is None else replace(law, values=values)))
@@ -140,7 +140,7 @@ def _from_starts(
     context: SearchContext,
     balances: Sequence[Balance],
     without: tuple[FittedCandidate, FittedCandidate],
-    named: Sequence[tuple[int, Weighed]],
+    named: Sequence[tuple[int, JudgedLaw]],
 ) -> tuple[list[FittedCandidate], FittedCandidate]:
     """The steps, and the last of them on all samples. without: the re-tuned model, and the same on all samples. From
     the balance's linear numbers; where that ends beside the law, from the model's own."""
@@ -157,7 +157,7 @@ def _from_starts(
 
 
 def _steps(
-    context: SearchContext, retuned: FittedCandidate, named: Sequence[tuple[int, Weighed]], deviations: FloatArray
+    context: SearchContext, retuned: FittedCandidate, named: Sequence[tuple[int, JudgedLaw]], deviations: FloatArray
 ) -> list[FittedCandidate]:
     """The laws one after the other beside the constants, each fitted with those before it."""
     whole = retuned.fitted.hypothesis
@@ -201,17 +201,17 @@ def _constants(balances: Sequence[Balance]) -> Hypothesis:
     hold."""
     whole = NOTHING
     for axis, balance in enumerate(balances):
-        regression = balance.searched.regression
+        regression = balance.search.regression
         if regression.prior is not None:
             continue
-        force = -float(regression.weights(regression.chosen(()))[-1])
+        force = -float(regression.weights(regression.columns_of(()))[-1])
         if force:
             claim = Claim(EFFECTS[CONSTANT], "one", (axis,))
             whole = together(whole, claimed(claim, [{"force": force}]))
     return whole
 
 
-def _plays(own: int, weighed: Weighed) -> bool:
+def _plays(own: int, weighed: JudgedLaw) -> bool:
     effect = EFFECTS.get(weighed.law.effect)
     if effect is None or weighed.law.channel != own:
         return False
@@ -221,7 +221,7 @@ def _plays(own: int, weighed: Weighed) -> bool:
     )
 
 
-def _claimed(axis: int, weighed: Weighed) -> Hypothesis:
+def _claimed(axis: int, weighed: JudgedLaw) -> Hypothesis:
     effect = EFFECTS[weighed.law.effect]
     return claimed(Claim(effect, "one", (axis,)), [{p.name: weighed.values[p.name] for p in effect.parameters}])
 
@@ -229,13 +229,13 @@ def _claimed(axis: int, weighed: Weighed) -> Hypothesis:
 def _released(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
     """Mass, damping and stiffness as they are beside laws of the only balance, not as they were fitted without them."""
     start = np.zeros(len(tuning.names))
-    if any(balance.searched.regression.prior is not None for balance in balances):
+    if any(balance.search.regression.prior is not None for balance in balances):
         return start
     model = tuning.model
     if len(balances) != 1 or model.coordinates != 1:
         return start
-    regression = balances[0].searched.regression
-    weights = regression.weights(regression.chosen(laws))[: regression.matrices]
+    regression = balances[0].search.regression
+    weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
     given = (model.mass, model.damping, model.stiffness)
     for place, (weight, matrix) in enumerate(zip(weights, given, strict=False)):
         if place == 0:

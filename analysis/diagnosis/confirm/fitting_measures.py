@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.data.operating_point import about_operating_point
 from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
@@ -89,6 +89,6 @@ def looks_of(
             held = share_within(balances, narrow.measure.band_hz) if isinstance(narrow.measure, PredictedForce) else 0.0
             if held >= LAWS_WITHIN:
                 yield Look(rigid, narrow, narrow=True)
-            yield Look(rigid, measure_by_force(reduced, rigid, balances[0].searched.regression.motions[0].band_hz))
+            yield Look(rigid, measure_by_force(reduced, rigid, balances[0].search.regression.motions[0].band_hz))
     except (MechanicalModelError, np.linalg.LinAlgError):
         return

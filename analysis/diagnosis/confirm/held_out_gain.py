@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.weighed import LEVEL, drawn_of
+from analysis.diagnosis.balance.judged_law import LEVEL, bootstrap_draws
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.signals.signal import FloatArray
@@ -38,7 +38,7 @@ def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: Fitt
     # Each channel in units of what is left of it without the effect: no channel drowns the others.
     size = np.maximum(left.sum(axis=0), np.finfo(float).tiny)
     before, after = (left / size).mean(axis=1), (right / size).mean(axis=1)
-    drawn = drawn_of(len(before))
+    drawn = bootstrap_draws(len(before))
     shares = 1 - after[drawn].sum(axis=1) / np.maximum(before[drawn].sum(axis=1), np.finfo(float).tiny)
     low, high = np.quantile(shares, [LEVEL, 1 - LEVEL])
     return HeldOutGain(float(1 - after.sum() / before.sum()), float(low), float(high))

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.balance.judge_laws import CEILING, PLAYED_AS, Balance
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
-from analysis.diagnosis.balance.weigh import CEILING, PLAYED_AS, Balance
 from analysis.diagnosis.confirm.balance_beside_model import balances_beside
 from analysis.diagnosis.confirm.confirm_laws import searched_by_balance
 from analysis.diagnosis.confirm.fitting_measures import Look

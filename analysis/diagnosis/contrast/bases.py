@@ -60,7 +60,7 @@ def turning_of(recording: Recording) -> bool:
 
 def left_of(base: Base, parts: tuple[Taken, ...]) -> float:
     """Infinite where what is to be told never changes: then nothing can be told of it."""
-    rows = np.vstack([part[mask] for part, mask in zip(base.rows(parts), base.kept(parts), strict=True)])
+    rows = np.vstack([part[mask] for part, mask in zip(base.rows(parts), base.valid_samples(parts), strict=True)])
     size = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
     spread = float(np.std(rows[:, 0]))
     if spread <= STILL * size[0]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.weighed import LEVEL, drawn_of
+from analysis.diagnosis.balance.judged_law import LEVEL, bootstrap_draws
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
 from analysis.diagnosis.contrast.bases import bases_of, left_of, moves_alike, turning_of
 from analysis.diagnosis.contrast.fault import Fault, Variant
@@ -197,7 +197,7 @@ def _weighed(
     gains = list(_usual(streams, fault, variant, fit.sizes)) if plain.error > (1 + LEAST) * fit.error else [0.0]
     typical = max(float(np.median(gains)), 0.0)
     errors = fit.errors * (1 + typical)
-    drawn = drawn_of(len(errors))
+    drawn = bootstrap_draws(len(errors))
     beyond = plain.errors[drawn].sum(axis=1) / np.maximum(errors[drawn].sum(axis=1), 1e-300) - 1
     left, room = float(errors.sum()), plain.error - samples
     return Weighed(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from analysis.diagnosis.balance.weighed import DRAWS, LEVEL, drawn_of
+from analysis.diagnosis.balance.judged_law import DRAWS, LEVEL, bootstrap_draws
 from analysis.diagnosis.contrast.compare import LEAST, Compared, Weighed
 from analysis.diagnosis.contrast.stream import FOLDS
 
@@ -111,14 +111,14 @@ def _distance(weighed: Weighed, name: str) -> float:
 
 def _alike(best: Weighed, other: Weighed, found: Compared) -> bool:
     behind = other.errors - best.errors
-    drawn = drawn_of(len(behind))
+    drawn = bootstrap_draws(len(behind))
     left = float(best.errors.sum())
     least = min(ALMOST * (float(found.plain.sum()) - left), WORSE * left)
     return bool(behind.sum() <= least or np.quantile(behind[drawn].sum(axis=1), LEVEL) <= 0)
 
 
 def _first(best: Weighed, rivals: Sequence[Weighed]) -> float:
-    drawn = drawn_of(len(best.errors))
+    drawn = bootstrap_draws(len(best.errors))
     first = np.ones(DRAWS, dtype=np.bool_)
     for other in rivals:
         first &= (other.errors - best.errors)[drawn].sum(axis=1) >= 0

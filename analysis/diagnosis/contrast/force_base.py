@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.balance.law import Law, scales_of
-from analysis.diagnosis.balance.laws import laws_of, likely_pitches, pitched
-from analysis.diagnosis.balance.motion import Motion, motions_of, within
-from analysis.diagnosis.balance.regression import Regression, of_laws, regression_of
+from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
+from analysis.diagnosis.balance.motion import Motion, band_pass, motions_of
+from analysis.diagnosis.balance.regression import Regression, keep_laws, regression_of
 from analysis.diagnosis.contrast.taken import Taken
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
@@ -35,21 +35,23 @@ class ForceBase:
     def rows(self, parts: Sequence[Taken], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
         """Per part (kept, 1 + columns). like: rows of parts with the same motion."""
         if like is not None:
-            told = (within(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz) for part in parts)
+            told = (
+                band_pass(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz) for part in parts
+            )
             step = round(parts[0].rate_hz / self.rate_hz)
             return tuple(np.hstack([target[::step], old[:, 1:]]) for target, old in zip(told, like, strict=True))
         motions = motions_of([part.observed() for part in parts], self.band_hz)
-        targets = [motion.reduced(motion.force[:, [self.axis]]) for motion in motions]
+        targets = [motion.decimate(motion.force[:, [self.axis]]) for motion in motions]
         plain = regression_of(motions, self.axis, (), self.turns)
         found = []
         for target, motion, base in zip(targets, motions, plain.columns, strict=True):
-            more = [motion.reduced(law.columns(motion, law.numbers)) for law in self.laws]
+            more = [motion.decimate(law.columns(motion, law.numbers)) for law in self.laws]
             found.append(np.hstack([target, base, *more]))
         return tuple(found)
 
-    def kept(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
+    def valid_samples(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
         return tuple(
-            motion.kept(part.known)
+            motion.valid_samples(part.known)
             for motion, part in zip(motions_of([part.observed() for part in parts], self.band_hz), parts, strict=True)
         )
 
@@ -59,9 +61,9 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
     scales = [scales_of(motions, channel, rotational) for channel in range(len(motions[0].channels))]
     turns = any(scale.turns for scale in scales)
     regression = regression_of(motions, axis, list(laws_of(motions, rotational)), turns)
-    left = regression.remainder(regression.chosen(_grown(regression)))
+    left = regression.remainder(regression.columns_of(_grown(regression)))
     more = [
-        pitched(channel, pitch, scale)
+        cogging_law(channel, pitch, scale)
         for channel, scale in enumerate(scales)
         for pitch in likely_pitches(motions, left, channel, scale)
     ]
@@ -69,7 +71,7 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
         regression = regression_of(motions, axis, (*regression.laws, *more), turns)
     return ForceBase(
         axis,
-        of_laws(regression, _grown(regression)).laws,
+        keep_laws(regression, _grown(regression)).laws,
         motions[0].band_hz,
         turns,
         motions[0].rate_hz / motions[0].step,
@@ -80,10 +82,10 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
 def _grown(regression: Regression) -> tuple[int, ...]:
     """Law after law, as long as the folds gain by it."""
     laws: tuple[int, ...] = ()
-    left = float(regression.crossed(regression.chosen(laws)).sum())
+    left = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
     while len(laws) < MOST_LAWS:
         tried = [
-            (float(regression.crossed(regression.chosen((*laws, number))).sum()), number)
+            (float(regression.cross_validated_errors(regression.columns_of((*laws, number))).sum()), number)
             for number in range(len(regression.laws))
             if number not in laws
         ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.friction_laws import SHARP
-from analysis.diagnosis.balance.law import sliding
+from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.fault import Fault, Numbers, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
@@ -84,13 +84,13 @@ def mechanism_faults(
 
 
 def _rubbing(axis: _Axis, wide: float) -> Variant:
-    return Variant((axis.of(lambda m: sliding(axis.v(m), wide)),), sized("level"), least=0.0)
+    return Variant((axis.of(lambda m: smooth_sign(axis.v(m), wide)),), sized("level"), least=0.0)
 
 
 def _one_sided(axis: _Axis, wide: float) -> Variant:
     undo = (
-        axis.of(lambda m: np.maximum(sliding(axis.v(m), wide), 0.0)),
-        axis.of(lambda m: np.minimum(sliding(axis.v(m), wide), 0.0)),
+        axis.of(lambda m: np.maximum(smooth_sign(axis.v(m), wide), 0.0)),
+        axis.of(lambda m: np.minimum(smooth_sign(axis.v(m), wide), 0.0)),
     )
     return Variant(undo, lambda s: {"level_positive": float(s[0]), "level_negative": float(s[1])}, least=0.0)
 

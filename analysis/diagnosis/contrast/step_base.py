@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.motion import low_passed
+from analysis.diagnosis.balance.motion import low_pass_filter
 from analysis.diagnosis.contrast.taken import Taken
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
@@ -29,7 +29,7 @@ class StepBase:
     def rows(self, parts: Sequence[Taken], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
         return tuple(self._rows(part) for part in parts)
 
-    def kept(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
+    def valid_samples(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
         found = []
         for part in parts:
             known = part.known[:: self.step]
@@ -49,7 +49,7 @@ class StepBase:
 
 
 def thinned(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
-    return samples if step == 1 else low_passed(samples, rate_hz, 0.4 * rate_hz / step)[::step]
+    return samples if step == 1 else low_pass_filter(samples, rate_hz, 0.4 * rate_hz / step)[::step]
 
 
 def likely_step(parts: Sequence[Taken]) -> int:

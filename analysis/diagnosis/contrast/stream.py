@@ -82,7 +82,7 @@ def _changing(rows: Sequence[FloatArray], plain: Sequence[FloatArray]) -> Places
 
 
 def stream_of(base: Base, clean: Sequence[Taken], other: Sequence[Taken]) -> Stream:
-    rows, masks = (base.rows(clean), base.rows(other)), (base.kept(clean), base.kept(other))
+    rows, masks = (base.rows(clean), base.rows(other)), (base.valid_samples(clean), base.valid_samples(other))
     everything = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
     columns = np.sqrt(np.mean(everything**2, axis=0))
     columns = np.where(columns > 0, columns, 1.0)

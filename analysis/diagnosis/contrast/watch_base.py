@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.motion import differentiated, low_passed
+from analysis.diagnosis.balance.motion import differentiate, low_pass_filter
 from analysis.diagnosis.contrast.taken import Taken
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -29,7 +29,7 @@ class WatchBase:
     def rows(self, parts: Sequence[Taken], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
         return tuple(self._rows(part) for part in parts)
 
-    def kept(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
+    def valid_samples(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
         found = []
         for part in parts:
             edge = int(part.rate_hz / self.band_hz) + 1
@@ -41,8 +41,8 @@ class WatchBase:
 
     def _rows(self, part: Taken) -> FloatArray:
         assert part.position is not None
-        read = low_passed(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
-        moved = differentiated(part.position[:, [self.channel]], part.rate_hz, self.band_hz, self.times)[:: self.step]
+        read = low_pass_filter(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
+        moved = differentiate(part.position[:, [self.channel]], part.rate_hz, self.band_hz, self.times)[:: self.step]
         count = len(read) - 2 * REACH
         near = [moved[shift : shift + count] for shift in range(2 * REACH + 1)]
         return np.hstack([read[REACH : REACH + count], *near, np.ones((count, 1))])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import sliding
+from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.data.closed_loop import in_closed_loop
 from analysis.diagnosis.first_model.model_structures import (
@@ -29,7 +29,7 @@ MODES_GAIN = 0.1
 SHOWN = 0.1
 """Of the power that remains, from which a shape in it is told."""
 SHAPES: dict[str, Callable[[Motion], FloatArray]] = {
-    "the direction of motion, as dry friction does": lambda m: sliding(m.velocity, 0.01 * float(m.velocity.std())),
+    "the direction of motion, as dry friction does": lambda m: smooth_sign(m.velocity, 0.01 * float(m.velocity.std())),
     "the square of the speed": lambda m: m.velocity * np.abs(m.velocity),
     "the square of the position": lambda m: (m.position - m.position.mean(axis=0)) ** 2,
     "the cube of the position, as a hardening spring does": lambda m: (m.position - m.position.mean(axis=0)) ** 3,
@@ -87,9 +87,10 @@ def remains(given: Balanced | None, fit: StructureFit) -> str:
     if given is None or fit.joint is None or given.untimed:
         return f"{left} remains."
     motions = given.regressions[0].motions
-    left_over = [rows[m.kept(m.fit)] for rows, m in zip(fit.joint.remainders, motions, strict=True)]
+    left_over = [rows[m.valid_samples(m.fit)] for rows, m in zip(fit.joint.remainders, motions, strict=True)]
     shares = {
-        name: _share([m.reduced(shape(m))[m.kept(m.fit)] for m in motions], left_over) for name, shape in SHAPES.items()
+        name: _share([m.decimate(shape(m))[m.valid_samples(m.fit)] for m in motions], left_over)
+        for name, shape in SHAPES.items()
     }
     name, share = max(shares.items(), key=lambda item: item[1])
     if share < SHOWN:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.balances import balances_of
+from analysis.diagnosis.balance.balances import find_balances
+from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import NoMotionError
-from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.carried_weight import weighted
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.data.measured_motion import time_unit
@@ -55,7 +55,7 @@ def first_model_of(
     which takes longer. recordings: in the form of `plain_form`. Raises NothingToDiagnose where they carry no model."""
     _require_no_weight(recordings)
     on_progress("weighing laws in the force balance", 0.0)
-    balances = balances_of(recordings, frozenset(without), time_left)
+    balances = find_balances(recordings, frozenset(without), time_left)
     if any(time_unit(each) != "s" for each in recordings) and (still := _massless(recordings)) is not None:
         return FirstModel(still, (UNTIMED_SAID,), balances)
     model = plain_model(balances, recordings[0], "fitted to these recordings")

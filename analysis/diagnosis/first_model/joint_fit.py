@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from analysis.diagnosis.balance.band import NOISE_SHARE
-from analysis.diagnosis.balance.blocks import Block, error_of, part_of_block
+from analysis.diagnosis.balance.blocks import Block, block_products, squared_error
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression, regression_of, signal_power
 from equalizer.signals.signal import FloatArray
@@ -105,7 +105,7 @@ def _products(
         count = shape.rows[0].shape[1]
         gram, pull = np.zeros((count, count)), np.zeros(count)
         for block, row, power in zip(each, shape.rows, powers, strict=True):
-            own = part_of_block(block, shape.columns)
+            own = block_products(block, shape.columns)
             gram, pull = gram + row.T @ own[0] @ row / power, pull + row.T @ own[1] / power
         found.append((gram, pull))
     return found
@@ -131,7 +131,7 @@ def _errors(blocks: Sequence[Sequence[Block]], shape: _Shape, numbers: Sequence[
     return np.array(
         [
             [
-                error_of(part_of_block(block, shape.columns), row @ weights, block.power)
+                squared_error(block_products(block, shape.columns), row @ weights, block.power)
                 for block, row in zip(each, shape.rows, strict=True)
             ]
             for each, weights in zip(zip(*blocks, strict=True), numbers, strict=True)

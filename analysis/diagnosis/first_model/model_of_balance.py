@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced
 from analysis.diagnosis.settings import MASSLESS_SHARE
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
@@ -19,7 +19,7 @@ OPEN = 0.1
 def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
     """recording: what `reduced_recordings` makes of it, where the balances hold more than one body per command. None
     where not each command drives one measured motion. Raises MechanicalModelError."""
-    regressions = [balance.searched.regression for balance in balances]
+    regressions = [balance.search.regression for balance in balances]
     count = len(balances)
     if count > len(regressions[0].motions[0].channels) or count != len(recording.response.channels):
         return None
@@ -70,9 +70,9 @@ def share_within(balances: Sequence[Balance], band_hz: float) -> float:
     """Of each named law's force, the power below a frequency; the least of them."""
     shares = [1.0]
     for balance in balances:
-        regression = balance.searched.regression
+        regression = balance.search.regression
         laws = [law.place for law in balance.named if law.place >= 0]
-        weights, begin = regression.weights(regression.chosen(laws)), regression.base
+        weights, begin = regression.weights(regression.columns_of(laws)), regression.base
         for place in (regression.places[law] for law in laws):
             own = weights[begin : begin + place.stop - place.start]
             begin += len(own)
@@ -91,8 +91,8 @@ def _below(courses: Sequence[FloatArray], motions: Sequence[Motion], band_hz: fl
 
 def _numbers(balance: Balance, laws: Sequence[int], places: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rows of mass, damping and stiffness, of the motions at these places."""
-    regression = balance.searched.regression
-    weights = regression.weights(regression.chosen(laws))[: regression.matrices]
+    regression = balance.search.regression
+    weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
     d = len(regression.motions[0].channels)
     rows = [*weights.reshape(-1, d)[:, list(places)], np.zeros(len(places))]
     return rows[0], rows[1], rows[2]

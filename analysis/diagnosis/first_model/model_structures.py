@@ -93,7 +93,7 @@ def balanced(recordings: Sequence[Recording]) -> Balanced:
         raise NoMotionError("only accelerations were measured")
     if len(motions[0].channels) != count or len(first.response.channels) != count:
         raise NoMotionError("not every command has one measured motion of its own")
-    if not any(motion.kept(motion.fit).any() for motion in motions):
+    if not any(motion.valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too little of the motion is to be fitted to")
     rotational = any(unit.startswith(("rad", "N m")) for unit in (*first.response.units, *first.command.units))
     turns = any(scales_of(motions, axis, rotational).turns for axis in range(count))

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.friction_laws import SHARP
-from analysis.diagnosis.balance.law import sliding
+from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.first_model.rectified import restored
@@ -178,15 +178,15 @@ def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
     motions = motions_of(observed_parts(recordings, 1))
     rows, aims = [], []
     for motion in motions:
-        rubbing = sliding(motion.velocity, SHARP * max(float(motion.velocity.std()), 1e-300))
+        rubbing = smooth_sign(motion.velocity, SHARP * max(float(motion.velocity.std()), 1e-300))
         courses = [motion.force, motion.velocity, motion.position, rubbing]
         if not np.isfinite(motion.band_hz):
             courses, aim = [motion.force, rubbing], motion.position
         else:
             aim = motion.acceleration
-        kept = motion.kept(motion.fit)
-        rows.append(np.hstack([motion.reduced(np.hstack(courses)), np.ones((len(aim[:: motion.step]), 1))])[kept])
-        aims.append(motion.reduced(aim)[kept])
+        kept = motion.valid_samples(motion.fit)
+        rows.append(np.hstack([motion.decimate(np.hstack(courses)), np.ones((len(aim[:: motion.step]), 1))])[kept])
+        aims.append(motion.decimate(aim)[kept])
     x, y = np.vstack(rows), np.vstack(aims)[:, 0]
     size = np.maximum(x.std(axis=0), 1e-300)
     size[-1] = 1.0

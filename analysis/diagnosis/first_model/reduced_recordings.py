@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.actuator import NO_COLUMN
+from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.law import Law
-from analysis.diagnosis.balance.motion import Motion, moving_signal
-from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.balance.motion import Motion, motion_signal
 from analysis.diagnosis.data.observed_parts import parts_of
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -23,15 +23,15 @@ def is_reduced(balances: Sequence[Balance]) -> bool:
     """Whether the balances hold more than one body per command, and no law of a command, which acts on all of it."""
     if any(each.place == NO_COLUMN for balance in balances for each in balance.named):
         return False
-    motion = balances[0].searched.regression.motions[0]
+    motion = balances[0].search.regression.motions[0]
     if len(motion.channels) > len(balances) or motion.order == 2:
         return True
-    return any(linear_laws(balance) or balance.searched.regression.beside.late_s for balance in balances)
+    return any(linear_laws(balance) or balance.search.regression.beside.delay_s for balance in balances)
 
 
 def linear_laws(balance: Balance) -> tuple[Law, ...]:
     """Beside mass, damping and stiffness: of the base, and of the chosen structure."""
-    return (*balance.searched.regression.beside.laws, *(each.law for each in balance.laws if each.law.linear))
+    return (*balance.search.regression.beside.laws, *(each.law for each in balance.laws if each.law.linear))
 
 
 def reduced_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
@@ -49,12 +49,12 @@ def _reduced(
 ) -> Recording:
     command = recording.command.samples.copy()
     for axis, balance in enumerate(balances):
-        regression = balance.searched.regression
+        regression = balance.search.regression
         for number, (start, stop) in enumerate(parts, begin):
             motion = regression.motions[number]
             left = motion.force[:, axis] - _beside(balance, motion)
             # What lies below an integrated motion's band has no motion to balance it.
-            command[start:stop, axis] = motion.within(left[:, None])[:, 0] if motion.order == 2 else left
+            command[start:stop, axis] = motion.band_pass(left[:, None])[:, 0] if motion.order == 2 else left
     response, integrated = _driven(recording, parts, balances, begin)
     return replace(
         recording,
@@ -69,9 +69,9 @@ def _reduced(
 
 def _beside(balance: Balance, motion: Motion) -> FloatArray:
     """(n,): what the force needs beside the driven motion's own mass, damping and stiffness, and the named laws."""
-    regression, d = balance.searched.regression, len(motion.channels)
+    regression, d = balance.search.regression, len(motion.channels)
     linear = [each.place for each in balance.laws if each.law.linear]
-    weights = regression.weights(regression.chosen([*linear, *(each.place for each in balance.named)]))
+    weights = regression.weights(regression.columns_of([*linear, *(each.place for each in balance.named)]))
     # The constant of the base is left to the fit.
     weights = np.delete(weights, regression.base - 1)
     courses = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]
@@ -85,12 +85,12 @@ def _driven(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], begin: int
 ) -> tuple[Signal, bool]:
     """The driven motions as measured, and whether they are integrals of what was."""
-    regression = balances[0].searched.regression
-    measured = moving_signal(recording)
+    regression = balances[0].search.regression
+    measured = motion_signal(recording)
     assert measured is not None
     d = len(regression.motions[0].channels)
     places = [
-        k if d <= len(balances) else balances[k].searched.regression.beside.own for k in range(min(d, len(balances)))
+        k if d <= len(balances) else balances[k].search.regression.beside.own for k in range(min(d, len(balances)))
     ]
     samples, order = measured.samples.copy(), regression.motions[0].order
     quantities, units = measured.quantities, measured.units

@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import regression_of
-from analysis.diagnosis.balance.structures import Structure, better
+from analysis.diagnosis.balance.structures import Structure, is_better
 from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.wording import listed
@@ -52,8 +52,8 @@ def _against(motions: Sequence[Motion], axis: int) -> bool:
         regression_of([replace(each, force=sign * each.force) for each in motions], axis, (), turns=False)
         for sign in (1.0, -1.0)
     )
-    first, other = (Structure((), each.crossed(each.chosen(()))) for each in (plain, turned))
-    return other.error < (1 - CLEARLY) * first.error and better(first, other)
+    first, other = (Structure((), each.cross_validated_errors(each.columns_of(()))) for each in (plain, turned))
+    return other.error < (1 - CLEARLY) * first.error and is_better(first, other)
 
 
 def _turned(recording: Recording, imposed: bool, sign: FloatArray) -> Recording:

@@ -47,14 +47,14 @@ def _derivative(recordings: Sequence[Recording]) -> str:
         regression = regression_of(motions, 0, (), turns=False)
     except (NoMotionError, np.linalg.LinAlgError):
         return "position"
-    whole = regression.chosen(())
+    whole = regression.columns_of(())
     power = max(sum(block.signal for block in regression.fit), 1e-300)
     if not np.isfinite(motions[0].band_hz):
         return "position"
 
     def use(columns: Sequence[int]) -> float:
-        without = regression.crossed([k for k in whole if k not in columns])
-        return float((without - regression.crossed(whole)).sum()) / power
+        without = regression.cross_validated_errors([k for k in whole if k not in columns])
+        return float((without - regression.cross_validated_errors(whole)).sum()) / power
 
     d = len(motions[0].channels)
     twice, itself = use(range(d)), use(range(2 * d, 3 * d))

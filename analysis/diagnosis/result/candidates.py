@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from analysis.diagnosis.balance.actuator import NO_COLUMN
+from analysis.diagnosis.balance.judge_laws import SMALL, Balance
+from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.structures import NOTICED
-from analysis.diagnosis.balance.weigh import SMALL, Balance
-from analysis.diagnosis.balance.weighed import Weighed
 from analysis.diagnosis.confirm.confirm_laws import CONSTANTS
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
 from analysis.diagnosis.effect_words import noun_of, place_of
@@ -119,7 +119,7 @@ def _told_with(effect: NamedEffect) -> tuple[str, ...]:
     return (effect.effect, *effect.class_, *refined)
 
 
-def _rank(weighed: Weighed) -> int:
+def _rank(weighed: JudgedLaw) -> int:
     """Missing physics that is sure to gain and can have such numbers before what is not or cannot; then a linear model
     of a higher order; and last what takes next to nothing."""
     if weighed.law.linear:
@@ -133,9 +133,9 @@ def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...]) -> tu
     """What the first model holds beside mass, damping and stiffness; channels: of the commands."""
     said = []
     for channel, balance in zip(channels, balances, strict=False):
-        beside, motion = balance.searched.regression.beside, balance.searched.regression.motions[0]
+        beside, motion = balance.search.regression.beside, balance.search.regression.motions[0]
         laws = [law.effect for law in linear_laws(balance)]
-        parts = [f"a command that is {1e3 * beside.late_s:.3g} ms late (a lag or a delay)"] if beside.late_s else []
+        parts = [f"a command that is {1e3 * beside.delay_s:.3g} ms late (a lag or a delay)"] if beside.delay_s else []
         parts += [noun_of(name) for name in dict.fromkeys(laws)]
         if len(motion.channels) > len(balances):
             others = [name for k, name in enumerate(motion.channels) if k != beside.own]
@@ -157,7 +157,7 @@ def reached_of(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tupl
         names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
         laws = [law.place for law in balance.laws if law.law.effect in names]
         rms = balance.error_of(laws) if laws else balance.linear
-        given = balance.searched.regression.prior is not None
+        given = balance.search.regression.prior is not None
         found.append(Reached(letter, balance.linear, rms, balance.ceiling, bool(laws), balance.tested, given))
     return tuple(found)
 
@@ -170,13 +170,13 @@ def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     return tuple(first.values())
 
 
-def _taken(balance: Balance, law: Weighed) -> float:
+def _taken(balance: Balance, law: JudgedLaw) -> float:
     """Share of the linear model's held-out error power that goes with a law; its own is of what all laws take."""
     whole = 1.0 if law.place == NO_COLUMN else 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2
     return min(max(whole * law.share, 0.0), 1.0)
 
 
-def _with_class(effect: NamedEffect, found: tuple[Weighed, float] | None) -> NamedEffect:
+def _with_class(effect: NamedEffect, found: tuple[JudgedLaw, float] | None) -> NamedEffect:
     """found: the law as it was weighed, and its share of the mismatch."""
     if found is None:
         late = effect.effect in LATE
@@ -205,7 +205,7 @@ def refines(effect: str, plain: str) -> bool:
     return plain in known
 
 
-def _candidate(weighed: Weighed, axis: str) -> Candidate:
+def _candidate(weighed: JudgedLaw, axis: str) -> Candidate:
     return Candidate(
         effect=weighed.law.effect,
         place=place_of(weighed.law.effect),

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.document import Diagnosis
 from analysis.diagnosis.result.signature_bins import binned
 from analysis.diagnosis.types import Mask
@@ -104,7 +104,7 @@ def state_maps(
     for axis, letter in enumerate(letters):
         if balances:
             course, completed = _of_balance(balances[axis], diagnosis, letter)
-            given = balances[axis].searched.regression.prior is not None
+            given = balances[axis].search.regression.prior is not None
             model = "the re-tuned model" if given else "mass, damping and stiffness alone"
         else:
             course, completed, model = _of_evidence(evidence, axis), "", "the re-tuned model"
@@ -116,11 +116,11 @@ def state_maps(
 
 
 def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_Course | None, str]:
-    regression = balance.searched.regression
+    regression = balance.search.regression
     names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
     named = [law.place for law in balance.laws if law.law.effect in names]
     laws = named or [law.place for law in balance.laws]
-    linear, whole = (regression.remainder(regression.chosen(each)) for each in ((), laws))
+    linear, whole = (regression.remainder(regression.columns_of(each)) for each in ((), laws))
     axis = min(regression.axis, len(regression.motions[0].channels) - 1)
     motions = regression.motions
     course = _Course(
@@ -131,7 +131,7 @@ def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_C
         np.concatenate(regression.force),
         np.concatenate(_less(regression, linear)),
         np.concatenate(_less(regression, whole)) if laws else None,
-        np.concatenate([motion.kept(motion.fit | motion.test) for motion in motions]),
+        np.concatenate([motion.valid_samples(motion.fit | motion.test) for motion in motions]),
         _slices([len(force) for force in regression.force]),
     )
     return (course if course.used.any() else None), (NAMED if named else NOT_CONFIRMED if laws else "")

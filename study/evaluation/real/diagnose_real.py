@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose

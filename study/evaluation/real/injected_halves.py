@@ -136,4 +136,4 @@ def _error(base: Base, clean: tuple[Taken, ...], other: tuple[Taken, ...]) -> fl
 
 
 def _rows(base: Base, parts: tuple[Taken, ...]) -> FloatArray:
-    return np.vstack([part[mask] for part, mask in zip(base.rows(parts), base.kept(parts), strict=True)])
+    return np.vstack([part[mask] for part, mask in zip(base.rows(parts), base.valid_samples(parts), strict=True)])

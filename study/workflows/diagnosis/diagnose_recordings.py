@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.choose_measure import Compared

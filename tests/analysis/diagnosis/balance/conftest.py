@@ -19,10 +19,10 @@ def axes(module_at) -> ModuleType:
 @pytest.fixture(scope="session")
 def balance_of():
     """Of a recording, one per axis."""
-    from analysis.diagnosis.balance.balances import balances_of
+    from analysis.diagnosis.balance.balances import find_balances
     from analysis.diagnosis.search.time_budget import always
 
-    return lambda recording, without=(): balances_of([recording], frozenset(without), always)
+    return lambda recording, without=(): find_balances([recording], frozenset(without), always)
 
 
 @pytest.fixture(scope="session")

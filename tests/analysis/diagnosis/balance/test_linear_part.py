@@ -67,8 +67,8 @@ def test_a_late_command_is_seen_and_its_friction_named(late_axis, recording_of, 
 
     (balance,) = balance_of(recording_of(force, motion, RATE_HZ))
 
-    beside = balance.searched.regression.beside
-    assert beside.late_s == pytest.approx(LATE_S, abs=0.002)
+    beside = balance.search.regression.beside
+    assert beside.delay_s == pytest.approx(LATE_S, abs=0.002)
     assert balance.named[0].law.effect == "coulomb_friction"
     assert balance.named[0].values["level"] == pytest.approx(LEVEL, rel=0.05)
 
@@ -76,7 +76,7 @@ def test_a_late_command_is_seen_and_its_friction_named(late_axis, recording_of, 
 def test_a_command_in_time_is_not_shifted(of_both):
     _, (balance,) = of_both
 
-    assert abs(balance.searched.regression.beside.late_s) < 1 / RATE_HZ
+    assert abs(balance.search.regression.beside.delay_s) < 1 / RATE_HZ
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
@@ -89,7 +89,7 @@ def test_of_two_measured_motions_the_driven_one_is_found_and_its_friction_named(
     (balance,) = of_both[1] if in_order else balance_of(recording_of(force, motion[:, order], RATE_HZ))
 
     driven = order.index(0)
-    assert balance.searched.regression.beside.own == driven
+    assert balance.search.regression.beside.own == driven
     assert (balance.named[0].law.effect, balance.named[0].law.channel) == ("coulomb_friction", driven)
     assert balance.named[0].values["level"] == pytest.approx(LEVEL, rel=0.1)
 

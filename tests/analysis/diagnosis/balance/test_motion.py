@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.balance.band import WIDEST
 from analysis.diagnosis.balance.laws import laws_of
-from analysis.diagnosis.balance.motion import NoMotionError, motions_of, moving_signal
+from analysis.diagnosis.balance.motion import NoMotionError, motion_signal, motions_of
 from analysis.diagnosis.data.observed_parts import observed_parts
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import Signal
@@ -80,9 +80,9 @@ def test_within_its_band_a_noisy_motion_keeps_its_acceleration(recording_of):
 
 def test_samples_near_the_ends_are_not_fitted_to(recording_of):
     found = motion_of(recording_of(course(2), course(0), RATE_HZ))
-    kept = found.kept(np.ones(COUNT, dtype=bool))
+    kept = found.valid_samples(np.ones(COUNT, dtype=bool))
     assert kept.any() and not kept[0] and not kept[-1]
-    assert len(kept) == len(found.reduced(found.force))
+    assert len(kept) == len(found.decimate(found.force))
 
 
 def test_gaps_are_bridged_and_never_fitted_to(recording_of):
@@ -112,8 +112,8 @@ def test_without_a_clock_no_law_asks_how_fast_it_moves(recording_of):
 def test_a_motion_is_of_the_lowest_derivative_and_moves(recording_of):
     both = recording_of(course(2), course(2), RATE_HZ, "acceleration")
     position = Signal(np.hstack([course(0), np.ones((COUNT, 1))]), RATE_HZ, "position", "m", ("x", "y"))
-    assert moving_signal(replace(both, position=position)).channels == ("x",)
-    assert moving_signal(both).quantities == ("acceleration",)
+    assert motion_signal(replace(both, position=position)).channels == ("x",)
+    assert motion_signal(both).quantities == ("acceleration",)
     still = recording_of(course(2), np.ones((COUNT, 1)), RATE_HZ)
     with pytest.raises(NoMotionError, match="no response is a motion"):
         motion_of(still)

@@ -5,18 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.all_laws import fit_all_laws
 from analysis.diagnosis.balance.blocks import FOLDS
-from analysis.diagnosis.balance.everything import of_everything
-from analysis.diagnosis.balance.law import Law, named
+from analysis.diagnosis.balance.law import Law, name_weights
 from analysis.diagnosis.balance.motion import motions_of
-from analysis.diagnosis.balance.regression import of_laws, regression_of, with_law
-from analysis.diagnosis.balance.structures import Structure, better
+from analysis.diagnosis.balance.regression import keep_laws, regression_of, replace_law
+from analysis.diagnosis.balance.structures import Structure, is_better
 from analysis.diagnosis.data.observed_parts import observed_parts
 
 RATE_HZ, COUNT = 500.0, 6000
-SCALE = Law("scale", 0, (1.0,), lambda m, n: np.tanh(m.velocity[:, :1] / n[0]), named("level"))
-CUBE = Law("cube", 0, (), lambda m, _: m.position[:, :1] ** 3, named("k3"))
-PAIR = Law("pair", 0, (), lambda m, _: np.hstack([np.sin(9 * m.position), np.cos(9 * m.position)]), named("a", "b"))
+SCALE = Law("scale", 0, (1.0,), lambda m, n: np.tanh(m.velocity[:, :1] / n[0]), name_weights("level"))
+CUBE = Law("cube", 0, (), lambda m, _: m.position[:, :1] ** 3, name_weights("k3"))
+PAIR = Law(
+    "pair", 0, (), lambda m, _: np.hstack([np.sin(9 * m.position), np.cos(9 * m.position)]), name_weights("a", "b")
+)
 
 
 @pytest.fixture
@@ -51,14 +53,14 @@ def left(regression, columns, weights, block):
 
 
 def test_weights_are_those_of_least_squares(regression):
-    columns = regression.chosen((0, 1))
+    columns = regression.columns_of((0, 1))
     assert regression.weights(columns) == pytest.approx(lstsq(regression, columns, regression.fit), rel=1e-4)
     assert regression.weights(columns)[-1] == pytest.approx(30, rel=0.2)
 
 
 def test_a_folds_error_is_that_of_numbers_fitted_to_all_others(regression):
-    columns = regression.chosen((1,))
-    found = regression.crossed(columns)
+    columns = regression.columns_of((1,))
+    found = regression.cross_validated_errors(columns)
     for number, block in enumerate(regression.fit):
         others = [other for other in regression.fit if other is not block]
         assert found[number] == pytest.approx(left(regression, columns, lstsq(regression, columns, others), block))
@@ -67,9 +69,9 @@ def test_a_folds_error_is_that_of_numbers_fitted_to_all_others(regression):
 
 
 def test_held_out_errors_are_of_samples_that_nothing_was_fitted_to(regression):
-    columns = regression.chosen((0, 2))
+    columns = regression.columns_of((0, 2))
     truth = [left(regression, columns, lstsq(regression, columns, regression.fit), b) for b in regression.test]
-    assert regression.held_out(columns) == pytest.approx(truth, rel=1e-4)
+    assert regression.held_out_errors(columns) == pytest.approx(truth, rel=1e-4)
     rows = {(b.motion, k) for b in regression.fit for k in b.rows.tolist()}
     assert not rows & {(b.motion, k) for b in regression.test for k in b.rows.tolist()}
     assert len(regression.fit) >= FOLDS
@@ -77,31 +79,37 @@ def test_held_out_errors_are_of_samples_that_nothing_was_fitted_to(regression):
 
 def test_a_law_in_anothers_place_gives_what_a_new_regression_would(regression):
     wider = replace(SCALE, numbers=(0.2,))
-    changed = with_law(regression, 0, wider)
+    changed = replace_law(regression, 0, wider)
     anew = regression_of(regression.motions, 0, (wider, CUBE, PAIR), turns=False)
     for laws in ((0,), (0, 1, 2)):
-        columns = anew.chosen(laws)
-        assert changed.crossed(columns) == pytest.approx(anew.crossed(columns))
-        assert changed.held_out(columns) == pytest.approx(anew.held_out(columns))
+        columns = anew.columns_of(laws)
+        assert changed.cross_validated_errors(columns) == pytest.approx(anew.cross_validated_errors(columns))
+        assert changed.held_out_errors(columns) == pytest.approx(anew.held_out_errors(columns))
         assert changed.weights(columns) == pytest.approx(anew.weights(columns))
-    assert changed.crossed(changed.chosen((0,))).sum() != pytest.approx(regression.crossed(anew.chosen((0,))).sum())
-    assert with_law(regression, 0, PAIR) is None
-    assert with_law(regression, 0, replace(SCALE, columns=lambda m, n: 0 * m.velocity[:, :1])) is None
+    assert changed.cross_validated_errors(changed.columns_of((0,))).sum() != pytest.approx(
+        regression.cross_validated_errors(anew.columns_of((0,))).sum()
+    )
+    assert replace_law(regression, 0, PAIR) is None
+    assert replace_law(regression, 0, replace(SCALE, columns=lambda m, n: 0 * m.velocity[:, :1])) is None
 
 
 def test_some_laws_alone_leave_what_they_leave_among_the_others(regression):
-    alone = of_laws(regression, (2, 0))
+    alone = keep_laws(regression, (2, 0))
     assert [law.effect for law in alone.laws] == ["pair", "scale"]
-    assert alone.crossed(alone.chosen((0, 1))) == pytest.approx(regression.crossed(regression.chosen((2, 0))))
-    assert alone.held_out(alone.chosen((1,))) == pytest.approx(regression.held_out(regression.chosen((0,))))
+    assert alone.cross_validated_errors(alone.columns_of((0, 1))) == pytest.approx(
+        regression.cross_validated_errors(regression.columns_of((2, 0)))
+    )
+    assert alone.held_out_errors(alone.columns_of((1,))) == pytest.approx(
+        regression.held_out_errors(regression.columns_of((0,)))
+    )
 
 
 def test_all_laws_together_leave_no_more_than_the_truth_and_noise_alone_stays(regression):
     everything = range(regression.columns[0].shape[1])
-    crossed, tested = of_everything(regression, everything)
-    truth = regression.crossed(regression.chosen((0, 1))).sum()
+    crossed, tested = fit_all_laws(regression, everything)
+    truth = regression.cross_validated_errors(regression.columns_of((0, 1))).sum()
     assert crossed == pytest.approx(truth, rel=0.05)
-    assert crossed < 0.7 * regression.crossed(regression.chosen(())).sum()
+    assert crossed < 0.7 * regression.cross_validated_errors(regression.columns_of(())).sum()
     assert tested.shape == (len(regression.test),)
 
 
@@ -110,24 +118,26 @@ def test_an_axis_has_no_mass_and_no_damping_below_zero(regression):
         regression, force=tuple(-f for f in regression.force),
         fit=tuple(replace(b, pull=-b.pull) for b in regression.fit),
     )  # fmt: skip
-    columns = turned.chosen(())
+    columns = turned.columns_of(())
     assert lstsq(turned, columns, turned.fit)[1] < 0
     assert (turned.weights(columns)[:2] >= 0).all()
 
 
 def test_columns_that_are_nothing_in_all_blocks_but_one_give_finite_errors(regression):
     """The rest of the sum is then the rounding of a difference."""
-    last = Law("late", 0, (), lambda m, _: (np.arange(len(m.force))[:, None] > 4300) * 1e6 * m.position, named("k"))
+    last = Law(
+        "late", 0, (), lambda m, _: (np.arange(len(m.force))[:, None] > 4300) * 1e6 * m.position, name_weights("k")
+    )
     late = regression_of(regression.motions[:1], 0, (last,), turns=False)
-    found = late.crossed(late.chosen((0,)))
+    found = late.cross_validated_errors(late.columns_of((0,)))
     assert np.isfinite(found).all()
-    assert found.sum() < 3 * late.crossed(late.chosen(())).sum()
+    assert found.sum() < 3 * late.cross_validated_errors(late.columns_of(())).sum()
 
 
 def test_laws_are_worth_it_where_the_folds_agree():
     plain = np.array([0.6, 0.05, 0.04, 0.1, 0.03, 0.02, 0.08, 0.08])
     swing = Structure((0,), plain / 20)
     luck = Structure((0,), plain * np.array([0.5, 1.1, 1.2, 1.1, 1.05, 1.3, 1.1, 1.2]))
-    assert better(Structure((), plain), swing)
-    assert not better(Structure((), plain), luck)
-    assert not better(Structure((), plain), Structure((0,), 0.99 * plain))
+    assert is_better(Structure((), plain), swing)
+    assert not is_better(Structure((), plain), luck)
+    assert not is_better(Structure((), plain), Structure((0,), 0.99 * plain))

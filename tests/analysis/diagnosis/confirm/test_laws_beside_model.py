@@ -59,11 +59,14 @@ def test_a_device_within_its_calibration_lacks_nothing(mass):
 
 def test_a_calibrated_number_does_not_take_friction_on_itself(with_friction):
     """Fitted freely, damping would hold part of it; its prior keeps it within a few standard deviations."""
-    regression = with_friction.searched.regression
-    deviations = regression.weights(regression.chosen(()))[1 : regression.base - 1]
+    regression = with_friction.search.regression
+    deviations = regression.weights(regression.columns_of(()))[1 : regression.base - 1]
     assert np.abs(deviations).max() < 10
     loose = replace(regression, prior=None)
-    assert loose.crossed(loose.chosen(())).sum() <= regression.crossed(regression.chosen(())).sum()
+    assert (
+        loose.cross_validated_errors(loose.columns_of(())).sum()
+        <= regression.cross_validated_errors(regression.columns_of(())).sum()
+    )
 
 
 def candidate(residuals, name="coulomb_friction", deviations=(0.0,)):

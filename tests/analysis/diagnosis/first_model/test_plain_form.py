@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.motion import moving_signal
+from analysis.diagnosis.balance.motion import motion_signal
 from analysis.diagnosis.data.driven_response import answer
 from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.first_model.plain_form import plain_form
@@ -147,7 +147,7 @@ def test_a_channel_without_a_single_number_is_no_motion_and_no_force():
     """Without a warning, which would be an error here."""
     push, none = smooth(2000, 1), np.full(2000, np.nan)
     moved = of([("f", "force", "N", push)], [("x", "position", "m", none), ("y", "position", "m", push)])
-    assert (moving := moving_signal(moved)) is not None
+    assert (moving := motion_signal(moved)) is not None
     assert moving.channels == ("y",)
     pushed = of([("x", "position", "m", push)], [("f1", "force", "N", none), ("f2", "force", "N", push)])
     assert plain_form((pushed,))[0][0].response.channels == ("f2",)

@@ -2,14 +2,14 @@
 
 from dataclasses import replace
 
+from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.law import Law
-from analysis.diagnosis.balance.weighed import Weighed
 from analysis.diagnosis.result.candidates import _rank
 
 
 def weighed(effect, gain, low, share=0.5, linear=False):
     law = Law(effect, 0, (), lambda m, n: m.position, lambda w, n, mass: None, linear)
-    return Weighed(0, law, {}, gain, low, share, (), 0.0, "it is not named")
+    return JudgedLaw(0, law, {}, gain, low, share, (), 0.0, "it is not named")
 
 
 def test_what_is_sure_to_gain_comes_before_what_gains_more_by_chance_or_cannot_be():

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.law import Law
-from analysis.diagnosis.balance.weighed import Weighed
 from analysis.diagnosis.document import Estimate, NamedEffect
 from analysis.diagnosis.result.candidate_wording import class_noun
 from analysis.diagnosis.result.candidates import _with_class, refines
@@ -14,9 +14,9 @@ from analysis.diagnosis.result.wording import inseparable_sentence, rival_senten
 DRY = NamedEffect("coulomb_friction", "mechanism", "x", 0.9, 0.9, {"level": Estimate(0.2, "N")})
 
 
-def weighed(*alike: str) -> tuple[Weighed, float]:
+def weighed(*alike: str) -> tuple[JudgedLaw, float]:
     law = Law.__new__(Law)
-    return Weighed(0, law, {}, 0.5, 0.4, 0.9, alike, 0.9, ""), 0.9
+    return JudgedLaw(0, law, {}, 0.5, 0.4, 0.9, alike, 0.9, ""), 0.9
 
 
 def test_refinements_leave_the_class_and_are_said_once():

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.judge_laws import judge_laws
 from analysis.diagnosis.balance.motion import motions_of
 from analysis.diagnosis.balance.structures import search_structures
-from analysis.diagnosis.balance.weigh import weigh
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
 from analysis.diagnosis.result.candidates import reached_of, with_balances
@@ -40,7 +40,7 @@ def rubbing(level):
 def seen(level, without=frozenset()):
     recording = rubbing(level)
     motions = motions_of(observed_parts((recording,), 1))
-    balance = weigh(search_structures(motions, 0, False, without, always))
+    balance = judge_laws(search_structures(motions, 0, False, without, always))
     return balance, state_maps(NOTHING, (balance,), (), recording), recording
 
 

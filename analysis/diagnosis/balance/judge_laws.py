@@ -1,4 +1,4 @@
-"""Which laws of a force balance earn a name: by what they take of the error on samples that nothing was fitted to.
+"""Decides which laws of a force balance are named, by how much of the held-out error each takes.
 
 No real device is within its sensors' noise of any model, so that nothing is asked of a remainder in units of noise. A
 law is judged by its gain on held-out blocks against the same sum of laws without it, with an interval from resampled
@@ -11,34 +11,34 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.balance.all_laws import fit_all_laws
 from analysis.diagnosis.balance.blocks import Block
-from analysis.diagnosis.balance.everything import of_everything
+from analysis.diagnosis.balance.judged_law import DRAWS, JudgedLaw, bootstrap_draws, force_ratio, gain_with_bound
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.plainest_structure import NOTABLE, numbers_of, plainest_structure
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.balance.structures import Searched, Structure, values_of
-from analysis.diagnosis.balance.weighed import DRAWS, Weighed, drawn_of, gain_of, times_recorded
+from analysis.diagnosis.balance.structures import Structure, StructureSearch, values_of
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
 CEILING = 0.5
-"""Share of what all laws together take of it that the named ones must reach, so that a name tells the main story;"""
+"""Share of what all laws together take of the error that the named ones must reach, so that they are its main part."""
 SMALL = 0.05
-"""and of which each must take so much."""
+"""Share of the same that each named law must take."""
 ALMOST = 0.15
 """Share of a law's gain by which a rival in its place must stay behind to be told from it."""
 OF_SIGNAL = 0.02
-"""Of the force's rms that a law must take: closer, the calibration and filters of laboratory recordings are not known.
+"""Share of the force's rms that a law must take: calibration and filters of laboratory recordings are not known better.
 """
 SECOND = 2 / 3
 """Share of what is left that a second law of one family must take."""
-MENDS = "it acts like a named law, and may only mend its shape"
+MENDS_SHAPE = "it acts like a named law, and may only mend its shape"
 MOST_ALIKE = 4
-"""Effects of a class; more of them tell nothing."""
+"""Effects of a class at most; a larger class says nothing."""
 LEAST_BLOCKS = 4
 CANCELLED = 2.0
-"""Times the recorded force's spread that a law's own may be: more is held by other columns, not seen."""
+"""Standard deviation of a law's own force at most, over the recorded one's: more is cancelled by other columns."""
 STILL = 0.01
 """Share of the speed's mean square, where it is fitted, below which samples that are held back test nothing."""
 FAMILIES = (
@@ -48,64 +48,64 @@ FAMILIES = (
 )  # fmt: skip
 """Effects that may stand in one class: they act alike. Of different families, none is named."""
 PLAYED_AS = {"drifting_friction": "coulomb_friction"}
-"""Laws that no simulation plays, and the one that is fitted in their place: of a class with it."""
+"""Laws that have no simulation, and the law that is fitted in their place and forms a class with them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Balance:
     """What a recording's forces say along one axis."""
 
-    searched: Searched
+    search: StructureSearch
     chosen: Structure
-    laws: tuple[Weighed, ...]
-    """Of the chosen structure, the largest gain first,"""
-    others: tuple[Weighed, ...]
-    """and others that would take some of what it leaves, or that came next."""
+    laws: tuple[JudgedLaw, ...]
+    """Laws of the chosen structure, the largest gain first."""
+    others: tuple[JudgedLaw, ...]
+    """Further laws that would take some of what the chosen structure leaves."""
     linear: float
-    """Held-out error of mass, damping and stiffness alone, over the signal's rms;"""
+    """Held-out error of mass, damping and stiffness alone, over the signal's rms."""
     error: float
-    """of the chosen structure;"""
+    """The same of the chosen structure."""
     ceiling: float
-    """and of all laws together."""
+    """The same of all laws together."""
     complete: bool
     tested: bool = True
-    """Whether what is held back moves enough to test by, or the folds do."""
+    """Whether the held-out blocks, or the folds, hold enough motion to test by."""
 
     @property
-    def named(self) -> tuple[Weighed, ...]:
+    def named(self) -> tuple[JudgedLaw, ...]:
         return tuple(each for each in self.laws if each.named)
 
     def error_of(self, laws: Sequence[int]) -> float:
-        """Beside mass, damping and stiffness, held out. laws: by place in the regression."""
-        regression = self.searched.regression
-        return float(np.sqrt(_held_out(regression, laws).sum() / _size(regression)))
+        """Held-out error with these laws, over the signal's rms. laws: by number in the regression."""
+        regression = self.search.regression
+        return float(np.sqrt(_held_out_errors(regression, laws).sum() / _signal_power(regression)))
 
 
-def weigh(searched: Searched) -> Balance:
-    regression = searched.regression
-    if not judged_by(regression):
-        alone = float(np.sqrt(searched.linear.error / _size(regression)))
-        return Balance(searched, searched.linear, (), (), alone, alone, alone, searched.complete, tested=False)
-    chosen = plainest_structure(searched)
-    held = _held_out(regression, chosen.laws)
-    linear = _held_out(regression, ())
-    ceiling = _ceiling(regression, held)
+def judge_laws(search: StructureSearch) -> Balance:
+    regression = search.regression
+    if not blocks_to_judge(regression):
+        alone = float(np.sqrt(search.linear.error / _signal_power(regression)))
+        return Balance(search, search.linear, (), (), alone, alone, alone, search.complete, tested=False)
+    chosen = plainest_structure(search)
+    held = _held_out_errors(regression, chosen.laws)
+    linear = _held_out_errors(regression, ())
+    ceiling = _error_of_all_laws(regression, held)
     room = max(float(linear.sum() - ceiling), 1e-6 * float(linear.sum()), 1e-300)
-    told = 1 - float(held.sum() - ceiling) / room
-    laws = [_weighed(regression, chosen.laws, number, (held, room, told)) for number in chosen.laws]
-    others = _others(regression, searched, chosen, (held, room))
-    rms = [float(np.sqrt(error / _size(regression))) for error in (linear.sum(), held.sum(), ceiling)]
-    ordered = _once_perfamily_of(sorted(laws, key=lambda each: -each.gain))
-    return Balance(searched, chosen, ordered, others, rms[0], rms[1], rms[2], searched.complete)
+    explained = 1 - float(held.sum() - ceiling) / room
+    laws = [_judge_law(regression, chosen.laws, number, (held, room, explained)) for number in chosen.laws]
+    others = _judge_further_laws(regression, search, chosen, (held, room))
+    rms = [float(np.sqrt(error / _signal_power(regression))) for error in (linear.sum(), held.sum(), ceiling)]
+    ordered = _name_once_per_family(sorted(laws, key=lambda each: -each.gain))
+    return Balance(search, chosen, ordered, others, rms[0], rms[1], rms[2], search.complete)
 
 
-def _once_perfamily_of(laws: Sequence[Weighed]) -> tuple[Weighed, ...]:
-    """laws: the largest gain first. Beside a named law of its family, another needs most of what is left: what acts
-    alike mends the shape of the first."""
-    found: list[Weighed] = []
+def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
+    """laws: the largest gain first. A second law of a family needs most of what is left to be named: one that acts like
+    the first may only correct its shape."""
+    found: list[JudgedLaw] = []
     for law in laws:
         mates = [other for other in found if other.named and family_of(other.law.effect) & {law.law.effect}]
-        found.append(replace(law, why_not=MENDS) if law.named and mates and law.gain < SECOND else law)
+        found.append(replace(law, why_not=MENDS_SHAPE) if law.named and mates and law.gain < SECOND else law)
     return tuple(found)
 
 
@@ -113,9 +113,9 @@ def family_of(effect: str) -> set[str]:
     return next((family for family in FAMILIES if effect in family), {effect})
 
 
-def judged_by(regression: Regression) -> tuple[Block, ...]:
-    """The blocks that laws are judged by: those held back, where the device moves in them; else those to fit, each by
-    numbers fitted to the others, where several of them move; else none: a single move tests nothing."""
+def blocks_to_judge(regression: Regression) -> tuple[Block, ...]:
+    """The blocks that laws are judged by: the held-out ones where the device moves in them; else the fit blocks, by
+    cross-validation, where several of them move; else none, for a single move tests nothing."""
     fit, test = (_speeds(regression, blocks) for blocks in (regression.fit, regression.test))
     if len(test) >= LEAST_BLOCKS and test.mean() >= STILL * fit.mean():
         return regression.test
@@ -129,38 +129,38 @@ def _speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
     return np.array([block.gram[speed, speed] / max(len(block.rows), 1) for block in blocks])
 
 
-def _size(regression: Regression) -> float:
-    return max(sum(block.signal for block in judged_by(regression) or regression.fit), 1e-300)
+def _signal_power(regression: Regression) -> float:
+    return max(sum(block.signal for block in blocks_to_judge(regression) or regression.fit), 1e-300)
 
 
-def _held_out(regression: Regression, laws: Sequence[int]) -> FloatArray:
-    columns = regression.chosen(laws)
-    held = judged_by(regression) is regression.test
-    return regression.held_out(columns) if held else regression.crossed(columns)
+def _held_out_errors(regression: Regression, laws: Sequence[int]) -> FloatArray:
+    columns = regression.columns_of(laws)
+    held = blocks_to_judge(regression) is regression.test
+    return regression.held_out_errors(columns) if held else regression.cross_validated_errors(columns)
 
 
-def _ceiling(regression: Regression, held: FloatArray) -> float:
-    """No more than what the chosen structure leaves."""
-    crossed, blocks = of_everything(regression, range(regression.columns[0].shape[1]))
-    whole = float(blocks.sum()) if judged_by(regression) is regression.test else crossed
+def _error_of_all_laws(regression: Regression, held: FloatArray) -> float:
+    """Sum of squares with all laws together, but at most that of the chosen structure."""
+    crossed, blocks = fit_all_laws(regression, range(regression.columns[0].shape[1]))
+    whole = float(blocks.sum()) if blocks_to_judge(regression) is regression.test else crossed
     return min(whole, float(held.sum()))
 
 
-def _weighed(
+def _judge_law(
     regression: Regression, laws: Sequence[int], number: int, against: tuple[FloatArray, float, float]
-) -> Weighed:
-    held, room, told = against
+) -> JudgedLaw:
+    held, room, explained = against
     rest = tuple(each for each in laws if each != number)
-    without = _held_out(regression, rest)
-    gain, low = gain_of(without, held)
+    without = _held_out_errors(regression, rest)
+    gain, low = gain_with_bound(without, held)
     share = float((without - held).sum()) / room
     law = regression.laws[number]
     values = dict(zip(laws, values_of(regression, laws), strict=True))[number]
-    alike, likely = _alike(regression, rest, number, (without, held))
-    taken = float(np.sqrt(max(float((without - held).sum()), 0.0) / _size(regression)))
+    alike, likely = _indistinguishable_effects(regression, rest, number, (without, held))
+    taken = float(np.sqrt(max(float((without - held).sum()), 0.0) / _signal_power(regression)))
     small = f"it takes {100 * taken:.1f} % of the force, less than such recordings are sure of"
-    why_not = _why_not(law, values, (gain, low, share, told), alike) or (small if taken < OF_SIGNAL else "")
-    times = times_recorded(regression, laws, number)
+    why_not = _why_not(law, values, (gain, low, share, explained), alike) or (small if taken < OF_SIGNAL else "")
+    times = force_ratio(regression, laws, number)
     possible = values is not None and times <= CANCELLED
     if not why_not and times > CANCELLED:
         why_not = f"its force would be {times:.0f} times what was recorded, and other terms would cancel it"
@@ -168,18 +168,18 @@ def _weighed(
     if not why_not and law.effect in PLAYED_AS:
         alike = (law.effect, *(effect for effect in alike if effect != PLAYED_AS[law.effect]))
         chosen, law = law.effect, replace(law, effect=PLAYED_AS[law.effect])
-    return Weighed(number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, possible)
+    return JudgedLaw(number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, possible)
 
 
-def _plainer(effect: str) -> tuple[str, ...]:
-    """What a law holds as a special case: beside that it always leaves less."""
+def _special_cases(effect: str) -> tuple[str, ...]:
+    """Effects that a law contains as special cases: it always fits better than these."""
     return EFFECTS[effect].simpler if effect in EFFECTS else ()
 
 
-def _alike(
+def _indistinguishable_effects(
     regression: Regression, rest: tuple[int, ...], number: int, errors: tuple[FloatArray, FloatArray]
 ) -> tuple[tuple[str, ...], float]:
-    """Effects that leave hardly more in a law's place, and how often none of them leaves less."""
+    """Effects that fit hardly worse in a law's place, and the share of bootstrap draws in which none fits better."""
     without, held = errors
     own = regression.laws[number]
     found: dict[str, tuple[float, tuple[int, ...]]] = {}
@@ -189,15 +189,15 @@ def _alike(
         laws = (*rest, place)
         if any(regression.laws[k].key == law.key for k in rest) or values_of(regression, laws)[-1] is None:
             continue
-        crossed = float(regression.crossed(regression.chosen(laws)).sum())
+        crossed = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
         if law.effect not in found or crossed < found[law.effect][0]:
             found[law.effect] = crossed, laws
     gained = float((without - held).sum())
-    alike, drawn = [], drawn_of(len(held))
+    alike, drawn = [], bootstrap_draws(len(held))
     first = np.ones(DRAWS, dtype=np.bool_)
     for effect, (_, laws) in found.items():
-        behind = _held_out(regression, laws) - held
-        if own.effect not in _plainer(effect):
+        behind = _held_out_errors(regression, laws) - held
+        if own.effect not in _special_cases(effect):
             first &= behind[drawn].sum(axis=1) >= 0
         # Of two that do as well, the plainer: what acts otherwise and has more numbers must leave less.
         more = numbers_of(regression, laws[-1:]) > numbers_of(regression, [number])
@@ -210,7 +210,7 @@ def _why_not(
     law: Law, values: dict[str, float] | None, numbers: tuple[float, float, float, float], alike: tuple[str, ...]
 ) -> str:
     """A sentence; empty where it is to be named."""
-    gain, low, share, told = numbers
+    gain, low, share, explained = numbers
     if law.linear:
         return "a linear model of a higher order: part of the first model, no missing physics"
     if values is None:
@@ -219,11 +219,13 @@ def _why_not(
         return "its gain on held-out data is not larger than what varies between stretches"
     if share < SMALL and gain < NOTABLE:
         return f"it takes {100 * share:.1f} % of what all laws together take"
-    if told < CEILING:
-        return f"with it, {100 * (1 - told):.0f} % of what all laws together take are left: the main part is another"
+    if explained < CEILING:
+        return (
+            f"with it, {100 * (1 - explained):.0f} % of what all laws together take are left: the main part is another"
+        )
     family = family_of(law.effect)
     strange = [effect for effect in alike if effect not in family]
-    others = [effect for effect in alike if law.effect not in _plainer(effect)]
+    others = [effect for effect in alike if law.effect not in _special_cases(effect)]
     if strange or len(others) >= MOST_ALIKE:
         return f"these data cannot tell it from {', '.join(strange or alike)}"
     return (
@@ -231,9 +233,9 @@ def _why_not(
     )
 
 
-def _others(
-    regression: Regression, searched: Searched, chosen: Structure, against: tuple[FloatArray, float]
-) -> tuple[Weighed, ...]:
+def _judge_further_laws(
+    regression: Regression, search: StructureSearch, chosen: Structure, against: tuple[FloatArray, float]
+) -> tuple[JudgedLaw, ...]:
     """The best further law of each effect beside the chosen structure, the largest gain first."""
     held, room = against
     effects = {regression.laws[k].effect for k in chosen.laws}
@@ -241,19 +243,19 @@ def _others(
     for number, law in enumerate(regression.laws):
         if law.effect in effects or values_of(regression, (*chosen.laws, number))[-1] is None:
             continue
-        error = float(regression.crossed(regression.chosen((*chosen.laws, number))).sum())
+        error = float(regression.cross_validated_errors(regression.columns_of((*chosen.laws, number))).sum())
         if law.effect not in best or error < best[law.effect][0]:
             best[law.effect] = error, number
     found = []
     for _, number in sorted(best.values())[:8]:
         laws = (*chosen.laws, number)
-        errors = _held_out(regression, laws)
-        gain, low = gain_of(held, errors)
+        errors = _held_out_errors(regression, laws)
+        gain, low = gain_with_bound(held, errors)
         values = values_of(regression, laws)[-1] or {}
         share = float((held - errors).sum()) / room
         why = "it takes too little beside what is named" if chosen.laws else "its gain is too small to be named"
         if gain > 0 and low > 0:
-            possible = times_recorded(regression, laws, number) <= CANCELLED
+            possible = force_ratio(regression, laws, number) <= CANCELLED
             law = regression.laws[number]
-            found.append(Weighed(number, law, values, gain, low, share, (), 0.0, why, possible=possible))
+            found.append(JudgedLaw(number, law, values, gain, low, share, (), 0.0, why, possible=possible))
     return tuple(sorted(found, key=lambda each: -each.gain))

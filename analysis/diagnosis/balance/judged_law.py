@@ -1,4 +1,4 @@
-"""A law as it was weighed, and its gain on held-out blocks with an interval from resampled ones."""
+"""A law with the result of its test: its gain on held-out blocks, with a bound from bootstrap over blocks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,27 +14,27 @@ DRAWS, SEED, LEVEL = 2000, 1, 0.025
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Weighed:
-    """One law, as a reader would judge it."""
+class JudgedLaw:
+    """One law, its parameters, its gain, and why it is not named."""
 
     place: int
     """In the regression."""
     law: Law
     values: dict[str, float]
     gain: float
-    """Share of the held-out error power that goes with it, beside the other laws;"""
+    """Share of the held-out error power that it takes, beside the other laws."""
     gain_low: float
-    """its lower end, at 97.5 %."""
+    """Lower confidence bound of the gain, at 97.5 %."""
     share: float
     """Of what all laws together take of the linear model's error."""
     alike: tuple[str, ...]
-    """Effects that do as well in its place."""
+    """Effects that fit as well in its place."""
     probability: float
     """Share of resampled blocks in which none of them leaves less."""
     why_not: str
     """Empty where it is to be named."""
     stands_for: str = ""
-    """The law that was chosen, where no simulation plays it and this one is fitted in its place."""
+    """The law that was chosen, where it has no simulation and this one is fitted in its place."""
 
     possible: bool = True
     """Its numbers have signs and sizes that such physics can have."""
@@ -44,23 +44,23 @@ class Weighed:
         return not self.why_not
 
 
-def gain_of(without: FloatArray, with_it: FloatArray) -> tuple[float, float]:
-    """Share of the error power that goes, and its lower end, from resampled blocks."""
-    drawn = drawn_of(len(without))
+def gain_with_bound(without: FloatArray, with_it: FloatArray) -> tuple[float, float]:
+    """Share of the error power that a law takes, and its lower bound by bootstrap over blocks. Inputs: (blocks,)."""
+    drawn = bootstrap_draws(len(without))
     shares = 1 - with_it[drawn].sum(axis=1) / np.maximum(without[drawn].sum(axis=1), 1e-300)
     return float(1 - with_it.sum() / max(float(without.sum()), 1e-300)), float(np.quantile(shares, LEVEL))
 
 
-def drawn_of(blocks: int) -> npt.NDArray[np.int64]:
+def bootstrap_draws(blocks: int) -> npt.NDArray[np.int64]:
     return np.random.default_rng(SEED).integers(blocks, size=(DRAWS, blocks))
 
 
-def times_recorded(regression: Regression, laws: Sequence[int], number: int) -> float:
-    """Standard deviation of a law's own force, over that of the recorded one."""
-    columns, place = regression.chosen(laws), regression.places[number]
+def force_ratio(regression: Regression, laws: Sequence[int], number: int) -> float:
+    """Standard deviation of a law's own force over that of the recorded force."""
+    columns, place = regression.columns_of(laws), regression.places[number]
     weights = np.zeros(regression.columns[0].shape[1])
     weights[columns] = regression.weights(columns)
-    kept = [motion.kept(motion.fit) for motion in regression.motions]
+    kept = [motion.valid_samples(motion.fit) for motion in regression.motions]
     own = [c[mask, place] @ weights[place] for c, mask in zip(regression.columns, kept, strict=True)]
     force = [f[mask] for f, mask in zip(regression.force, kept, strict=True)]
     return float(np.concatenate(own).std() / max(float(np.concatenate(force).std()), 1e-300))
