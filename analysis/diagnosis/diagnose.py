@@ -19,7 +19,7 @@ from analysis.diagnosis.confirm.laws_beside_model import Beside, weighed_beside
 from analysis.diagnosis.contrast.decide import BEYOND
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.data.observed_parts import names_of_parts
-from analysis.diagnosis.discovery.join import has_law, with_laws
+from analysis.diagnosis.discovery.add_laws import add_laws, has_law
 from analysis.diagnosis.errors.choose_measure import Compared, measure_of
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
@@ -246,7 +246,7 @@ def _searched(
 ) -> _Seen:
     def beyond(seen: Searched) -> Searched:
         wanted = settings.discovery and not settings.fitted
-        return with_laws(seen, progress, settings.time_left) if wanted else seen
+        return add_laws(seen, progress, settings.time_left) if wanted else seen
 
     return _Seen(searched(context, catalogue, progress, settings.time_left, beyond), CleanFloor())
 

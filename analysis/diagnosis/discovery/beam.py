@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from analysis.diagnosis.discovery.fit_sum import Sum, column_of, fit_sum
 from analysis.diagnosis.discovery.grammar import Term
-from analysis.diagnosis.discovery.screen import Products, extended, products_of, tried
-from analysis.diagnosis.discovery.sums import Sum, column_of, fitted_sum
-from analysis.diagnosis.discovery.whitened import View
+from analysis.diagnosis.discovery.matched_filter import View
+from analysis.diagnosis.discovery.screen_terms import Products, add_columns, cross_validate_terms, products_of
 from analysis.diagnosis.settings import (
     LAW_BEAM,
     LAW_MAIN_PART,
@@ -25,39 +25,40 @@ _LACKING = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Searched:
+class RankedSums:
     sums: tuple[Sum, ...]
     """The best first."""
     placebo: float
-    """Share of the held-out squares that the best term takes of residuals out of their time: what chance takes."""
+    """Largest share of the held-out squares that a term takes of time-shuffled residuals: what chance takes."""
 
 
-def best_sums(base: Products, terms: Sequence[Term], time_left: TimeBudget) -> Searched:
-    """base: of the model's numbers alone."""
+def best_sums(base: Products, terms: Sequence[Term], time_left: TimeBudget) -> RankedSums:
+    """Beam search for the sums with the least held-out error. base: products of the model's numbers alone."""
     view = base.view
-    kept, columns = _tabled(view, terms)
-    order = _order(base, columns)
-    found = _refined(base, (), kept, order, time_left)
-    every = [*found, *_without_variables(base, found, kept, order, time_left)]
+    kept, columns = _term_columns(view, terms)
+    order = _rank_terms(base, columns)
+    found = _fit_best_shapes(base, (), kept, order, time_left)
+    every = [*found, *_fit_without_variables(base, found, kept, order, time_left)]
     while found and len(found[0].terms) < LAW_MOST_TERMS and time_left():
         best = found[0]
-        if best.crossed - 1 <= LAW_MAIN_PART * (best.without - 1):
+        if best.cross_validated - 1 <= LAW_MAIN_PART * (best.without - 1):
             break
         longer: list[Sum] = []
         for sum_ in found[: LAW_BEAM // 2]:
             held = [column for term in sum_.terms if (column := column_of(view, term)) is not None]
-            order = _order(extended(base, held), columns)
-            longer += _refined(base, sum_.terms, kept, order, time_left)[:LAW_BEAM]
-        longer = sorted(longer, key=lambda each: each.crossed)
-        if not longer or not _worth(best, longer[0]):
+            order = _rank_terms(add_columns(base, held), columns)
+            longer += _fit_best_shapes(base, sum_.terms, kept, order, time_left)[:LAW_BEAM]
+        longer = sorted(longer, key=lambda each: each.cross_validated)
+        if not longer or not _is_worth_it(best, longer[0]):
             break
         every += longer
         found = tuple(longer)
-    return Searched(tuple(sorted(every, key=_price(view))), _placebo(view, columns))
+    return RankedSums(tuple(sorted(every, key=_description_length(view))), _placebo_share(view, columns))
 
 
-def _placebo(view: View, columns: FloatArray) -> float:
-    """Each block gets the residual of another one, backwards and as large as its own: the most of several turns."""
+def _placebo_share(view: View, columns: FloatArray) -> float:
+    """Negative control: each block gets another block's residual, reversed in time and scaled to its own rms; the
+    largest share that any term takes over several such shuffles."""
     blocks, takes = list(pairwise(view.edges)), [0.0]
     for shift in range(1, min(len(blocks), _PLACEBOS + 1)):
         turned = np.zeros_like(view.residual)
@@ -66,41 +67,41 @@ def _placebo(view: View, columns: FloatArray) -> float:
             own, other = view.residual[a:b], view.residual[c : c + count]
             size = float(np.linalg.norm(own)) / max(float(np.linalg.norm(other)), 1e-300)
             turned[a : a + count] = size * other[::-1]
-        found = tried(products_of(replace(view, residual=turned)), columns)
+        found = cross_validate_terms(products_of(replace(view, residual=turned)), columns)
         without = float(found.without.sum())
         takes.append(1 - float(found.with_it.sum(axis=0).min()) / max(without, 1e-300))
     return max(takes)
 
 
-def _without_variables(
+def _fit_without_variables(
     base: Products, found: Sequence[Sum], terms: Sequence[Term], order: Sequence[int], time_left: TimeBudget
 ) -> tuple[Sum, ...]:
-    """The grammar without what the best needs: the best starts of laws that lack one of its variables."""
+    """The best sums of one term that lack a variable of the best sum: its rivals."""
     if not found:
         return ()
     needed = set(found[0].variables)
     left = [number for number in order if not needed <= terms[number].variables]
-    return _refined(base, (), terms, left, time_left)[:_LACKING]
+    return _fit_best_shapes(base, (), terms, left, time_left)[:_LACKING]
 
 
-def _worth(shorter: Sum, longer: Sum) -> bool:
+def _is_worth_it(shorter: Sum, longer: Sum) -> bool:
     """Whether another term takes enough of what is left above the noise."""
-    return shorter.crossed - longer.crossed > LAW_WORTH_SHARE * max(shorter.crossed - 1.0, 0.0)
+    return shorter.cross_validated - longer.cross_validated > LAW_WORTH_SHARE * max(shorter.cross_validated - 1.0, 0.0)
 
 
-def _price(view: View) -> Callable[[Sum], float]:
-    """Squares over the noise's, and what its numbers cost to say (Schwarz 1978)."""
+def _description_length(view: View) -> Callable[[Sum], float]:
+    """Bayesian information criterion (Schwarz 1978): squares over the noise's, plus log(samples) for each number."""
     samples = len(view.residual)
 
     def price(of: Sum) -> float:
         numbers = sum(1 + len(term.numbers) for term in of.terms)
-        return of.crossed * samples + numbers * float(np.log(samples))
+        return of.cross_validated * samples + numbers * float(np.log(samples))
 
     return price
 
 
-def _tabled(view: View, terms: Sequence[Term]) -> tuple[list[Term], FloatArray]:
-    """Terms that are numbers everywhere, and their columns, of one size (terms, s)."""
+def _term_columns(view: View, terms: Sequence[Term]) -> tuple[list[Term], FloatArray]:
+    """Terms that are finite everywhere, and their columns (terms, s), scaled to an rms of 1."""
     kept: list[Term] = []
     columns: FloatArray = np.empty((len(terms), len(view.residual)), dtype=np.float32)
     for term in terms:
@@ -112,19 +113,19 @@ def _tabled(view: View, terms: Sequence[Term]) -> tuple[list[Term], FloatArray]:
     return kept, columns[: len(kept)]
 
 
-def _order(base: Products, columns: FloatArray) -> list[int]:
-    return [int(number) for number in np.argsort(tried(base, columns).with_it.sum(axis=0))]
+def _rank_terms(base: Products, columns: FloatArray) -> list[int]:
+    return [int(number) for number in np.argsort(cross_validate_terms(base, columns).with_it.sum(axis=0))]
 
 
-def _refined(
+def _fit_best_shapes(
     base: Products, held: tuple[Term, ...], terms: Sequence[Term], order: Sequence[int], time_left: TimeBudget
 ) -> tuple[Sum, ...]:
-    """The best starts of different shapes, each beside the terms that are held, fitted together."""
+    """The best-ranked shapes, each fitted together with the terms in `held`, sorted by held-out error."""
     shapes: dict[str, Term] = {}
     for number in order:
         if terms[number].shape not in {term.shape for term in held}:
             shapes.setdefault(terms[number].shape, terms[number])
         if len(shapes) == LAW_REFINED:
             break
-    found = [fitted_sum(base, (*held, term)) for term in shapes.values() if time_left()]
-    return tuple(sorted((each for each in found if each is not None), key=lambda each: each.crossed))
+    found = [fit_sum(base, (*held, term)) for term in shapes.values() if time_left()]
+    return tuple(sorted((each for each in found if each is not None), key=lambda each: each.cross_validated))

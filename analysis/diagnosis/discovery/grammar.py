@@ -1,4 +1,4 @@
-"""Terms that a law without a name may be made of: shapes of the motion and the commands, with free numbers.
+"""The grammar of discovered laws: terms of the motion and the commands, with free numbers.
 
 A term is a shape times a factor; its free numbers (exponents, widths, time constants, pitches) start on a grid that the
 recording's own travel, speed and duration span. What is linear in an axis's own motion is no term: mass, damping and
@@ -37,11 +37,11 @@ class Term:
         return frozenset(_SIGNAL.findall(self.shape))
 
 
-def odd(name: str, number: int) -> str:
+def odd_power(name: str, number: int) -> str:
     return f"abs({name})**p{number}*sign({name})"
 
 
-def even(name: str, number: int) -> str:
+def even_power(name: str, number: int) -> str:
     return f"abs({name})**p{number}"
 
 
@@ -69,11 +69,12 @@ def axes_of(columns: Columns, count: int) -> tuple[Axis, ...]:
 
 
 def terms_of(axes: Sequence[Axis], at: int, seconds: float, rate_hz: float) -> tuple[Term, ...]:
-    """Of a force along axis `at`; periodic ones apart (`periodic`)."""
+    """All terms of a force along axis `at`, but the periodic ones (`periodic_terms`). seconds: the recording's
+    length."""
     own, others = axes[at], [axis for number, axis in enumerate(axes) if number != at]
     every = (
-        *_powers(own), *_products(own), *_hinges(own), *_saturating(own), *_singular(own),
-        *_memory(own, others, seconds, rate_hz), *_across(own, others), *_drifting(own, seconds),
+        *_powers(own), *_products(own), *_hinges(own), *_saturations(own), *_poles(own),
+        *_memory(own, others, seconds, rate_hz), *_cross_axis(own, others), *_drifts(own, seconds),
     )  # fmt: skip
     return tuple(every)
 
@@ -83,16 +84,18 @@ def _powers(of: Axis) -> Iterator[Term]:
     for name, starts in ((of.v, (0.25, 0.5, 1.5, 2.0, 3.0, 5.0)), (of.x, (0.5, 1.5, 2.0, 3.0, 5.0)),
                          (of.f, (0.5, 1.5, 2.0, 3.0, 5.0))):  # fmt: skip
         for start in starts:
-            yield Term(odd(name, 0), (start,), (POWER,), (0,))
+            yield Term(odd_power(name, 0), (start,), (POWER,), (0,))
         for start in (1.0, 2.0, 4.0):
-            yield Term(even(name, 0), (start,), (POWER,), (0,))
+            yield Term(even_power(name, 0), (start,), (POWER,), (0,))
 
 
 def _products(of: Axis) -> Iterator[Term]:
-    """Of place and speed, of place or speed and command."""
-    for (left, right), a, b in product(product((odd, even), (odd, even)), (1.0, 2.0), (1.0, 2.0)):
+    """Products of position and speed, and of position or speed with the command."""
+    for (left, right), a, b in product(
+        product((odd_power, even_power), (odd_power, even_power)), (1.0, 2.0), (1.0, 2.0)
+    ):
         yield Term(f"{left(of.x, 0)}*{right(of.v, 1)}", (a, b), (POWER, POWER), (0, 1))
-    for shape, start in product((odd, even), (1.0, 2.0)):
+    for shape, start in product((odd_power, even_power), (1.0, 2.0)):
         yield Term(f"{shape(of.x, 0)}*sign({of.v})", (start,), (POWER,), (0,))
         for of_force, name in product((of.f, f"abs({of.f})"), (of.x, of.v)):
             yield Term(f"{shape(name, 0)}*{of_force}", (start,), (POWER,), (0,))
@@ -108,7 +111,7 @@ def _hinges(of: Axis) -> Iterator[Term]:
         yield Term(f"maximum(abs({of.v}) - p0, 0)*sign({of.v})", (share * of.speed,), ((0.0, of.speed),))
 
 
-def _saturating(of: Axis) -> Iterator[Term]:
+def _saturations(of: Axis) -> Iterator[Term]:
     for (name, size), share in product(((of.v, of.speed), (of.x, of.travel)), (0.03, 0.1, 0.3, 1.0)):
         width = (share * size,), ((1e-3 * size, 10 * size),)
         yield Term(f"tanh({name}/p0)", *width)
@@ -119,8 +122,8 @@ def _saturating(of: Axis) -> Iterator[Term]:
         yield Term(f"tanh({of.f}/p0)", (share * of.force,), ((1e-3 * of.force, 10 * of.force),))
 
 
-def _singular(of: Axis) -> Iterator[Term]:
-    """About a place that the axis never reached; as it is, or without its value at zero, where the device rests."""
+def _poles(of: Axis) -> Iterator[Term]:
+    """Inverse powers of the distance to a position that the axis never reached, with or without their value at zero."""
     for share, power, side in product((1.15, 1.5, 2.5), (1.0, 2.0, 3.0), (of.x, f"(-{of.x})")):
         beyond = (1.02 * of.travel, 20 * of.travel)
         for shape in (f"(1/abs(p0 - {side})**p1 - 1/p0**p1)", f"1/abs(p0 - {side})**p1"):
@@ -144,8 +147,8 @@ def _memory(of: Axis, others: Sequence[Axis], seconds: float, rate_hz: float) ->
     yield Term(f"integral({of.x})")
 
 
-def _across(of: Axis, others: Sequence[Axis]) -> Iterator[Term]:
-    """What the motion or the command of another axis does here."""
+def _cross_axis(of: Axis, others: Sequence[Axis]) -> Iterator[Term]:
+    """Terms of another axis's motion or command."""
     x, v, f = of.x, of.v, of.f
     for k in others:
         shapes = (
@@ -163,15 +166,14 @@ def _across(of: Axis, others: Sequence[Axis]) -> Iterator[Term]:
         yield Term(f"sqrt({speed})*{v}")
 
 
-def _drifting(of: Axis, seconds: float) -> Iterator[Term]:
+def _drifts(of: Axis, seconds: float) -> Iterator[Term]:
     yield from (Term(f"{name}*t") for name in (of.x, of.v, of.f))
     yield Term("t")
 
 
-def periodic(columns: Columns, own: Axis, left: FloatArray, rate_hz: float) -> tuple[Term, ...]:
-    """Along the way or in time: of what is left of the force (n,) the strongest lines, alone or times the speed, the
-    place or the command; and long pitches, which hardly make a line. Two pitches at least were travelled: of fewer no
-    data tell a wave from a power."""
+def periodic_terms(columns: Columns, own: Axis, left: FloatArray, rate_hz: float) -> tuple[Term, ...]:
+    """Sines of the position or of time, at the strongest spectral lines of the missing force `left` (n,), alone or
+    times speed, position or command; and long pitches, which hardly make a line. At least one pitch is travelled."""
     x = columns[own.x]
     every = max(len(x) // 8000, 1)
     waves = np.arange(1.0, 40.0, 0.175) / own.travel

@@ -1,8 +1,8 @@
-"""What a law without a name must pass before it may be said: each check that fails is a sentence.
+"""Checks that a discovered law must pass before it is named; each check that fails gives a sentence.
 
-A law that fits is not yet a law: with so many shapes some fit anything. It is named only where stretches of another
-kind than those it was found in bear it out, where its numbers are the same in every stretch, where the same search in a
-shuffled force finds nothing, and where no law of other variables does as well.
+With so many formulas some fit anything. A law is named only where held-out stretches of another kind than those it was
+found in confirm it (extrapolation), where its numbers are the same in every stretch (stability), where the same search
+in a shuffled force finds nothing (negative control), and where no law of other variables fits as well.
 """
 
 import re
@@ -12,8 +12,8 @@ import numpy as np
 
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.discovery.as_effect import law_of_sum, laws_of
-from analysis.diagnosis.discovery.discover import Discovered
+from analysis.diagnosis.discovery.discover import Discovery
+from analysis.diagnosis.discovery.law_of_sum import law_of_sum, laws_of
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
@@ -36,33 +36,38 @@ _COUPLED = re.compile(r"p0\*v?[a-z]")
 """Linear in the motion of another axis; in its own the model is."""
 
 
-def failed(context: SearchContext, of: Discovered, rivals: Sequence[FittedCandidate]) -> tuple[str, ...]:
-    """Why the laws are candidates and no more; empty where they pass. rivals: the best of the catalogue, confirmed."""
-    return tuple(dict.fromkeys(_failed(context, of, rivals)))
+def reasons_against(context: SearchContext, of: Discovery, rivals: Sequence[FittedCandidate]) -> tuple[str, ...]:
+    """Why the laws are only candidates; empty where they pass. rivals: the best of the catalogue, with held-out
+    error."""
+    return tuple(dict.fromkeys(_reasons_against(context, of, rivals)))
 
 
-def _failed(context: SearchContext, of: Discovered, rivals: Sequence[FittedCandidate]) -> Iterator[str]:
+def _reasons_against(context: SearchContext, of: Discovery, rivals: Sequence[FittedCandidate]) -> Iterator[str]:
     if not held_out_kinds(context.whole.records):
         yield SAME_KIND
     for number, found in enumerate(of.rounds):
         first = found.sums[0]
         if first.spread > LAW_STABLE:
             yield f"its numbers differ by {100 * first.spread:.0f} % from stretch to stretch"
-        if 1 - found.taken > LAW_PLACEBO * (1 - found.placebo):
+        if 1 - found.explained_share > LAW_PLACEBO * (1 - found.placebo):
             yield (
-                f"it takes {100 * found.taken:.0f} % of the missing force, and the same search takes "
+                f"it takes {100 * found.explained_share:.0f} % of the missing force, and the same search takes "
                 f"{100 * found.placebo:.0f} % of one that is shuffled in time"
             )
-        yield from _alike(context, of, number)
+        yield from _equally_good_laws(context, of, number)
     if any(law is not None and _COUPLED.fullmatch(law.expression) for law in laws_of(of.found.after.fitted.hypothesis)):
         yield HALF_TAKEN
-    yield from _not_ahead(context, of.found.after, (of.found.retuned, "the re-tuned model"))
+    yield from _insignificant_gain(context, of.found.after, (of.found.retuned, "the re-tuned model"))
     for rival in rivals:
-        yield from _not_ahead(context, of.found.after, (rival, f"{noun_of(rival.newest)} alone or with what it needs"))
+        yield from _insignificant_gain(
+            context, of.found.after, (rival, f"{noun_of(rival.newest)} alone or with what it needs")
+        )
 
 
-def _not_ahead(context: SearchContext, law: FittedCandidate, rival: tuple[FittedCandidate, str]) -> Iterator[str]:
-    """On held-out data, by an interval from resampled stretches."""
+def _insignificant_gain(
+    context: SearchContext, law: FittedCandidate, rival: tuple[FittedCandidate, str]
+) -> Iterator[str]:
+    """Whether the gain on held-out data is not significant, by a bootstrap interval over stretches."""
     ahead = held_out_gain(context.whole, rival[0], law)
     if ahead is None:
         yield "too little was held out to confirm it"
@@ -70,9 +75,9 @@ def _not_ahead(context: SearchContext, law: FittedCandidate, rival: tuple[Fitted
         yield f"what it gains on held-out data over {rival[1]} is not larger than what varies between stretches"
 
 
-def _alike(context: SearchContext, of: Discovered, number: int) -> Iterator[str]:
-    """Laws of other variables that leave hardly more of what was fitted to, that what was kept for the test does not
-    part from it either, and that foretell other things."""
+def _equally_good_laws(context: SearchContext, of: Discovery, number: int) -> Iterator[str]:
+    """Laws of other variables that fit as well, that held-out data do not tell from it either, and that predict
+    something else."""
     found = of.rounds[number]
     best = found.fitted_candidates[0]
     close = [
@@ -87,14 +92,14 @@ def _alike(context: SearchContext, of: Discovered, number: int) -> Iterator[str]
         rival = context.confirmed(candidate)
         ahead = held_out_gain(context.whole, rival, law)
         parted = ahead is not None and ahead.low > 0
-        if not parted and not _say_the_same(of.found.retuned, law, rival):
+        if not parted and not _predict_the_same(of.found.retuned, law, rival):
             names = law_of_sum(each, context.measure.records[0].recording).variables
             yield f"a law of {' and '.join(names)} does as well"
 
 
-def _say_the_same(without: FittedCandidate, law: FittedCandidate, other: FittedCandidate) -> bool:
-    """Whether two laws foretell the same of all samples, the sealed ones included: then they are one law, written in
-    two ways, as a relaxation by place or by speed."""
+def _predict_the_same(without: FittedCandidate, law: FittedCandidate, other: FittedCandidate) -> bool:
+    """Whether two laws predict the same residuals in all samples, held-out ones included: then they are the same law
+    written in two ways, as a relaxation of position or of speed."""
     apart = added = 0.0
     left = without.fitted.residuals, law.fitted.residuals, other.fitted.residuals
     for base, of_law, of_other in zip(*left, strict=True):
@@ -104,8 +109,8 @@ def _say_the_same(without: FittedCandidate, law: FittedCandidate, other: FittedC
 
 
 def beats(law: FittedCandidate, rival: FittedCandidate) -> bool:
-    """Whether a law leaves so much less than a named effect, on sealed samples too, that the name is not believed. Both
-    confirmed."""
+    """Whether a law's excess error is so far below a named effect's that it replaces the name, on held-out samples too.
+    Both with held-out errors."""
     sealed, other = (float(np.mean(np.log(each.score.test))) for each in (law, rival))
     if np.isfinite(sealed) and sealed >= other:
         return False
@@ -113,14 +118,14 @@ def beats(law: FittedCandidate, rival: FittedCandidate) -> bool:
 
 
 def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
-    """What sealed stretches are that those are not which laws are found in; none where they are alike. A segment of
-    which the end alone is sealed is among both; rest is among neither."""
+    """In what the held-out stretches differ from those in which laws are found; empty where they are alike. A segment
+    of which only the end is held out counts as both; rest counts as neither."""
     found: list[tuple[str, tuple[int, ...], float]] = []
     sealed: list[tuple[str, tuple[int, ...], float]] = []
     for record in records:
         for segment in record.recording.segments:
             part = slice(segment.start, segment.stop)
-            told = _told(segment, record.command[part])
+            told = _describe_segment(segment, record.command[part])
             if not told[1]:
                 continue
             if record.test[part].any():
@@ -139,37 +144,37 @@ def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
     return tuple(words for true, words in said if true)
 
 
-def _told(segment: Segment, command: FloatArray) -> tuple[str, tuple[int, ...], float]:
+def _describe_segment(segment: Segment, command: FloatArray) -> tuple[str, tuple[int, ...], float]:
     driven = np.flatnonzero(np.abs(command).max(axis=0, initial=0.0) > 0)
     return segment.kind, tuple(driven.tolist()), float(np.abs(command).max(initial=0.0))
 
 
-def proved(context: SearchContext, found: Explanation, rivals: Sequence[FittedCandidate]) -> str:
-    """Where a named law was proved, how far it goes beside the best of the catalogue, and where it was never seen. A
-    sentence or two."""
+def proof_sentence(context: SearchContext, found: Explanation, rivals: Sequence[FittedCandidate]) -> str:
+    """One or two sentences: on what a named law was tested, its error beside that of the best of the catalogue, and the
+    range of motion beyond which it is unknown."""
     whole, after = context.whole, found.after
     laws = [law for law in laws_of(after.fitted.hypothesis) if law is not None]
     where = listed(held_out_kinds(whole.records))
-    said = f"The formula was tested on {where}, which nothing was fitted to: {_left(context, found, after)}"
-    closest = min((_remains(context, found, rival) for rival in rivals), default=None)
+    said = f"The formula was tested on {where}, which nothing was fitted to: {_error_sentence(context, found, after)}"
+    closest = min((_held_out_error_share(context, found, rival) for rival in rivals), default=None)
     if closest is not None:
         said += f", the best law of the catalogue {100 * closest:.3g} %"
-    visited = _visited(context, found, {name for law in laws for name in law.variables})
+    visited = _range_of_motion(context, found, {name for law in laws for name in law.variables})
     return f"{said}. What it says beyond {listed(visited)} is not known." if visited else f"{said}."
 
 
-def _left(context: SearchContext, found: Explanation, law: FittedCandidate) -> str:
-    return f"there it leaves {100 * _remains(context, found, law):.3g} % of the re-tuned model's error"
+def _error_sentence(context: SearchContext, found: Explanation, law: FittedCandidate) -> str:
+    return f"there it leaves {100 * _held_out_error_share(context, found, law):.3g} % of the re-tuned model's error"
 
 
-def _remains(context: SearchContext, found: Explanation, law: FittedCandidate) -> float:
-    """Share of the held-out error, rms, in the mean over the channels."""
+def _held_out_error_share(context: SearchContext, found: Explanation, law: FittedCandidate) -> float:
+    """Held-out rms error over the re-tuned model's, in the mean over the channels."""
     gain = held_out_gain(context.whole, found.retuned, law)
     return float("nan") if gain is None else float(np.sqrt(max(1 - gain.gain, 0.0)))
 
 
-def _visited(context: SearchContext, found: Explanation, names: set[str]) -> tuple[str, ...]:
-    """How far each signal went, test included; of the motion."""
+def _range_of_motion(context: SearchContext, found: Explanation, names: set[str]) -> tuple[str, ...]:
+    """The largest position and speed of each axis that the law uses, held-out samples included, as text."""
     measure, fitted = context.whole, found.after.fitted
     model, placed = context.tuning.tuned(fitted.deviations), fitted.hypothesis.placed()
     evidence = measure.evidence(model, placed, fitted.residuals)

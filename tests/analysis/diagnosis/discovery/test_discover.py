@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.discovery.as_effect import law_of_sum, laws_of
+from analysis.diagnosis.discovery.add_laws import add_laws, has_law
 from analysis.diagnosis.discovery.beam import best_sums
 from analysis.diagnosis.discovery.discover import discover
-from analysis.diagnosis.discovery.grammar import Term, axes_of, periodic, terms_of
-from analysis.diagnosis.discovery.join import has_law, with_laws
+from analysis.diagnosis.discovery.fit_sum import Sum
+from analysis.diagnosis.discovery.grammar import Term, axes_of, periodic_terms, terms_of
+from analysis.diagnosis.discovery.law_of_sum import law_of_sum, laws_of
+from analysis.diagnosis.discovery.matched_filter import views_of
 from analysis.diagnosis.discovery.proof import SAME_KIND
-from analysis.diagnosis.discovery.screen import products_of
-from analysis.diagnosis.discovery.snap import readable
-from analysis.diagnosis.discovery.sums import Sum
-from analysis.diagnosis.discovery.whitened import views_of
+from analysis.diagnosis.discovery.screen_terms import products_of
+from analysis.diagnosis.discovery.snap_exponents import simplify_powers
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.result.wording import summary_lines
@@ -90,7 +90,7 @@ def test_ten_times_the_noise_leaves_the_law(seed=6):
 
 def joined(recording):
     context, known = arena_of(recording)
-    return with_laws(Searched(context, known, judge(known)), quiet, always)
+    return add_laws(Searched(context, known, judge(known)), quiet, always)
 
 
 def test_a_proved_law_explains(seed=7):
@@ -121,12 +121,14 @@ def test_a_shuffled_force_holds_no_law(seed=9):
     )[0]
     seen = view.records[0]
     axis = axes_of(seen.columns, 1)
-    terms = terms_of(axis, 0, len(seen.left) / seen.rate_hz, seen.rate_hz)
+    terms = terms_of(axis, 0, len(seen.missing_force) / seen.rate_hz, seen.rate_hz)
     found = best_sums(
-        products_of(view), (*terms, *periodic(seen.columns, axis[0], seen.left[:, 0], seen.rate_hz)), always
+        products_of(view),
+        (*terms, *periodic_terms(seen.columns, axis[0], seen.missing_force[:, 0], seen.rate_hz)),
+        always,
     )
     best = found.sums[0]
-    assert best.crossed / best.without < LAW_PLACEBO * (1 - found.placebo)
+    assert best.cross_validated / best.without < LAW_PLACEBO * (1 - found.placebo)
     assert any("vx" not in each.variables for each in found.sums)  # the grammar without it was asked
 
 
@@ -151,7 +153,7 @@ def test_axes_are_called_as_the_recording_does():
     ],
 )
 def test_formulas_are_written_as_a_reader_would(written, read):
-    assert readable(written) == read
+    assert simplify_powers(written) == read
 
 
 def test_a_diagnosis_says_the_law(seed=10):

@@ -1,4 +1,4 @@
-"""A sum of terms along one axis, with its free numbers fitted to what a fit leaves: Gauss and Newton's steps.
+"""Fits the free numbers of a sum of terms to a fit's residual: Gauss-Newton with variable projection.
 
 Factors and the model's own numbers are solved for at each step, so that only what is not linear is searched (variable
 projection, Golub and Pereyra 1973).
@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.discovery.along import along
+from analysis.diagnosis.discovery.evaluate_shape import evaluate_shape
 from analysis.diagnosis.discovery.grammar import Term
-from analysis.diagnosis.discovery.screen import Products, Solved, extended, solved, tried
-from analysis.diagnosis.discovery.whitened import View
+from analysis.diagnosis.discovery.matched_filter import View
+from analysis.diagnosis.discovery.screen_terms import Products, Solution, add_columns, cross_validate_terms, solve
 from equalizer.signals.signal import FloatArray
 
 _MOVE = 1e-3
 _ROUNDS = 8
-_SETTLED = 1e-3
-"""Share of what is left, below which a step is the last."""
+_CONVERGED = 1e-3
+"""Relative decrease of the cost below which a step is the last."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,14 +27,14 @@ class Sum:
     terms: tuple[Term, ...]
     factors: tuple[float, ...]
     """SI"""
-    crossed: float
+    cross_validated: float
     """Held-out squares over the noise's, per sample: 1 = noise alone."""
     without: float
     """The same of the re-tuned model alone."""
     spread: float
     """Jackknife error of the first factor over the blocks, as a share of it."""
-    moved: tuple[float, ...]
-    """(t,): what it wants the model's own numbers to change by, in standard deviations."""
+    model_shift: tuple[float, ...]
+    """(t,): change of the model's own numbers that is fitted with it, in standard deviations."""
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -42,51 +42,52 @@ class Sum:
 
 
 def column_of(view: View, term: Term) -> FloatArray | None:
-    """(s,); None where it is no number somewhere."""
+    """(s,): the term's force through the matched filter; None where it is not finite."""
     parts = []
     for seen in view.records:
-        force = along(term.shape, term.numbers, seen.columns, seen.rate_hz)
+        force = evaluate_shape(term.shape, term.numbers, seen.columns, seen.rate_hz)
         if not np.isfinite(force).all():
             return None
         parts.append(seen.column(force, view.axis))
     return np.concatenate(parts)
 
 
-def fitted_sum(base: Products, terms: Sequence[Term]) -> Sum | None:
-    """base: of the model's numbers alone. None where no start is a number."""
+def fit_sum(base: Products, terms: Sequence[Term]) -> Sum | None:
+    """The sum with its numbers, factors and held-out errors. base: products of the model's numbers alone. None where
+    the terms are not finite at their starting numbers."""
     view = base.view
     at = _Point(tuple(terms), *_columns(view, terms))
     if at.columns is None:
         return None
-    best = _solved(base, at.columns)
+    best = _solve_columns(base, at.columns)
     for _ in range(_ROUNDS if any(term.numbers for term in terms) else 0):
-        better = _stepped(base, at, best)
+        better = _gauss_newton_step(base, at, best)
         if better is None:
             break
         gained = 1 - better[1].cost / best.cost
         at, best = better
-        if gained < _SETTLED:
+        if gained < _CONVERGED:
             break
     assert at.columns is not None
-    return _judged(base, at.terms, at.columns, best)
+    return _score_sum(base, at.terms, at.columns, best)
 
 
-def _judged(base: Products, terms: tuple[Term, ...], columns: Sequence[FloatArray], best: Solved) -> Sum:
+def _score_sum(base: Products, terms: tuple[Term, ...], columns: Sequence[FloatArray], best: Solution) -> Sum:
     view = base.view
-    whole = extended(base, columns[1:])
-    held = tried(whole, columns[0][None, :])
-    alone = tried(base, columns[0][None, :])
+    whole = add_columns(base, columns[1:])
+    held = cross_validate_terms(whole, columns[0][None, :])
+    alone = cross_validate_terms(base, columns[0][None, :])
     size = view.noise * len(view.residual)
     factors = held.factors[:, 0]
     spread = float(np.std(factors) * np.sqrt(len(factors) - 1) / max(abs(float(np.mean(factors))), 1e-300))
     return Sum(
         view.axis,
         terms,
-        tuple(best.weights[len(view.tuned) :].tolist()),
+        tuple(best.weights[len(view.parameter_columns) :].tolist()),
         float(held.with_it.sum()) / size,
         float(alone.without.sum()) / size,
         spread,
-        tuple(best.weights[: len(view.tuned) - 1].tolist()),
+        tuple(best.weights[: len(view.parameter_columns) - 1].tolist()),
     )
 
 
@@ -101,18 +102,18 @@ def _columns(view: View, terms: Sequence[Term]) -> tuple[tuple[FloatArray, ...] 
     return (None if any(column is None for column in found) else tuple(c for c in found if c is not None),)
 
 
-def _solved(base: Products, columns: Sequence[FloatArray]) -> Solved:
-    return solved(extended(base, columns))
+def _solve_columns(base: Products, columns: Sequence[FloatArray]) -> Solution:
+    return solve(add_columns(base, columns))
 
 
-def _stepped(base: Products, at: _Point, best: Solved) -> tuple[_Point, Solved] | None:
-    view, k = base.view, len(base.view.tuned)
+def _gauss_newton_step(base: Products, at: _Point, best: Solution) -> tuple[_Point, Solution] | None:
+    view, k = base.view, len(base.view.parameter_columns)
     assert at.columns is not None
     factors = best.weights[k:]
     moves, slopes = [], []
     for number, term in enumerate(at.terms):
         for place in range(len(term.numbers)):
-            column = column_of(view, _moved(term, place, _MOVE))
+            column = column_of(view, _move_number(term, place, _MOVE))
             if column is None:
                 return None
             slopes.append(factors[number] * (column - at.columns[number]) / _MOVE)
@@ -120,33 +121,34 @@ def _stepped(base: Products, at: _Point, best: Solved) -> tuple[_Point, Solved] 
     if not moves:
         return None
     sizes = np.array([max(float(np.linalg.norm(slope)), 1e-300) for slope in slopes])
-    joint = extended(base, [*at.columns, *(slope / size for slope, size in zip(slopes, sizes, strict=True))])
-    found = solved(_steadied(joint, len(slopes)))
+    joint = add_columns(base, [*at.columns, *(slope / size for slope, size in zip(slopes, sizes, strict=True))])
+    found = solve(_damp_slopes(joint, len(slopes)))
     step = np.clip(found.weights[-len(slopes) :] / sizes, -0.7, 0.7)
     for share in (1.0, 0.4, 0.15, 0.05):
         terms = at.terms
         for (number, place), move in zip(moves, step, strict=True):
-            moved = _moved(terms[number], place, share * float(move))
+            moved = _move_number(terms[number], place, share * float(move))
             terms = (*terms[:number], moved, *terms[number + 1 :])
         columns = _columns(view, terms)[0]
         if columns is None:
             continue
-        there = _solved(base, columns)
+        there = _solve_columns(base, columns)
         if there.cost < best.cost * (1 - 1e-6):
             return _Point(terms, columns), there
     return None
 
 
-def _steadied(joint: Products, count: int) -> Products:
-    """Slopes, of size 1, that hardly differ from other columns are not followed."""
+def _damp_slopes(joint: Products, count: int) -> Products:
+    """Levenberg damping of the slopes (of norm 1), so that those nearly equal to other columns are not followed."""
     squares = joint.squares.copy()
     places = np.arange(squares.shape[1] - count, squares.shape[1])
     squares[:, places, places] += 1e-4 / len(squares)
     return replace(joint, squares=squares)
 
 
-def _moved(term: Term, place: int, move: float) -> Term:
-    """Exponents and angles by so much, what is positive by such a share; within the bounds."""
+def _move_number(term: Term, place: int, move: float) -> Term:
+    """The term with one number moved within its bounds: exponents and angles by `move`, others by the factor
+    exp(move)."""
     numbers, (low, high) = list(term.numbers), term.bounds[place]
     here = numbers[place]
     plain = place in term.exponents or place in term.turns

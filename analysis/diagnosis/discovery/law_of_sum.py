@@ -1,10 +1,10 @@
-"""A sum of terms as a law that a simulation plays, and as a hypothesis that is fitted by output error."""
+"""Turns a sum of terms into a law that can be simulated, and a law into a hypothesis to fit by output error."""
 
 import re
 from collections.abc import Sequence
 
+from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import AXES
-from analysis.diagnosis.discovery.sums import Sum
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, claimed
 from equalizer.effects.discovered_law import Channels, axis_names, law_effect, law_values
 from equalizer.laws.law import Law
@@ -15,20 +15,20 @@ _SIGNAL = re.compile(rf"\b([vf]?)([{AXES}])\b")
 
 
 def law_of_sum(of: Sum, recording: Recording) -> Law:
-    """p0 is the first term's factor, then its numbers, then the next term's. The grammar calls the driven axes x, y, z
-    in their order; the law calls them as the recording does."""
+    """The sum as a law: p0 is the first term's factor, then its numbers, then the next term's. The grammar calls the
+    driven axes x, y, z in their order; the law calls them as the recording does."""
     names = axis_names(recording.command.channels)
     parts: list[str] = []
     numbers: list[float] = []
     for term, factor in zip(of.terms, of.factors, strict=True):
         first = len(numbers)
         numbers += [factor, *term.numbers]
-        parts.append(f"p{first}*{_numbered(term.shape, first + 1)}")
+        parts.append(f"p{first}*{_renumber(term.shape, first + 1)}")
     text = _SIGNAL.sub(lambda found: found[1] + names[AXES.index(found[2])], " + ".join(parts))
     return Law(text, tuple(numbers), (), "force", names[of.axis])
 
 
-def _numbered(shape: str, first: int) -> str:
+def _renumber(shape: str, first: int) -> str:
     return _NUMBER.sub(lambda found: f"p{int(found[1]) + first}", shape)
 
 
@@ -47,11 +47,11 @@ def laws_of(hypothesis: Hypothesis) -> tuple[Law | None, ...]:
     return tuple(
         None
         if claim.effect.law is None
-        else claim.effect.law.with_numbers(_in_order(hypothesis.of_claim(number)[0].values))
+        else claim.effect.law.with_numbers(_numbers_in_order(hypothesis.of_claim(number)[0].values))
         for number, claim in enumerate(hypothesis.claims)
     )
 
 
-def _in_order(values: object) -> Sequence[float]:
+def _numbers_in_order(values: object) -> Sequence[float]:
     assert isinstance(values, dict)
     return [values[f"p{place}"] for place in range(len(values))]

@@ -1,8 +1,8 @@
-"""A fit's residuals as seen by a force along one axis, whitened, with what re-tuning the model does to them.
+"""A matched filter of a fit's residuals for a force along one axis, and the effect of re-tuning on its output.
 
-A matched filter: of all channels only what such a force could have made is kept, scaled so that noise stays white and
-products of columns are those of the simulated responses. A column of force costs two Fourier transforms instead of a
-simulation. Where forces are compared, the filter is the band alone.
+Of all channels only what such a force could have caused is kept, scaled so that noise stays white and inner products of
+columns are those of the simulated responses. A column of force costs two Fourier transforms instead of a simulation.
+Where forces are compared, the filter is the band alone.
 """
 
 from collections.abc import Sequence
@@ -31,97 +31,106 @@ _SETTLING_S = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
-    """One record as a force along the driven axes would show in it."""
+class FilteredRecord:
+    """One record's matched filters for forces along the driven axes."""
 
     columns: Columns
-    left: FloatArray
-    """(n, m), N: what is missing, as a force."""
+    missing_force: FloatArray
+    """(n, m), N: the force that the model lacks."""
     rate_hz: float
     length: int
     """Of the transforms, samples."""
-    through: ComplexArray
-    """(lines, c, m): from a force to the residuals; as many lines as count."""
+    force_response: ComplexArray
+    """(lines, c, m): frequency response from a force to the residuals, up to the last line with command power."""
     strength: FloatArray
     """(lines, m)"""
-    kept: tuple[slice, ...]
-    """Blocks, in thinned samples."""
+    block_slices: tuple[slice, ...]
+    """Blocks, in decimated samples."""
 
-    def matched(self, residuals: FloatArray) -> FloatArray:
-        """(kept samples, m). residuals: (n, c)"""
-        spectrum = rfft(residuals, self.length, axis=0)[: len(self.through)]
-        found = np.einsum("lcm,lc->lm", np.conj(self.through), spectrum) / self.strength
-        return self._thinned(found)
+    def filter_residuals(self, residuals: FloatArray) -> FloatArray:
+        """(kept samples, m): residuals (n, c) through the matched filter of each axis."""
+        spectrum = rfft(residuals, self.length, axis=0)[: len(self.force_response)]
+        found = np.einsum("lcm,lc->lm", np.conj(self.force_response), spectrum) / self.strength
+        return self._select_blocks(found)
 
-    def forced(self, forces: FloatArray) -> FloatArray:
-        """(kept samples, m), as `matched` what they make of the residuals. forces: (n, m), N, as in `column`."""
+    def filter_forces(self, forces: FloatArray) -> FloatArray:
+        """(kept samples, m): the residuals that forces (n, m), N, cause, through the same filter. Each force acts as in
+        `column`."""
         mean = forces.copy()
         mean[:-1] = 0.5 * (forces[1:] + forces[:-1])
-        spectrum = rfft(mean, self.length, axis=0)[: len(self.through)]
-        seen = np.einsum("lcm,lm->lc", self.through, spectrum)
-        return self._thinned(np.einsum("lcm,lc->lm", np.conj(self.through), seen) / self.strength)
+        spectrum = rfft(mean, self.length, axis=0)[: len(self.force_response)]
+        seen = np.einsum("lcm,lm->lc", self.force_response, spectrum)
+        return self._select_blocks(np.einsum("lcm,lc->lm", np.conj(self.force_response), seen) / self.strength)
 
     def column(self, force: FloatArray, axis: int) -> FloatArray:
-        """(kept samples,). force: (n,), N, at each sample; it acts as the mean over the time that begins there."""
+        """(kept samples,): the filter's output for a force (n,), N, along one axis. Sampled at each sample, it acts as
+        the mean over the step that begins there."""
         mean = force.copy()
         mean[:-1] = 0.5 * (force[1:] + force[:-1])
-        spectrum = rfft(mean, self.length)[: len(self.through)] * self.strength[:, axis]
-        return self._thinned(spectrum[:, None])[:, 0]
+        spectrum = rfft(mean, self.length)[: len(self.force_response)] * self.strength[:, axis]
+        return self._select_blocks(spectrum[:, None])[:, 0]
 
-    def _thinned(self, spectrum: ComplexArray) -> FloatArray:
+    def _select_blocks(self, spectrum: ComplexArray) -> FloatArray:
         count = 2 * (len(spectrum) - 1)
         course = irfft(spectrum, count, axis=0) * np.sqrt(count / self.length)
-        return np.concatenate([course[part] for part in self.kept])
+        return np.concatenate([course[part] for part in self.block_slices])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """Along one axis."""
+    """The filtered residual along one axis, with what the model's own numbers would explain of it."""
 
     axis: int
-    records: tuple[Seen, ...]
+    records: tuple[FilteredRecord, ...]
     residual: FloatArray
-    """(s,), over all records and blocks,"""
-    tuned: FloatArray
+    """(s,), over all records and blocks."""
+    parameter_columns: FloatArray
     """(t + 1, s): what one standard deviation of each of the model's own numbers would explain of it, and a constant
-    force,"""
+    force."""
     pull: FloatArray
-    """(t + 1,): where the calibration wants them, from where they are."""
+    """(t + 1,): the calibration's values of these numbers less the present ones, in standard deviations."""
     edges: tuple[int, ...]
-    """of the blocks;"""
+    """Edges of the blocks."""
     noise: float
-    """mean square of what noise leaves of a sample."""
+    """Mean square of the noise in a sample."""
 
 
 def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
-    """One per driven axis; none where the measure cannot tell forces."""
+    """One view per driven axis."""
     model, placed = tuning.tuned(fitted.deviations), fitted.hypothesis.placed()
     evidence = measure.evidence(model, placed, fitted.residuals)
-    seen = tuple(_seen(measure, record, told) for record, told in zip(measure.records, evidence, strict=True))
-    residual = np.concatenate([each.matched(_known(left)) for each, left in zip(seen, fitted.residuals, strict=True)])
-    columns = np.array([_moved(measure, tuning, fitted, seen, number) for number in range(len(fitted.deviations))])
+    seen = tuple(_filter_record(measure, record, told) for record, told in zip(measure.records, evidence, strict=True))
+    residual = np.concatenate(
+        [each.filter_residuals(_zero_missing(left)) for each, left in zip(seen, fitted.residuals, strict=True)]
+    )
+    columns = np.array(
+        [_parameter_columns(measure, tuning, fitted, seen, number) for number in range(len(fitted.deviations))]
+    )
     edges = _edges(seen)
     pull = np.append(-fitted.deviations, 0.0)
     views = []
     for axis in range(model.inputs):
-        constant = np.concatenate([each.column(np.ones(len(each.left)), axis) for each in seen])
+        constant = np.concatenate([each.column(np.ones(len(each.missing_force)), axis) for each in seen])
         tuned = np.vstack([columns[:, :, axis].reshape(-1, len(residual)), constant])
         noise = _noise(measure, seen, axis)
         views.append(View(axis, seen, residual[:, axis], tuned, pull, edges, noise))
     return tuple(views)
 
 
-def _known(left: FloatArray) -> FloatArray:
+def _zero_missing(left: FloatArray) -> FloatArray:
     return np.where(np.isfinite(left), left, 0.0)
 
 
-def _moved(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, seen: Sequence[Seen], number: int) -> FloatArray:
-    """(s, m): of mass, damping and stiffness by the force along the measured motion, which is exact however far the
-    model is off; of modes by the model without the hypothesis."""
+def _parameter_columns(
+    measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, seen: Sequence[FilteredRecord], number: int
+) -> FloatArray:
+    """(s, m): effect of one standard deviation of one of the model's numbers. That of mass, damping and stiffness
+    follows from the force along the measured motion, exact however wrong the model is; that of modes from the model
+    without the hypothesis."""
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     if number < 3 * len(pairs):
-        return np.concatenate([each.forced(_resisting(each, tuning, pairs, number)) for each in seen])
+        return np.concatenate([each.filter_forces(_parameter_force(each, tuning, pairs, number)) for each in seen])
     base = measure.residuals(tuning.tuned(fitted.deviations), ())
     for move in (MOVED, -MOVED):
         there = fitted.deviations.copy()
@@ -131,41 +140,48 @@ def _moved(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, seen: Sequence
         except (MechanicalModelError, np.linalg.LinAlgError):
             continue
         change = [
-            each.matched(_known((before - after) / move)) for each, before, after in zip(seen, base, moved, strict=True)
+            each.filter_residuals(_zero_missing((before - after) / move))
+            for each, before, after in zip(seen, base, moved, strict=True)
         ]
         return np.concatenate(change)
-    return np.zeros((sum(part.stop - part.start for each in seen for part in each.kept), m))
+    return np.zeros((sum(part.stop - part.start for each in seen for part in each.block_slices), m))
 
 
-def _resisting(one: Seen, tuning: Tuning, pairs: Sequence[tuple[int, int]], number: int) -> FloatArray:
-    """(n, m), N, of one standard deviation of a mass, a damping or a stiffness of a pair of axes."""
+def _parameter_force(
+    record: FilteredRecord, tuning: Tuning, pairs: Sequence[tuple[int, int]], number: int
+) -> FloatArray:
+    """(n, m), N: force of one standard deviation of a mass, a damping or a stiffness of a pair of axes."""
     order, (i, j) = number // len(pairs), pairs[number % len(pairs)]
-    forces = np.zeros_like(one.left)
+    forces = np.zeros_like(record.missing_force)
     for axis, other in {(i, j), (j, i)}:
         name = AXES[other]
-        motion = (np.gradient(one.columns[f"v{name}"]) * one.rate_hz, one.columns[f"v{name}"], one.columns[name])
+        motion = (
+            np.gradient(record.columns[f"v{name}"]) * record.rate_hz,
+            record.columns[f"v{name}"],
+            record.columns[name],
+        )
         forces[:, axis] -= tuning.deviation[number] * motion[order]
     return forces
 
 
-def _seen(measure: ErrorMeasure, record: Observed, told: Evidence) -> Seen:
+def _filter_record(measure: ErrorMeasure, record: Observed, told: Evidence) -> FilteredRecord:
     rate_hz, n = told.sample_rate_hz, len(told.command)
     length = next_fast_len(n + int(_SETTLING_S * rate_hz), real=True)
     lines = rfftfreq(length, 1 / rate_hz)
     power = np.cumsum(np.sum(np.abs(rfft(told.command, length, axis=0)) ** 2, axis=1))
     last = int(1.1 * np.searchsorted(power, LAW_POWER_KEPT * power[-1])) + 8
     last = min(next_fast_len(last, real=True) + 1, len(lines))
-    through = _through(measure, told, lines[:last])
+    through = _force_response(measure, told, lines[:last])
     strength = np.sqrt(np.sum(np.abs(through) ** 2, axis=1))
     strength = np.maximum(strength, 1e-9 * strength.max(axis=0))
     share = 2 * (last - 1) / length
     # What a force does near the end is cut off there.
-    end = n - min(_settling(measure, told), n // 4)
+    end = n - min(_settling_samples(measure, told), n // 4)
     kept = tuple(slice(int(a * share), int(min(b, end) * share)) for a, b in _blocks(record) if a < end)
-    return Seen(columns_of(told), told.axis_force, rate_hz, length, through, strength, kept)
+    return FilteredRecord(columns_of(told), told.axis_force, rate_hz, length, through, strength, kept)
 
 
-def _through(measure: ErrorMeasure, told: Evidence, lines: FloatArray) -> ComplexArray:
+def _force_response(measure: ErrorMeasure, told: Evidence, lines: FloatArray) -> ComplexArray:
     if isinstance(measure, PredictedForce):
         m = told.command.shape[1]
         within = low_pass_gain(lines, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
@@ -175,8 +191,8 @@ def _through(measure: ErrorMeasure, told: Evidence, lines: FloatArray) -> Comple
     return np.asarray(np.concatenate([seen.response, seen.position], axis=1)[:, :c] / measure.unit[:, None])
 
 
-def _settling(measure: ErrorMeasure, told: Evidence) -> int:
-    """Samples, until what a force did is gone."""
+def _settling_samples(measure: ErrorMeasure, told: Evidence) -> int:
+    """Samples until the response to a force has decayed."""
     if isinstance(measure, PredictedForce):
         return 0
     slowest = float(np.abs(np.linalg.eigvals(linear_steps(told.model, 1 / told.sample_rate_hz).advance)).max())
@@ -194,7 +210,7 @@ def columns_of(told: Evidence) -> Columns:
 
 
 def _blocks(record: Observed) -> list[tuple[int, int]]:
-    """Segments, as far as they are not sealed; where there are few, equal parts."""
+    """Segments that are not held out; where there are few, equal parts."""
     used = record.fit | record.choose
     edges = [
         (segment.start, min(segment.stop, len(used)))
@@ -208,15 +224,15 @@ def _blocks(record: Observed) -> list[tuple[int, int]]:
     return list(pairwise(cuts))
 
 
-def _edges(seen: Sequence[Seen]) -> tuple[int, ...]:
-    sizes = [part.stop - part.start for each in seen for part in each.kept]
+def _edges(seen: Sequence[FilteredRecord]) -> tuple[int, ...]:
+    sizes = [part.stop - part.start for each in seen for part in each.block_slices]
     return tuple(np.cumsum([0, *sizes]).tolist())
 
 
-def _noise(measure: ErrorMeasure, seen: Sequence[Seen], axis: int) -> float:
+def _noise(measure: ErrorMeasure, seen: Sequence[FilteredRecord], axis: int) -> float:
     left = (measure.noise / measure.unit) ** 2
     shares = [
-        np.sum(np.abs(each.through[:, :, axis]) ** 2 * left[None, :], axis=1) / each.strength[:, axis] ** 2
+        np.sum(np.abs(each.force_response[:, :, axis]) ** 2 * left[None, :], axis=1) / each.strength[:, axis] ** 2
         for each in seen
     ]
     return float(np.mean(np.concatenate(shares)))

@@ -1,4 +1,4 @@
-"""Exponents that are simple numbers within their errors, written as such; and the formula as a reader writes it."""
+"""Rounds a law's exponents to whole or half numbers where their errors allow it, and simplifies the formula."""
 
 import re
 from dataclasses import replace
@@ -6,7 +6,7 @@ from functools import reduce
 
 import numpy as np
 
-from analysis.diagnosis.discovery.as_effect import channels_of, laws_of
+from analysis.diagnosis.discovery.law_of_sum import channels_of, laws_of
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, claimed, together
 from analysis.diagnosis.errors.intervals import standard_errors
 from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit
@@ -17,11 +17,12 @@ from equalizer.laws.law import Law
 from equalizer.laws.roles import roles
 
 
-def snapped(context: SearchContext, fitted: Fitted) -> Fitted:
-    """Fitted anew with its exponents held at simple numbers; the same where none is near one."""
+def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
+    """The fit repeated with exponents held at whole or half numbers; unchanged where none is near one, or where that
+    costs too much."""
     known = sensitivity_at(context, fitted.deviations, fitted.hypothesis)
     errors = standard_errors(context.measure, context.tuning, fitted, known)[len(context.tuning.names) :]
-    plain = _plain(context, fitted.hypothesis, errors)
+    plain = _with_simple_exponents(context, fitted.hypothesis, errors)
     if plain is None:
         return fitted
     start = evaluated(context.measure, context.tuning, fitted.deviations, plain)
@@ -29,8 +30,8 @@ def snapped(context: SearchContext, fitted: Fitted) -> Fitted:
     return found if found.cost <= fitted.cost * (1 + LAW_SNAP) else fitted
 
 
-def _plain(context: SearchContext, whole: Hypothesis, errors: np.ndarray) -> Hypothesis | None:
-    """errors: (numbers,), of the point."""
+def _with_simple_exponents(context: SearchContext, whole: Hypothesis, errors: np.ndarray) -> Hypothesis | None:
+    """The hypothesis with simple exponents; None where none changes. errors: (numbers,), standard errors."""
     recording = context.measure.records[0].recording
     parts, changed, first = [], False, 0
     for number, (claim, law) in enumerate(zip(whole.claims, laws_of(whole), strict=True)):
@@ -38,9 +39,9 @@ def _plain(context: SearchContext, whole: Hypothesis, errors: np.ndarray) -> Hyp
         own = errors[first : first + count]
         first += count
         if law is None:
-            parts.append(_of_claim(whole, number))
+            parts.append(_single_claim(whole, number))
             continue
-        simple = _simple(law, own)
+        simple = _simplify_exponents(law, own)
         changed |= simple is not law
         effect = law_effect(simple, channels_of(recording))
         parts.append(claimed(Claim(effect, "one", claim.sites), [law_values(simple)]))
@@ -49,13 +50,13 @@ def _plain(context: SearchContext, whole: Hypothesis, errors: np.ndarray) -> Hyp
     return reduce(together, parts)
 
 
-def _of_claim(whole: Hypothesis, number: int) -> Hypothesis:
+def _single_claim(whole: Hypothesis, number: int) -> Hypothesis:
     claim = whole.claims[number]
     return claimed(claim, [dict(placed.values) for placed in whole.of_claim(number)])
 
 
-def _simple(law: Law, errors: np.ndarray) -> Law:
-    """With exponents near a half or a whole number written into the formula. errors: of exponents as logarithms."""
+def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:
+    """The law with exponents near a half or a whole number written into the formula. errors: of their logarithms."""
     found = law
     for place, role in sorted(roles(law.tree).items(), reverse=True):
         value = law.numbers[place]
@@ -64,20 +65,20 @@ def _simple(law: Law, errors: np.ndarray) -> Law:
         near = max(round(2 * value) / 2, 0.5)
         reach = 1.96 * INTERVAL_FACTOR * float(errors[place]) * value
         if abs(value - near) <= max(reach, LAW_SNAP * value):
-            found = held(found, place, near)
-    return replace(found, expression=readable(found.expression))
+            found = substitute_number(found, place, near)
+    return replace(found, expression=simplify_powers(found.expression))
 
 
-def held(law: Law, place: int, value: float) -> Law:
-    """With a free number as part of the formula."""
+def substitute_number(law: Law, place: int, value: float) -> Law:
+    """The law with free number `place` replaced by a value in the formula."""
     text = re.sub(rf"\bp{place}\b", f"{value:g}", law.expression)
     renamed = re.sub(r"\bp(\d+)\b", lambda found: f"p{int(found[1]) - (int(found[1]) > place)}", text)
     numbers = (*law.numbers[:place], *law.numbers[place + 1 :])
     return replace(law, expression=renamed, numbers=numbers, units=())
 
 
-def readable(expression: str) -> str:
-    """Signed powers of whole exponents without absolute values."""
+def simplify_powers(expression: str) -> str:
+    """The formula with powers of whole exponents written without absolute values where these are not needed."""
 
     def signed(found: re.Match[str]) -> str:
         name, power = found[1], int(found[2])

@@ -1,4 +1,4 @@
-"""A shape along samples, whole arrays at a time where nothing is remembered: a search evaluates hundreds."""
+"""Evaluates a term's formula along the samples of a recording, vectorised where it has no memory."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -18,8 +18,8 @@ _WHOLE: Mapping[str, Callable[..., FloatArray]] = {
 }  # fmt: skip
 
 
-def along(shape: str, numbers: Sequence[float], columns: Columns, rate_hz: float) -> FloatArray:
-    """(n,). Outside its domain NaN or inf."""
+def evaluate_shape(shape: str, numbers: Sequence[float], columns: Columns, rate_hz: float) -> FloatArray:
+    """(n,): the formula `shape` with these numbers; NaN or inf outside its domain. columns: signals by name, (n,)."""
     tree = parse_formula(shape, template=True)[0]
     with np.errstate(all="ignore"):
         if any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(tree)):

@@ -1,4 +1,4 @@
-"""A finished search, with a law that has no name where no catalogue name stands, or where the law is far better."""
+"""Adds a discovered law to a finished search where no catalogue effect is named, or where the law is far better."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
-from analysis.diagnosis.discovery.as_effect import laws_of
-from analysis.diagnosis.discovery.discover import Discovered, discover
-from analysis.diagnosis.discovery.proof import beats, failed, proved
+from analysis.diagnosis.discovery.discover import Discovery, discover
+from analysis.diagnosis.discovery.law_of_sum import laws_of
+from analysis.diagnosis.discovery.proof import beats, proof_sentence, reasons_against
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import identified
 from analysis.diagnosis.search.search import Searched, Unconfirmed
@@ -18,17 +18,17 @@ from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, SEALED_ALONE_E
 from analysis.diagnosis.types import Progress, TimeBudget
 
 
-def with_laws(searched: Searched, progress: Progress, time_left: TimeBudget) -> Searched:
-    """The same search where it needs no law, or where none is found that is better than what it names; a law that is
-    not proved is a candidate, and no more."""
+def add_laws(searched: Searched, progress: Progress, time_left: TimeBudget) -> Searched:
+    """The search with the discovered law in place of its names. Unchanged where it needs no law or none is better; a
+    law that fails a check of `proof` is added as an unconfirmed candidate only."""
     context, known = searched.context, searched.found
-    if not _wanted(searched) or not time_left():
+    if not _needs_law(searched) or not time_left():
         return searched
     found = discover(context, known, progress, time_left)
-    if found is None or not _gains(found.found):
+    if found is None or not _improves_held_out(found.found):
         return searched
     rivals = _rivals(context, known)
-    reasons = failed(context, found, rivals)
+    reasons = reasons_against(context, found, rivals)
     if not all(beats(found.found.after, rival) for rival in rivals):
         reasons = (*reasons, "what the catalogue names leaves hardly more")
     checked = identified(context, found.found, time_left)
@@ -42,17 +42,17 @@ def with_laws(searched: Searched, progress: Progress, time_left: TimeBudget) -> 
         reasons = (*reasons, "what was kept for the test does not bear it out")
     if reasons:
         return replace(searched, unconfirmed=(*searched.unconfirmed, *_candidates(context, found, reasons)))
-    remarks = (proved(context, checked, rivals),)
+    remarks = (proof_sentence(context, checked, rivals),)
     return Searched(context, checked, judged, remarks, None if checked.errors is None else checked.errors[1])
 
 
 def has_law(searched: Searched) -> bool:
-    """Whether a law without a name is named."""
+    """Whether a discovered law is among what is named."""
     laws = laws_of(searched.found.after.fitted.hypothesis)
     return searched.judged.named and any(law is not None for law in laws)
 
 
-def _wanted(searched: Searched) -> bool:
+def _needs_law(searched: Searched) -> bool:
     """Only whole simulations prove a law; where noise alone is left, there is none to be found."""
     context, found = searched.context, searched.found
     if (
@@ -67,26 +67,26 @@ def _wanted(searched: Searched) -> bool:
     return found.statistic is None and (left.score.worst_channel > NOISE_ALONE or sealed > SEALED_ALONE_ERROR)
 
 
-def _gains(found: Explanation) -> bool:
-    """On sealed samples, in the mean over the channels."""
-    before, after = _sealed(found.retuned), _sealed(found.after)
+def _improves_held_out(found: Explanation) -> bool:
+    """Whether the held-out error falls, in the mean of its logarithm over the channels."""
+    before, after = _held_out_log_error(found.retuned), _held_out_log_error(found.after)
     return not (np.isfinite(before) and after >= before)
 
 
-def _sealed(of: FittedCandidate) -> float:
+def _held_out_log_error(of: FittedCandidate) -> float:
     return float(np.mean(np.log(of.score.test)))
 
 
 def _rivals(context: SearchContext, known: Explanation) -> list[FittedCandidate]:
-    """What is named, and the best of the first round of the catalogue."""
+    """What the catalogue offers instead: what is named, and the best candidate of the first round."""
     rivals = [known.after] if known.steps else []
     if known.rounds and known.rounds[0]:
         rivals.append(context.confirmed(known.rounds[0][0]))
     return rivals
 
 
-def _candidates(context: SearchContext, found: Discovered, reasons: tuple[str, ...]) -> Iterator[Unconfirmed]:
-    """Each law, with the gain of all."""
+def _candidates(context: SearchContext, found: Discovery, reasons: tuple[str, ...]) -> Iterator[Unconfirmed]:
+    """Each law as an unconfirmed candidate, with the gain of all laws together."""
     gain = held_out_gain(context.whole, found.found.retuned, found.found.after)
     hypothesis = found.found.after.fitted.hypothesis
     for number, law in enumerate(laws_of(hypothesis)):

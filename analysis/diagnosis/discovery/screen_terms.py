@@ -1,4 +1,4 @@
-"""Which term explains most of what a fit leaves, beside what re-tuning does: held out, block by block.
+"""Screens terms by cross-validation: how much of a fit's residual each explains beside what re-tuning explains.
 
 Each block's error is that of numbers fitted to all others (Stone, J. R. Stat. Soc. B 36:111, 1974), with the model's
 own numbers pulled to their calibration. Terms are tried together, as products of columns.
@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from analysis.diagnosis.discovery.whitened import View
+from analysis.diagnosis.discovery.matched_filter import View
 from equalizer.signals.signal import FloatArray
 
 _DEPENDENT = 1e-6
@@ -19,17 +19,17 @@ _DEPENDENT = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Products:
-    """Of base columns, block by block; (blocks, …) each."""
+    """Normal equations of the base columns, block by block."""
 
     view: View
     held: tuple[FloatArray, ...]
-    """(s,) each: columns of terms that are held to be there, after the model's numbers and a constant."""
+    """(s,) each: columns of terms already taken, after the model's numbers and a constant."""
     squares: FloatArray
     """(blocks, k, k)"""
-    seen: FloatArray
-    """(blocks, k): with the residual,"""
+    with_residual: FloatArray
+    """(blocks, k): products with the residual."""
     power: FloatArray
-    """(blocks,): and the residual's own."""
+    """(blocks,): sum of squares of the residual."""
 
     @property
     def blocks(self) -> list[slice]:
@@ -38,25 +38,28 @@ class Products:
 
     @property
     def calibration(self) -> FloatArray:
-        """(k,): how strongly each is pulled back."""
+        """(k,): prior precision of each column's weight."""
         sizes = self.squares.sum(axis=0).diagonal()
         pulled = np.where(sizes > 0, 1e-10 * sizes, 1.0)
         pulled[: len(self.view.pull) - 1] = 1.0
         return pulled
 
     def cross(self, columns: FloatArray) -> FloatArray:
-        """(blocks, k, terms). columns: (terms, s)"""
+        """(blocks, k, terms): products of the base columns with others. columns: (terms, s)"""
         found = []
         for part in self.blocks:
             those = columns[:, part].T
-            rows = [self.view.tuned[:, part] @ those, *((column[None, part] @ those) for column in self.held)]
+            rows = [
+                self.view.parameter_columns[:, part] @ those,
+                *((column[None, part] @ those) for column in self.held),
+            ]
             found.append(np.vstack(rows))
         return np.array(found)
 
 
 def products_of(view: View) -> Products:
-    """Of the model's numbers and a constant."""
-    base, edges = view.tuned, list(pairwise(view.edges))
+    """Products of the model's numbers and a constant."""
+    base, edges = view.parameter_columns, list(pairwise(view.edges))
     return Products(
         view,
         (),
@@ -66,8 +69,8 @@ def products_of(view: View) -> Products:
     )
 
 
-def extended(base: Products, columns: Sequence[FloatArray]) -> Products:
-    """With terms that are held to be there, too."""
+def add_columns(base: Products, columns: Sequence[FloatArray]) -> Products:
+    """The products with the columns of more terms. columns: (s,) each"""
     if not len(columns):
         return base
     more, view = np.array(columns), base.view
@@ -77,21 +80,21 @@ def extended(base: Products, columns: Sequence[FloatArray]) -> Products:
     squares = np.concatenate(
         [np.concatenate([base.squares, cross.transpose(0, 2, 1)], axis=2), np.concatenate([cross, own], axis=2)], axis=1
     )
-    return Products(view, (*base.held, *columns), squares, np.hstack([base.seen, seen]), base.power)
+    return Products(view, (*base.held, *columns), squares, np.hstack([base.with_residual, seen]), base.power)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tried:
+class TermErrors:
     without: FloatArray
-    """(blocks,): held-out squares of the base alone,"""
+    """(blocks,): held-out squares of the base alone."""
     with_it: FloatArray
-    """(blocks, terms): and with each term."""
+    """(blocks, terms): held-out squares with each term."""
     factors: FloatArray
-    """(blocks, terms): of the term, fitted to the other blocks."""
+    """(blocks, terms): each term's factor, fitted to the other blocks."""
 
 
-def tried(of: Products, columns: FloatArray) -> Tried:
-    """columns: (terms, s)"""
+def cross_validate_terms(of: Products, columns: FloatArray) -> TermErrors:
+    """Held-out squares with each term alone beside the base, by leaving each block out. columns: (terms, s)"""
     parts = of.blocks
     cross = of.cross(columns)
     own = np.array([np.einsum("ks,ks->k", columns[:, part], columns[:, part]) for part in parts])
@@ -102,7 +105,7 @@ def tried(of: Products, columns: FloatArray) -> Tried:
     without, with_it, factors = [], [], []
     for number in range(len(parts)):
         squares = of.squares.sum(axis=0) - of.squares[number] + np.diag(pulled)
-        pull = of.seen.sum(axis=0) - of.seen[number] + wanted
+        pull = of.with_residual.sum(axis=0) - of.with_residual[number] + wanted
         other = cross.sum(axis=0) - cross[number]
         solved = np.linalg.solve(squares, np.column_stack([pull, other]))
         alone, along = solved[:, 0], solved[:, 1:]
@@ -112,38 +115,40 @@ def tried(of: Products, columns: FloatArray) -> Tried:
         gained = seen.sum(axis=0) - seen[number] - other.T @ alone
         factor = np.where(free, gained / np.where(free, left, 1.0), 0.0)
         weights = alone[:, None] - along * factor
-        without.append(_squares(of, number, alone[:, None])[0])
+        without.append(_held_out_squares(of, number, alone[:, None])[0])
         with_it.append(
-            _squares(of, number, weights)
+            _held_out_squares(of, number, weights)
             - 2 * factor * seen[number]
             + 2 * factor * np.einsum("kt,kt->t", weights, cross[number])
             + factor**2 * own[number]
         )
         factors.append(factor)
-    return Tried(np.array(without), np.array(with_it), np.array(factors))
+    return TermErrors(np.array(without), np.array(with_it), np.array(factors))
 
 
-def _squares(of: Products, number: int, weights: FloatArray) -> FloatArray:
+def _held_out_squares(of: Products, number: int, weights: FloatArray) -> FloatArray:
     """(terms,). weights: (k, terms)"""
     return np.asarray(
-        of.power[number] - 2 * of.seen[number] @ weights + np.einsum("kt,kt->t", weights, of.squares[number] @ weights)
+        of.power[number]
+        - 2 * of.with_residual[number] @ weights
+        + np.einsum("kt,kt->t", weights, of.squares[number] @ weights)
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solved:
+class Solution:
     weights: FloatArray
     """(k,)"""
     cost: float
-    """Squares that are left, and those of the calibration."""
+    """Residual sum of squares plus the prior's penalty."""
 
 
-def solved(of: Products) -> Solved:
-    """All blocks together."""
-    pulled, squares, seen = of.calibration, of.squares.sum(axis=0), of.seen.sum(axis=0)
+def solve(of: Products) -> Solution:
+    """Weights and cost of the base columns, fitted to all blocks together."""
+    pulled, squares, seen = of.calibration, of.squares.sum(axis=0), of.with_residual.sum(axis=0)
     wanted = np.zeros(len(pulled))
     wanted[: len(of.view.pull)] = pulled[: len(of.view.pull)] * of.view.pull
     weights = np.linalg.solve(squares + np.diag(pulled), seen + wanted)
     own = weights[: len(of.view.pull)] - of.view.pull
     left = float(of.power.sum() - 2 * seen @ weights + weights @ squares @ weights)
-    return Solved(weights, left + float(pulled[: len(own)] @ own**2))
+    return Solution(weights, left + float(pulled[: len(own)] @ own**2))
