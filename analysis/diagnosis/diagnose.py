@@ -135,7 +135,7 @@ def _beside_clean(
     progress("comparing with the clean recordings", 0.1)
     contrast = contrast_of(recordings, settings.clean, frozenset(settings.without), settings.time_left)
     if not settings.fitted and contrast.left_open:
-        unweighed = _by_given_model(recordings, model, settings, contrast.weighed, map_, progress)
+        unweighed = _by_given_model(recordings, model, settings, contrast.tested_effects, map_, progress)
         if unweighed is not None:
             return unweighed
     context = _search_context(recordings[0], look, settings, map_)

@@ -1,5 +1,5 @@
-"""Which fault sets recordings apart from clean ones of the same device, weighed against what sets stretches of either
-apart from each other: no real device is the same twice."""
+"""Tests each fault: the error that undoing it removes between faulty and clean recordings, against the error that it
+removes between stretches of one set, for no real device repeats itself exactly."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -8,22 +8,29 @@ import numpy as np
 
 from analysis.diagnosis.balance.judged_law import LEVEL, bootstrap_draws
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
-from analysis.diagnosis.contrast.bases import bases_of, left_of, moves_alike, turning_of
+from analysis.diagnosis.contrast.bases import bases_of, is_rotational, move_alike, unexplained_share
 from analysis.diagnosis.contrast.fault import Fault, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
-from analysis.diagnosis.contrast.ledger import Fit, Pair, fitted, foretold, left_by_own, left_with
+from analysis.diagnosis.contrast.joint_products import (
+    Fit,
+    Pair,
+    error_of_own_fit,
+    error_with_sizes,
+    fit_sizes,
+    held_out_error,
+)
 from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
-from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, turned_sensor
-from analysis.diagnosis.contrast.stream import FOLDS, Stream, changed_rows, stream_of
-from analysis.diagnosis.contrast.taken import Taken, taken_of
-from analysis.diagnosis.contrast.watch_base import watch_bases
+from analysis.diagnosis.contrast.part import Part, split_into_parts
+from analysis.diagnosis.contrast.sensor_base import sensor_bases
+from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
+from analysis.diagnosis.contrast.stream import FOLDS, Stream, rows_with_fault_undone, stream_of
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 ALL = tuple(range(FOLDS))
 APART = ((0, 1), (2, 3), (4, 5), (0, 1, 2))
-"""Blocks of a set that are weighed against its others: thirds and halves, like two recordings."""
+"""Blocks of a set that are compared with its other blocks, thirds and halves, as if they were two recordings."""
 FURTHER = 1.6
 """Times the largest excess between stretches of one set that both together must have. By hand: of seven public devices
 in order, halves of which a fault was named had up to 1.53 times; faults that were named right, 1.75 and more."""
@@ -35,8 +42,8 @@ one of them. What is less is not worth a name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Weighed:
-    """A fault, as a reader would judge it."""
+class JudgedFault:
+    """A fault with its values, its gain, and what it gains between stretches of one set."""
 
     fault: Fault
     values: dict[str, float]
@@ -44,45 +51,45 @@ class Weighed:
     """Standard error of each value, from leaving out blocks of either set: what varies among the clean stretches makes
     a number as uncertain as what varies among the others."""
     errors: FloatArray
-    """(blocks,): what is left with it undone: of the faulty set, then of the clean one."""
+    """(blocks,): sums of squares with it undone, of the faulty set, then of the clean one."""
     gain: float
-    """Error with it over error without it, less 1;"""
+    """Error with the fault over the error with it undone, less 1."""
     usual: float
-    """the largest that it has between stretches of one set;"""
+    """The largest gain between stretches of one set, less the typical one."""
     typical: float
-    """their median: so much it gains by what it is, whatever the stretches."""
+    """The median gain between stretches of one set: what it gains by its flexibility alone."""
     share: float
-    """Of what sets the two sets apart, beyond what each leaves by a base of its own."""
+    """Share of the excess error that it explains: that of both sets together over that of a base of each set's own."""
     held_out: float
-    """What is left of the faulty set, each block by numbers fitted to all others."""
+    """Cross-validated sum of squares of the faulty set."""
     gain_low: float
-    """Lower end of the gain beyond the typical one, from resampled blocks."""
+    """Lower confidence bound of the gain beyond the typical one, by bootstrap over blocks."""
     apart: float
-    """The largest excess between stretches of one set, in the faulty one with the fault undone; see `Compared`."""
+    """The largest excess between stretches of one set, in the faulty one with the fault undone; see `Comparison`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Compared:
-    weighed: tuple[Weighed, ...]
-    """The best first;"""
+class Comparison:
+    faults: tuple[JudgedFault, ...]
+    """The best first."""
     plain: FloatArray
-    """(blocks,): what is left with nothing undone, as `Weighed.errors`."""
+    """(blocks,): sums of squares with nothing undone, as `JudgedFault.errors`."""
     samples: int
-    """What would be left where each set had a base of its own,"""
+    """Number of samples: the sum of squares where each set has a base of its own, for errors are white with rms 1."""
     faulty_samples: int
-    """and what of the faulty set."""
+    """The same of the faulty set."""
     held_out: float
-    """As `Weighed.held_out`, with nothing undone."""
+    """As `JudgedFault.held_out`, with nothing undone."""
     faulty_share: float
-    """rms of the own error of the faulty set, over the rms of what is told."""
+    """Rms error of the faulty set by a base of its own, over the rms of what is predicted."""
     usual: float
-    """The largest excess between stretches of one set; see `excess`;"""
+    """The largest `excess` between stretches of one set."""
     usual_clean: float
-    """and of the clean one alone."""
+    """The same of the clean set alone."""
     by_force: bool
     step_s: float
     complete: bool
-    """All faults were weighed: the time did not run out before."""
+    """All faults were tested before the time ran out."""
 
     @property
     def excess(self) -> float:
@@ -90,41 +97,42 @@ class Compared:
 
     @property
     def differ(self) -> bool:
-        """By more than stretches of one set do."""
+        """Whether the two sets differ by more than stretches of one set do."""
         return self.excess > max(AS_ONE, FURTHER * self.usual)
 
-    def differ_but_for(self, fault: Weighed) -> bool:
-        """By more than stretches of one set would without the fault: what comes and goes sets them apart, too."""
+    def differ_but_for(self, fault: JudgedFault) -> bool:
+        """The same with the fault undone in the faulty set: one that comes and goes sets its stretches apart, too."""
         return self.excess > max(AS_ONE, FURTHER * max(self.usual_clean, fault.apart))
 
 
-def compared(
+def compare(
     recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
-) -> Compared | None:
-    """None where there is too little, nothing holds, or one set hardly moves beside the other."""
-    sides = taken_of(clean), taken_of(recordings)
-    if not all(sides) or not moves_alike(*sides):
+) -> Comparison | None:
+    """The faulty recordings against the clean ones. None where there is too little data, no base fits, or one set
+    hardly moves beside the other."""
+    sides = split_into_parts(clean), split_into_parts(recordings)
+    if not all(sides) or not move_alike(*sides):
         return None
     try:
-        streams, faults, by_force = _streams(*sides)
-        found = _weigh(streams, [fault for fault in faults if fault.effect not in without], time_left)
+        streams, faults, by_force = _set_up(*sides)
+        found = _judge_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
     except (np.linalg.LinAlgError, ValueError):
         return None
     base = streams[0].base
     step_s = 1 / base.rate_hz if isinstance(base, ForceBase) else base.step / sides[0][0].rate_hz
-    return replace(found, faulty_share=min(left_of(base, sides[1]), 1.0), by_force=by_force, step_s=step_s)
+    return replace(found, faulty_share=min(unexplained_share(base, sides[1]), 1.0), by_force=by_force, step_s=step_s)
 
 
-def _streams(clean: tuple[Taken, ...], faulty: tuple[Taken, ...]) -> tuple[list[Stream], list[Fault], bool]:
+def _set_up(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> tuple[list[Stream], list[Fault], bool]:
     recording = clean[0].recording
     bases, motions = bases_of(clean, faulty)
     by_force = isinstance(bases[0], ForceBase)
     timed = bool(motions) and np.isfinite(motions[0].band_hz)
     band_hz, step = (motions[0].band_hz, motions[0].step) if motions else (np.inf, 1)
     table = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=False)}
-    streams = [stream_of(base, clean, faulty) for base in (*bases, *watch_bases(clean, band_hz, step))]
+    streams = [stream_of(base, clean, faulty) for base in (*bases, *sensor_bases(clean, band_hz, step))]
     faults: list[Fault] = []
-    turns = turning_of(recording)
+    turns = is_rotational(recording)
     for axis, name in enumerate(recording.command.channels):
         if timed:
             faults += mechanism_faults(axis, name, motions, lambda part: table[id(part.recording)], turns)
@@ -135,14 +143,14 @@ def _streams(clean: tuple[Taken, ...], faulty: tuple[Taken, ...]) -> tuple[list[
     if len(recording.response.channels) > 1:
         faults += faults_of_all((*clean, *faulty))
     if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"}:
-        faults.append(turned_sensor())
+        faults.append(sensor_misalignment())
     return streams, faults, by_force
 
 
-def _weigh(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Compared:
+def _judge_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Comparison:
     clean = [stream.grams(stream.clean, []).blocks for stream in streams]
     bare = [Pair(stream.grams(stream.other, []), ALL, tuple(own)) for stream, own in zip(streams, clean, strict=True)]
-    plain = fitted(bare, None)
+    plain = fit_sizes(bare, None)
     own = sum(stream.other.count for stream in streams)
     samples = own + sum(stream.clean.count for stream in streams)
     best: list[tuple[Fit, Fault, Variant, list[Pair]]] = []
@@ -153,29 +161,34 @@ def _weigh(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBu
         tried = []
         for variant in fault.variants:
             pairs = [
-                Pair(stream.grams(stream.other, changed_rows(stream, stream.other, fault, variant)), ALL, tuple(own))
+                Pair(
+                    stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, fault, variant)),
+                    ALL,
+                    tuple(own),
+                )
                 for stream, own in zip(streams, clean, strict=True)
             ]
             if all(pair.with_it.sound for pair in pairs):
-                tried.append((fitted(pairs, variant), fault, variant, pairs))
+                tried.append((fit_sizes(pairs, variant), fault, variant, pairs))
         if tried:
             best.append(min(tried, key=lambda each: each[0].error))
     else:
         complete = True
     best.sort(key=lambda each: each[0].error)
     weighed = sorted(
-        (_weighed(streams, found, plain, samples) for found in best), key=lambda each: float(each.errors.sum())
+        (_judge_fault(streams, found, plain, samples) for found in best), key=lambda each: float(each.errors.sum())
     )
-    held = sum(foretold(kept, np.zeros(0), block) for block, kept in enumerate(_apart(bare)))
-    usual = [max(_excesses(each)) for each in (clean, [pair.with_it.blocks for pair in bare])]
-    return Compared(tuple(weighed), plain.errors, samples, own, held, 0.0, max(usual), usual[0], True, 0.0, complete)
+    held = sum(held_out_error(kept, np.zeros(0), block) for block, kept in enumerate(_leave_out_blocks(bare)))
+    usual = [max(_excesses_within_a_set(each)) for each in (clean, [pair.with_it.blocks for pair in bare])]
+    return Comparison(tuple(weighed), plain.errors, samples, own, held, 0.0, max(usual), usual[0], True, 0.0, complete)
 
 
-def _excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
-    """Of stretches of one set described together over each by itself. sides: per stream, products (blocks, k, k)."""
+def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
+    """Error of stretches of one set with a common base over that with a base each, less 1. sides: per stream, products
+    (blocks, k, k)."""
 
     def error(blocks: Sequence[int]) -> float:
-        return sum(left_by_own(side[list(blocks)].sum(axis=0)) for side in sides)
+        return sum(error_of_own_fit(side[list(blocks)].sum(axis=0)) for side in sides)
 
     together = error(ALL)
     for at in APART:
@@ -183,60 +196,68 @@ def _excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
         yield together / max(apart, 1e-300) - 1
 
 
-def _weighed(
+def _judge_fault(
     streams: Sequence[Stream], found: tuple[Fit, Fault, Variant, list[Pair]], plain: Fit, samples: int
-) -> Weighed:
+) -> JudgedFault:
     fit, fault, variant, pairs = found
     values = variant.values(fit.sizes)
-    apart = _apart(pairs)
-    fits = [fitted(kept, variant) for kept in apart]
-    sides = [[variant.values(fit.sizes) for fit in fits], _by_clean(pairs, variant)]
-    held = sum(foretold(kept, each.sizes, block) for block, (kept, each) in enumerate(zip(apart, fits, strict=True)))
-    spread = {name: float(np.sqrt(sum(_jackknifed([other[name] for other in side]) for side in sides)))
+    apart = _leave_out_blocks(pairs)
+    fits = [fit_sizes(kept, variant) for kept in apart]
+    sides = [[variant.values(fit.sizes) for fit in fits], _values_without_clean_blocks(pairs, variant)]
+    held = sum(
+        held_out_error(kept, each.sizes, block) for block, (kept, each) in enumerate(zip(apart, fits, strict=True))
+    )
+    spread = {name: float(np.sqrt(sum(_jackknife_variance([other[name] for other in side]) for side in sides)))
               for name in values}  # fmt: skip
-    gains = list(_usual(streams, fault, variant, fit.sizes)) if plain.error > (1 + LEAST) * fit.error else [0.0]
+    gains = (
+        list(_gains_within_a_set(streams, fault, variant, fit.sizes))
+        if plain.error > (1 + LEAST) * fit.error
+        else [0.0]
+    )
     typical = max(float(np.median(gains)), 0.0)
     errors = fit.errors * (1 + typical)
     drawn = bootstrap_draws(len(errors))
     beyond = plain.errors[drawn].sum(axis=1) / np.maximum(errors[drawn].sum(axis=1), 1e-300) - 1
     left, room = float(errors.sum()), plain.error - samples
-    return Weighed(
+    return JudgedFault(
         fault, values, spread, errors, plain.error / max(left, 1e-300) - 1, max([0.0, *gains]) - typical, typical,
         (plain.error - left) / room if room > 0 else 0.0, held, float(np.quantile(beyond, LEVEL)),
-        max(_excesses([pair.with_it.undone(fit.sizes) for pair in pairs])),
+        max(_excesses_within_a_set([pair.with_it.undo_sizes(fit.sizes) for pair in pairs])),
     )  # fmt: skip
 
 
-def _by_clean(pairs: Sequence[Pair], variant: Variant) -> list[dict[str, float]]:
-    """The values, without each block of the clean set."""
+def _values_without_clean_blocks(pairs: Sequence[Pair], variant: Variant) -> list[dict[str, float]]:
+    """The fault's values, with each block of the clean set left out in turn."""
     kept = [
         [replace(pair, without=(*pair.without[:block], *pair.without[block + 1 :])) for pair in pairs] for block in ALL
     ]
-    return [variant.values(fitted(each, variant).sizes) for each in kept]
+    return [variant.values(fit_sizes(each, variant).sizes) for each in kept]
 
 
-def _jackknifed(values: Sequence[float]) -> float:
-    """Variance of a number from those without each block."""
+def _jackknife_variance(values: Sequence[float]) -> float:
+    """Jackknife variance of a number, from its values with each block left out."""
     return float((len(values) - 1) * np.var(values))
 
 
-def _apart(pairs: Sequence[Pair]) -> list[list[Pair]]:
-    """Without each block of the faulty set."""
+def _leave_out_blocks(pairs: Sequence[Pair]) -> list[list[Pair]]:
+    """The pairs with each block of the faulty set left out in turn."""
     return [[replace(pair, at=tuple(other for other in ALL if other != block)) for pair in pairs] for block in ALL]
 
 
-def _usual(streams: Sequence[Stream], fault: Fault, variant: Variant, sizes: FloatArray) -> Iterator[float]:
-    """The gains by the fault between stretches of one set: of the clean one, from none of it to a size of a stretch's
-    own; of the faulty one, from the size of all. There it is undone everywhere first: what a base cannot describe would
-    gain in any stretch."""
+def _gains_within_a_set(
+    streams: Sequence[Stream], fault: Fault, variant: Variant, sizes: FloatArray
+) -> Iterator[float]:
+    """The fault's gains between stretches of one set (negative control): in the clean set from size zero to a size of
+    the stretch's own; in the faulty set from the common size, which is undone everywhere first, for what a base cannot
+    describe would gain in any stretch."""
     for clean in (True,) if fault.varies else (True, False):
         common = np.zeros_like(sizes) if clean else sizes
         sides = [stream.clean if clean else stream.other for stream in streams]
         both = [
-            stream.grams(side, changed_rows(stream, side, fault, variant))
+            stream.grams(side, rows_with_fault_undone(stream, side, fault, variant))
             for stream, side in zip(streams, sides, strict=True)
         ]
         for at in APART:
             rest = [block for block in ALL if block not in at]
-            pairs = [Pair(grams, at, tuple(grams.undone(common)[rest])) for grams in both]
-            yield left_with(pairs, common) / max(fitted(pairs, variant).error, 1e-300) - 1
+            pairs = [Pair(grams, at, tuple(grams.undo_sizes(common)[rest])) for grams in both]
+            yield error_with_sizes(pairs, common) / max(fit_sizes(pairs, variant).error, 1e-300) - 1

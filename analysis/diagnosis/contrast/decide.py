@@ -1,4 +1,4 @@
-"""What may be said of a comparison with clean recordings: a name, a class of names, or candidates alone."""
+"""Decides what a comparison with clean recordings names: a fault, a class of faults, or candidates only."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from analysis.diagnosis.balance.judged_law import DRAWS, LEVEL, bootstrap_draws
-from analysis.diagnosis.contrast.compare import LEAST, Compared, Weighed
+from analysis.diagnosis.contrast.compare import LEAST, Comparison, JudgedFault
 from analysis.diagnosis.contrast.stream import FOLDS
 
 BEYOND = 5.0
@@ -23,9 +23,9 @@ ALMOST = 0.1
 WORSE = 0.25
 """or of what the fault leaves: where a gain is large, a tenth of it is many times that. By hand."""
 MOST_ALIKE = 4
-"""Faults of a class; more of them tell nothing."""
+"""Faults of a class at most; a larger class says nothing."""
 BOUND = float(stdtrit(FOLDS - 1, 0.975))
-"""Standard errors, from so few blocks, of a 95 % interval: within it, a number may be none."""
+"""Half width of a 95 % interval in standard errors (Student's t for so few blocks): within it, a number may be none."""
 SAME = {
     "transport_delay": ("logger_offset",),
     "logger_offset": ("transport_delay",),
@@ -35,27 +35,27 @@ SAME = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Decided:
-    named: Weighed | None
+class Decision:
+    named: JudgedFault | None
     alike: tuple[str, ...]
-    """Effects that do as well in its place."""
+    """Effects that fit as well in its place."""
     probability: float
     """Share of resampled blocks in which none of them leaves less."""
-    others: tuple[tuple[Weighed, str], ...]
+    others: tuple[tuple[JudgedFault, str], ...]
     """Candidates, and why they are not named; the best first."""
 
 
-def decide(found: Compared, responses: int) -> Decided:
-    """responses: how many channels there are."""
-    reasons = [(law, _why_not(law, found.differ_but_for(law))) for law in found.weighed]
+def decide(found: Comparison, responses: int) -> Decision:
+    """The fault or class that is named, and the candidates. responses: number of response channels."""
+    reasons = [(law, _why_not(law, found.differ_but_for(law))) for law in found.faults]
     sure = [law for law, why in reasons if why == ""]
     others = tuple((law, why) for law, why in reasons if law.gain > 0 and why)
     if not sure:
-        return Decided(None, (), 0.0, others)
-    best = _plainest(sure, found)
+        return Decision(None, (), 0.0, others)
+    best = _choose_plainest(sure, found)
     rivals = [law for law in sure if law is not best]
     told_apart_from = [rival for rival in rivals if not _refines(rival, best)]
-    alike = tuple(rival for rival in told_apart_from if _alike(best, rival, found))
+    alike = tuple(rival for rival in told_apart_from if _is_inseparable(best, rival, found))
     same = SAME.get(best.fault.effect, ()) if responses == 1 or best.fault.effect == "force_offset" else ()
     names = tuple(name for name in dict.fromkeys((*(rival.fault.effect for rival in alike), *same))
                   if name != best.fault.effect)  # fmt: skip
@@ -69,26 +69,26 @@ def decide(found: Compared, responses: int) -> Decided:
         why_not = f"these data cannot tell whether it is on {best.fault.axis} or on {', '.join(elsewhere)}"
     behind = tuple((rival, "another explains more of what sets these recordings apart") for rival in rivals)
     if why_not:
-        return Decided(None, (), 0.0, ((best, why_not), *behind, *others))
+        return Decision(None, (), 0.0, ((best, why_not), *behind, *others))
     left = tuple(item for item in behind if item[0] not in alike)
-    return Decided(best, names, _first(best, told_apart_from), (*left, *others))
+    return Decision(best, names, _probability_of_best(best, told_apart_from), (*left, *others))
 
 
-def _refines(other: Weighed, best: Weighed) -> bool:
-    """Whether it holds the best as a special case, and so always leaves less."""
+def _refines(other: JudgedFault, best: JudgedFault) -> bool:
+    """Whether `other` holds `best` as a special case, so that it always fits better."""
     return best.fault.effect in other.fault.simpler and best.fault.axis == other.fault.axis
 
 
-def _plainest(sure: Sequence[Weighed], found: Compared) -> Weighed:
-    """The one that leaves least; of those that these data cannot tell from it, one that it holds as a special case."""
+def _choose_plainest(sure: Sequence[JudgedFault], found: Comparison) -> JudgedFault:
+    """The fault with the least error, or a special case of it that these data cannot tell from it."""
     best = min(sure, key=lambda each: float(each.errors.sum()))
     for law in sure:
-        if _refines(best, law) and _alike(best, law, found):
+        if _refines(best, law) and _is_inseparable(best, law, found):
             return law
     return best
 
 
-def _why_not(weighed: Weighed, differ: bool) -> str:
+def _why_not(weighed: JudgedFault, differ: bool) -> str:
     """differ: whether the sets do by more than stretches of one. Where they do not, a fault must gain in all blocks
     alike."""
     if weighed.gain < LEAST or weighed.gain_low <= 0:
@@ -99,17 +99,17 @@ def _why_not(weighed: Weighed, differ: bool) -> str:
     if weighed.gain <= BEYOND * weighed.usual:
         return f"it gains {weighed.usual:.2g} between stretches of one kind, too, and {weighed.gain:.2g} here"
     main = next(iter(weighed.values))
-    if abs(_distance(weighed, main)) <= BOUND * weighed.spread[main]:
+    if abs(_distance_from_none(weighed, main)) <= BOUND * weighed.spread[main]:
         return "the interval of its number holds none"
     return ""
 
 
-def _distance(weighed: Weighed, name: str) -> float:
-    """From a number that is no fault."""
+def _distance_from_none(weighed: JudgedFault, name: str) -> float:
+    """Distance of a number from its value without a fault: 1 for a gain, else 0."""
     return weighed.values[name] - (1.0 if name == "gain" else 0.0)
 
 
-def _alike(best: Weighed, other: Weighed, found: Compared) -> bool:
+def _is_inseparable(best: JudgedFault, other: JudgedFault, found: Comparison) -> bool:
     behind = other.errors - best.errors
     drawn = bootstrap_draws(len(behind))
     left = float(best.errors.sum())
@@ -117,7 +117,7 @@ def _alike(best: Weighed, other: Weighed, found: Compared) -> bool:
     return bool(behind.sum() <= least or np.quantile(behind[drawn].sum(axis=1), LEVEL) <= 0)
 
 
-def _first(best: Weighed, rivals: Sequence[Weighed]) -> float:
+def _probability_of_best(best: JudgedFault, rivals: Sequence[JudgedFault]) -> float:
     drawn = bootstrap_draws(len(best.errors))
     first = np.ones(DRAWS, dtype=np.bool_)
     for other in rivals:

@@ -5,42 +5,42 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.contrast.taken import Taken
+from analysis.diagnosis.contrast.part import Part
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.signal import FloatArray
 
-Undo = Callable[[Taken], Taken]
+Undo = Callable[[Part], Part]
 
 
-Told = Callable[[FloatArray, float], FloatArray]
-"""Of columns (n, k) that tell a command, at a rate."""
+ColumnChange = Callable[[FloatArray, float], FloatArray]
+"""Maps columns (n, k) that predict a command, at a rate in Hz, to those that predict the faulty command."""
 
 
 Unit = Callable[[int], float]
-"""Of every how many samples are kept."""
+"""Maps a decimation step to a scale factor."""
 Numbers = Callable[[FloatArray], dict[str, float]]
 
 
 EVERY = -1
-"""Site of a fault that all channels have."""
+"""Site number of a fault of all channels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variant:
-    """A fault with its nonlinear numbers. Its size multiplies the change that each step of undoing makes."""
+    """A fault with its nonlinear numbers fixed. Its sizes multiply the changes that the functions in `undo` make."""
 
     undo: tuple[Undo, ...]
-    """One per size, each with a size of 1."""
+    """One per size, each undoing a fault of size 1."""
     values: Numbers
     """Numbers of the fault from its sizes (steps,)."""
     least: float = -np.inf
     most: float = np.inf
-    """Of each size: about 1 where undoing is not linear in it."""
+    """Bounds of each size: about 1 where undoing is not linear in the size."""
     unit: Unit = lambda step: 1.0
-    """What is told of a faulty sensor changes by this factor: else a gain that makes every error small would win."""
-    told: Told | None = None
-    """What the recorded command would be told to be, where that is known from what is told without the fault. Undoing
-    a gain or a lag of the command instead would make errors small that are no errors of the fault's."""
+    """Factor by which the errors of a faulty sensor are scaled: else a gain that makes every error small would win."""
+    column_change: ColumnChange | None = None
+    """How the predicted command changes with the fault, where that is known. Undoing a gain or a lag in the recorded
+    command instead would make errors smaller that the fault did not cause."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,9 +54,9 @@ class Fault:
     simpler: tuple[str, ...] = ()
     """Faults that it holds as special cases."""
     varies: bool = False
-    """In the course of a recording: stretches of a faulty one differ by it, too."""
+    """It changes in the course of a recording, so that stretches of a faulty one differ by it, too."""
 
 
-def sized(name: str, of_one: float = 1.0) -> Numbers:
-    """A number in proportion to the only size."""
+def proportional_number(name: str, of_one: float = 1.0) -> Numbers:
+    """A fault's number in proportion to its only size. of_one: the number at size 1."""
     return lambda sizes: {name: of_one * float(sizes[0])}

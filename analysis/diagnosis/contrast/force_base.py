@@ -1,5 +1,5 @@
-"""What the device in order is, by forces: along each axis, mass, damping, stiffness and the laws that its own clean
-recordings ask for. Nothing of it is named: it is what a fault stands out from."""
+"""Base model by force balance: along each axis mass, damping, stiffness and the laws that the clean recordings need.
+None of these is named; they describe the device without faults."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from analysis.diagnosis.balance.law import Law, scales_of
 from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
 from analysis.diagnosis.balance.motion import Motion, band_pass, motions_of
 from analysis.diagnosis.balance.regression import Regression, keep_laws, regression_of
-from analysis.diagnosis.contrast.taken import Taken
+from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
@@ -21,7 +21,7 @@ WORTH = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceBase:
-    """One axis. Rows are the force, then the columns of what the device is known to need."""
+    """One axis. Rows are the force, then the columns that predict it."""
 
     axis: int
     laws: tuple[Law, ...]
@@ -32,15 +32,15 @@ class ForceBase:
     lowest_hz: float = 0.0
     """Where the band begins, see `Motion`."""
 
-    def rows(self, parts: Sequence[Taken], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
-        """Per part (kept, 1 + columns). like: rows of parts with the same motion."""
+    def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
+        """Per part (kept, 1 + columns). like: rows of parts with the same motion, whose columns are reused."""
         if like is not None:
-            told = (
+            commands = (
                 band_pass(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz) for part in parts
             )
             step = round(parts[0].rate_hz / self.rate_hz)
-            return tuple(np.hstack([target[::step], old[:, 1:]]) for target, old in zip(told, like, strict=True))
-        motions = motions_of([part.observed() for part in parts], self.band_hz)
+            return tuple(np.hstack([target[::step], old[:, 1:]]) for target, old in zip(commands, like, strict=True))
+        motions = motions_of([part.to_observed() for part in parts], self.band_hz)
         targets = [motion.decimate(motion.force[:, [self.axis]]) for motion in motions]
         plain = regression_of(motions, self.axis, (), self.turns)
         found = []
@@ -49,19 +49,21 @@ class ForceBase:
             found.append(np.hstack([target, base, *more]))
         return tuple(found)
 
-    def valid_samples(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
+    def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         return tuple(
             motion.valid_samples(part.known)
-            for motion, part in zip(motions_of([part.observed() for part in parts], self.band_hz), parts, strict=True)
+            for motion, part in zip(
+                motions_of([part.to_observed() for part in parts], self.band_hz), parts, strict=True
+            )
         )
 
 
 def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceBase:
-    """motions: of the clean recordings, all to be fitted to."""
+    """The base of one axis with its laws selected. motions: of the clean recordings, all samples fitted to."""
     scales = [scales_of(motions, channel, rotational) for channel in range(len(motions[0].channels))]
     turns = any(scale.turns for scale in scales)
     regression = regression_of(motions, axis, list(laws_of(motions, rotational)), turns)
-    left = regression.remainder(regression.columns_of(_grown(regression)))
+    left = regression.remainder(regression.columns_of(_select_laws(regression)))
     more = [
         cogging_law(channel, pitch, scale)
         for channel, scale in enumerate(scales)
@@ -71,7 +73,7 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
         regression = regression_of(motions, axis, (*regression.laws, *more), turns)
     return ForceBase(
         axis,
-        keep_laws(regression, _grown(regression)).laws,
+        keep_laws(regression, _select_laws(regression)).laws,
         motions[0].band_hz,
         turns,
         motions[0].rate_hz / motions[0].step,
@@ -79,8 +81,8 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
     )
 
 
-def _grown(regression: Regression) -> tuple[int, ...]:
-    """Law after law, as long as the folds gain by it."""
+def _select_laws(regression: Regression) -> tuple[int, ...]:
+    """Forward selection of laws, as long as the cross-validated error falls by `WORTH`."""
     laws: tuple[int, ...] = ()
     left = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
     while len(laws) < MOST_LAWS:

@@ -1,4 +1,4 @@
-"""Faults of a mechanism: forces along the measured motion that came in beside what the device needs."""
+"""Faults of a mechanism: forces along the measured motion that act beside what the device needs."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -8,22 +8,22 @@ import numpy as np
 from analysis.diagnosis.balance.friction_laws import SHARP
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.contrast.fault import Fault, Numbers, Undo, Variant, sized
-from analysis.diagnosis.contrast.taken import Taken
+from analysis.diagnosis.contrast.fault import Fault, Numbers, Undo, Variant, proportional_number
+from analysis.diagnosis.contrast.part import Part
 from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 Shape = Callable[[Motion], FloatArray]
-"""(n,) of a part's motion: a force of size 1."""
-Along = Callable[[Taken], Motion]
+"""Maps a part's motion to the force (n,) of a fault of size 1."""
+Along = Callable[[Part], Motion]
 WIDER = (1.0, 3.0, 8.0, 20.0)
-"""Of the sharpest turn of dry friction."""
+"""Widths of the smoothed sign of dry friction, over the sharpest."""
 GIVES = tuple(np.geomspace(0.003, 0.3, 7).tolist())
-"""Of the way that was covered: where it slides."""
+"""Presliding distances, over the travel."""
 RIPPLES = tuple(np.arange(2.0, 40.0, 0.35).tolist())
-"""Of a ripple on that way: nearer than it takes to tell two of them apart."""
+"""Periods of a cogging force within the travel: closer than what tells two of them apart."""
 STOPS = tuple(np.arange(0.05, 0.5, 0.05).tolist())
-"""Of the way, from its middle."""
+"""Distances of an end stop from the middle of the travel, over the travel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,18 +42,18 @@ class _Axis:
         return Fault(effect, "mechanism", self.name, self.number, tuple(variants), simpler)
 
     def plain(self, effect: str, shape: Shape, number: str, least: float = 0.0) -> Fault:
-        return self.fault(effect, [Variant((self.of(shape),), sized(number), least=least)])
+        return self.fault(effect, [Variant((self.of(shape),), proportional_number(number), least=least)])
 
     def of(self, shape: Shape) -> Undo:
-        def undo(taken: Taken) -> Taken:
-            command = taken.command.copy()
-            command[:, self.number] -= shape(self.along(taken))
-            return replace(taken, command=command)
+        def undo(part: Part) -> Part:
+            command = part.command.copy()
+            command[:, self.number] -= shape(self.along(part))
+            return replace(part, command=command)
 
         return undo
 
     def q(self, motion: Motion) -> FloatArray:
-        """From the middle of the way."""
+        """(n,): position from the middle of the travel."""
         return np.asarray(motion.position[:, self.channel] - self.middle)
 
     def v(self, motion: Motion) -> FloatArray:
@@ -63,7 +63,7 @@ class _Axis:
 def mechanism_faults(
     number: int, name: str, motions: Sequence[Motion], along: Along, rotational: bool
 ) -> Iterator[Fault]:
-    """motions: of all that is compared, which the grids span."""
+    """All faults of the mechanism along axis `number`. motions: of all compared parts, which the grids span."""
     channel = min(number, len(motions[0].channels) - 1)
     position = np.concatenate([motion.position[:, channel] for motion in motions])
     velocity = np.concatenate([motion.velocity[:, channel] for motion in motions])
@@ -76,18 +76,22 @@ def mechanism_faults(
     yield axis.plain("quadratic_damping", lambda m: axis.v(m) * np.abs(axis.v(m)), "coefficient")
     yield axis.plain("added_stiffness", axis.q, "stiffness", least=-np.inf)
     yield axis.plain("hardening_stiffness", lambda m: axis.q(m) ** 3, "k3", least=-np.inf)
-    yield axis.fault("coulomb_friction", [_rubbing(axis, wide * sharp) for wide in WIDER])
-    yield axis.fault("asymmetric_friction", [_one_sided(axis, wide * sharp) for wide in WIDER], ("coulomb_friction",))
-    yield axis.fault("presliding_hysteresis", [_giving(axis, give * width) for give in GIVES], ("coulomb_friction",))
-    yield axis.fault("cogging", [_ripple(axis, way / count) for count in RIPPLES])
+    yield axis.fault("coulomb_friction", [_coulomb_friction(axis, wide * sharp) for wide in WIDER])
+    yield axis.fault(
+        "asymmetric_friction", [_asymmetric_friction(axis, wide * sharp) for wide in WIDER], ("coulomb_friction",)
+    )
+    yield axis.fault(
+        "presliding_hysteresis", [_presliding(axis, give * width) for give in GIVES], ("coulomb_friction",)
+    )
+    yield axis.fault("cogging", [_cogging(axis, way / count) for count in RIPPLES])
     yield axis.fault("end_stop", [stop for share in STOPS for stop in _stops(axis, share * width)])
 
 
-def _rubbing(axis: _Axis, wide: float) -> Variant:
-    return Variant((axis.of(lambda m: smooth_sign(axis.v(m), wide)),), sized("level"), least=0.0)
+def _coulomb_friction(axis: _Axis, wide: float) -> Variant:
+    return Variant((axis.of(lambda m: smooth_sign(axis.v(m), wide)),), proportional_number("level"), least=0.0)
 
 
-def _one_sided(axis: _Axis, wide: float) -> Variant:
+def _asymmetric_friction(axis: _Axis, wide: float) -> Variant:
     undo = (
         axis.of(lambda m: np.maximum(smooth_sign(axis.v(m), wide), 0.0)),
         axis.of(lambda m: np.minimum(smooth_sign(axis.v(m), wide), 0.0)),
@@ -95,12 +99,12 @@ def _one_sided(axis: _Axis, wide: float) -> Variant:
     return Variant(undo, lambda s: {"level_positive": float(s[0]), "level_negative": float(s[1])}, least=0.0)
 
 
-def _giving(axis: _Axis, give: float) -> Variant:
+def _presliding(axis: _Axis, give: float) -> Variant:
     numbers: Numbers = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / give}  # noqa: E731
     return Variant((axis.of(lambda m: bristle_bend(m.position[:, axis.channel], give)),), numbers, least=0.0)
 
 
-def _ripple(axis: _Axis, pitch: float) -> Variant:
+def _cogging(axis: _Axis, pitch: float) -> Variant:
     undo = (
         axis.of(lambda m: np.sin(2 * np.pi * m.position[:, axis.channel] / pitch)),
         axis.of(lambda m: np.cos(2 * np.pi * m.position[:, axis.channel] / pitch)),
@@ -112,7 +116,7 @@ def _ripple(axis: _Axis, pitch: float) -> Variant:
 
 
 def _stops(axis: _Axis, reach: float) -> Iterator[Variant]:
-    """At both ends, and at either."""
+    """End stops at both ends, and at either."""
     both = axis.of(lambda m: np.sign(axis.q(m)) * np.maximum(np.abs(axis.q(m)) - reach, 0.0))
     yield Variant((both,), lambda s: {"position": axis.middle + reach, "stiffness": float(s[0])}, least=0.0)
     for side in (1.0, -1.0):

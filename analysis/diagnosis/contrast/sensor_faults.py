@@ -1,4 +1,4 @@
-"""Faults of a sensor: what it would have read without them."""
+"""Faults of a sensor, each as the change of the readings that undoes it."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -6,9 +6,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from analysis.diagnosis.contrast.actuator_faults import AROUND, BEGUN, GRID, at_times, late_times, later, middle_hz
-from analysis.diagnosis.contrast.fault import EVERY, Fault, Numbers, Undo, Variant, sized
-from analysis.diagnosis.contrast.taken import Taken
+from analysis.diagnosis.contrast.actuator_faults import (
+    AROUND,
+    BEGUN,
+    GRID,
+    delays_to_try,
+    median_frequency_hz,
+    resample,
+    shift_samples,
+)
+from analysis.diagnosis.contrast.fault import EVERY, Fault, Numbers, Undo, Variant, proportional_number
+from analysis.diagnosis.contrast.part import Part
 from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
@@ -18,15 +26,15 @@ WIDELY = (0.5, 1.6)
 """As AROUND, of faults that act nearly in proportion to their size."""
 GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)
 SHIFTS = (0.03, 0.1, 0.3, 0.7, 1.2)
-"""Of the channel's rms."""
+"""Offsets and drifts, over the channel's rms."""
 BENT = (0.02, 0.06, 0.15, 0.3)
-"""Share of its largest reading by which that is off."""
+"""Nonlinearity errors at the largest reading, as a share of it."""
 PLAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 """As SHIFTS, of a gap before the sensor."""
 TURNED = 0.05
-"""Of a gap, by which a reading goes back that turns round."""
+"""Share of a gap by which a reading must go back to count as a reversal."""
 FASTEST = 0.05
-"""No clock is further off."""
+"""Relative rate error of a clock at most."""
 IN_UNITS = ("sensor_offset", "sensor_drift")
 """Faults that only channels of one unit can have alike."""
 
@@ -44,32 +52,32 @@ class _Channel:
         return Fault(effect, "sensor", self.name, site, tuple(variants), simpler)
 
     def of(self, read: Read) -> Undo:
-        def undo(taken: Taken) -> Taken:
-            response = taken.response.copy()
+        def undo(part: Part) -> Part:
+            response = part.response.copy()
             for number in self.numbers:
-                response[:, number] = read(response[:, number], taken.rate_hz)
-            return replace(taken, response=response)
+                response[:, number] = read(response[:, number], part.rate_hz)
+            return replace(part, response=response)
 
         return undo
 
 
-def sensor_faults(number: int, name: str, parts: Sequence[Taken]) -> Iterator[Fault]:
-    """parts: of all that is compared, which the grids span."""
+def sensor_faults(number: int, name: str, parts: Sequence[Part]) -> Iterator[Fault]:
+    """All faults of response channel `number`. parts: all compared ones, which the grids span."""
     whole = np.concatenate([part.response[:, number] for part in parts])
     channel = _Channel((number,), name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
     longest = max(parts, key=lambda part: len(part.response))
-    yield from _shared(channel, longest, longest.response[:, number])
+    yield from _common_faults(channel, longest, longest.response[:, number])
     shares = [side * share for share in BENT for side in (1.0, -1.0)]
-    yield channel.fault("sensor_nonlinearity", [_bent(channel, share, 3, "cubic") for share in shares])
-    yield channel.fault("sensor_asymmetry", [_bent(channel, share, 2, "square") for share in shares])
+    yield channel.fault("sensor_nonlinearity", [_nonlinearity(channel, share, 3, "cubic") for share in shares])
+    yield channel.fault("sensor_asymmetry", [_nonlinearity(channel, share, 2, "square") for share in shares])
     yield channel.fault("sensor_play", [_play(channel, share * channel.rms) for share in PLAYS])
     for other in range(longest.response.shape[1]):
         if other != number:
-            yield _heard(channel, other)
+            yield _cross_axis_sensitivity(channel, other)
 
 
-def faults_of_all(parts: Sequence[Taken]) -> Iterator[Fault]:
-    """That all channels have alike: of one supply, one filter, one logger. parts: as above."""
+def faults_of_all(parts: Sequence[Part]) -> Iterator[Fault]:
+    """Faults that all channels share, as those of one supply, filter or logger. parts: as in `sensor_faults`."""
     whole = np.vstack([part.response for part in parts])
     sizes = np.std(whole, axis=0)
     largest = int(np.argmax(sizes))
@@ -77,35 +85,35 @@ def faults_of_all(parts: Sequence[Taken]) -> Iterator[Fault]:
     channel = _Channel(tuple(range(whole.shape[1])), "", float(sizes[largest]) or 1.0, top)
     longest = max(parts, key=lambda part: len(part.response))
     alike = len(set(longest.recording.response.units)) == 1
-    for fault in _shared(channel, longest, longest.response[:, largest]):
+    for fault in _common_faults(channel, longest, longest.response[:, largest]):
         if alike or fault.effect not in IN_UNITS:
             yield fault
 
 
-def _shared(channel: _Channel, longest: Taken, course: FloatArray) -> Iterator[Fault]:
+def _common_faults(channel: _Channel, longest: Part, course: FloatArray) -> Iterator[Fault]:
     """Faults that one channel may have, or all. course: (n,) of the longest part."""
-    times = late_times(course, longest.rate_hz)
+    times = delays_to_try(course, longest.rate_hz)
     yield channel.fault("sensor_gain", [_gain(channel, gain) for gain in GAINS])
     shifts = [side * share * channel.rms for share in SHIFTS for side in (1.0, -1.0)]
     yield channel.fault("sensor_offset", [_offset(channel, shift) for shift in shifts])
     drifts = [_drift(channel, shift, begun) for shift in shifts for begun in BEGUN]
     yield replace(channel.fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
-    yield channel.fault("logger_offset", [_late(channel, time_s) for time_s in times])
+    yield channel.fault("logger_offset", [_logger_offset(channel, time_s) for time_s in times])
     yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz) for time_s in times])
     seconds = len(longest.response) / longest.rate_hz
-    least = 0.02 / middle_hz(course, longest.rate_hz) / seconds
+    least = 0.02 / median_frequency_hz(course, longest.rate_hz) / seconds
     rates = [side * float(rate) for rate in least * np.geomspace(0.2, 100.0, GRID) for side in (1.0, -1.0)]
-    clocks = [_other_clock(channel, rate) for rate in rates if abs(rate) < FASTEST]
+    clocks = [_clock_drift(channel, rate) for rate in rates if abs(rate) < FASTEST]
     yield replace(channel.fault("clock_drift", clocks), varies=True)
 
 
 def _play(channel: _Channel, gap: float) -> Variant:
-    return Variant((channel.of(lambda y, rate: _driven(y, gap)),), sized("gap", gap), *WIDELY)
+    return Variant((channel.of(lambda y, rate: _undo_play(y, gap)),), proportional_number("gap", gap), *WIDELY)
 
 
-def _driven(y: FloatArray, gap: float) -> FloatArray:
-    """What drives a reading through a gap: half of it ahead. It turns round at the reading's extreme, at first slowly,
-    and has crossed the gap where the reading turns round, too."""
+def _undo_play(y: FloatArray, gap: float) -> FloatArray:
+    """(n,): the motion that drives a reading through a gap, half the gap ahead of it. It reverses at the reading's
+    extreme, slowly at first, and has crossed the gap where the reading reverses."""
     side = np.sign(bristle_bend(y, TURNED * gap))
     ahead = 0.5 * side
     turns = np.flatnonzero(side[1:] * side[:-1] < 0) + 1
@@ -118,16 +126,16 @@ def _driven(y: FloatArray, gap: float) -> FloatArray:
     return np.asarray(y + gap * ahead)
 
 
-def _heard(channel: _Channel, other: int) -> Fault:
-    """Another channel in this one."""
+def _cross_axis_sensitivity(channel: _Channel, other: int) -> Fault:
+    """Cross-talk: another channel's signal in this one."""
     (own,) = channel.numbers
 
-    def undo(taken: Taken) -> Taken:
-        response = taken.response.copy()
-        response[:, own] -= taken.response[:, other]
-        return replace(taken, response=response)
+    def undo(part: Part) -> Part:
+        response = part.response.copy()
+        response[:, own] -= part.response[:, other]
+        return replace(part, response=response)
 
-    return channel.fault("cross_axis_sensitivity", [Variant((undo,), sized("from_next"))])
+    return channel.fault("cross_axis_sensitivity", [Variant((undo,), proportional_number("from_next"))])
 
 
 def _gain(channel: _Channel, gain: float) -> Variant:
@@ -136,22 +144,24 @@ def _gain(channel: _Channel, gain: float) -> Variant:
 
 
 def _offset(channel: _Channel, shift: float) -> Variant:
-    return Variant((channel.of(lambda y, rate: y - shift),), sized("offset", shift), *WIDELY)
+    return Variant((channel.of(lambda y, rate: y - shift),), proportional_number("offset", shift), *WIDELY)
 
 
 def _drift(channel: _Channel, total: float, begun: float) -> Variant:
     undo = channel.of(lambda y, rate: y - total * np.linspace(begun, 1.0, len(y)))
-    return Variant((undo,), sized("total", total), *WIDELY)
+    return Variant((undo,), proportional_number("total", total), *WIDELY)
 
 
-def _late(channel: _Channel, time_s: float) -> Variant:
+def _logger_offset(channel: _Channel, time_s: float) -> Variant:
     return Variant(
-        (channel.of(lambda y, rate: later(y[:, None], -time_s * rate)[:, 0]),), sized("offset", time_s), *AROUND
+        (channel.of(lambda y, rate: shift_samples(y[:, None], -time_s * rate)[:, 0]),),
+        proportional_number("offset", time_s),
+        *AROUND,
     )
 
 
 def _lag(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
-    """A low pass y += share (x - y) from sample to sample, taken back exactly."""
+    """A first-order low pass, y += share (x - y) per sample, inverted exactly."""
     kept = float(np.exp(-1 / (time_s * rate_hz)))
     undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1], y[:-1]])) / (1 - kept))
     numbers: Numbers = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
@@ -159,20 +169,20 @@ def _lag(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
 
 
 def _mean_gain(kept: float, step: int) -> float:
-    """Of the low pass, as a mean of logarithms over what every so many samples hold: by so much it makes smaller what
-    cannot be foretold (Kolmogorov's formula for the error of the best prediction of a next sample)."""
+    """Geometric mean gain of the low pass over the band of the decimated samples: by it the one-step prediction error
+    shrinks (Kolmogorov's formula)."""
     turn = np.pi / step * (np.arange(256) + 0.5) / 256
     return float(np.exp(np.mean(np.log((1 - kept) / np.abs(1 - kept * np.exp(-1j * turn))))))
 
 
-def _bent(channel: _Channel, share: float, power: int, number: str) -> Variant:
+def _nonlinearity(channel: _Channel, share: float, power: int, number: str) -> Variant:
     top = channel.top
-    undo = channel.of(lambda y, rate: _straightened(y / top, share, power) * top)
-    return Variant((undo,), sized(number, share / top ** (power - 1)), *WIDELY)
+    undo = channel.of(lambda y, rate: _invert_power_law(y / top, share, power) * top)
+    return Variant((undo,), proportional_number(number, share / top ** (power - 1)), *WIDELY)
 
 
-def _straightened(y: FloatArray, share: float, power: int) -> FloatArray:
-    """The x with y = x + share x^power, by Newton's steps."""
+def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
+    """Solves y = x + share x^power for x by Newton's method."""
     x = y.copy()
     for _ in range(20):
         slope = 1 + power * share * x ** (power - 1)
@@ -180,25 +190,25 @@ def _straightened(y: FloatArray, share: float, power: int) -> FloatArray:
     return np.asarray(np.clip(x, -3.0, 3.0))
 
 
-def _other_clock(channel: _Channel, late: float) -> Variant:
-    """Read at t (1 + late), put back to t."""
-    undo = channel.of(lambda y, rate: at_times(y, np.arange(len(y)) / (1 + late)))
-    return Variant((undo,), sized("ppm", 1e6 * late), *AROUND)
+def _clock_drift(channel: _Channel, late: float) -> Variant:
+    """Readings taken at t (1 + late), resampled to t."""
+    undo = channel.of(lambda y, rate: resample(y, np.arange(len(y)) / (1 + late)))
+    return Variant((undo,), proportional_number("ppm", 1e6 * late), *AROUND)
 
 
-TURNS = (
+ROTATIONS = (
     ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
     ((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
 )
 
 
-def turned_sensor() -> Fault:
-    """Three directions of one sensor, turned together by small angles."""
+def sensor_misalignment() -> Fault:
+    """A rotation of a three-axis sensor by small angles."""
 
     def of(turn: FloatArray) -> Undo:
-        return lambda taken: replace(taken, response=taken.response + taken.response @ turn.T)
+        return lambda part: replace(part, response=part.response + part.response @ turn.T)
 
-    undo = tuple(of(np.array(turn)) for turn in TURNS)
+    undo = tuple(of(np.array(turn)) for turn in ROTATIONS)
     variant = Variant(undo, lambda s: {"degrees": float(np.degrees(np.linalg.norm(s)))})
     return Fault("sensor_misalignment", "sensor", "", EVERY, (variant,))

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.contrast.compare import Compared, compared
-from analysis.diagnosis.contrast.decide import Decided, decide
-from analysis.diagnosis.contrast.lines import Line, hum_of, noise_of, steps_of
-from analysis.diagnosis.contrast.taken import taken_of
+from analysis.diagnosis.contrast.compare import Comparison, compare
+from analysis.diagnosis.contrast.decide import Decision, decide
+from analysis.diagnosis.contrast.part import split_into_parts
+from analysis.diagnosis.contrast.signal_faults import SignalFault, find_hum, find_quantization, find_sensor_noise
 from analysis.diagnosis.errors.choose_measure import Chosen
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.played_errors import played_error
@@ -22,34 +22,35 @@ from equalizer.signals.recording import Recording
 HUM, NOISE, STEPS = "mains_hum", "sensor_noise", "force_quantization"
 LOWEST_MAINS_HZ = 45.0
 FORESEEN = 0.02
-"""Share of a clean recording that a model may miss for faults to be told by it alone. By hand, as the next."""
+"""Prediction error of a model on a clean recording, as a share, up to which it is used alone to find faults. By hand,
+as the next."""
 NOISY = 0.1
 """Share of the signal from which what does not repeat is more than noise: a device that slips and sticks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contrast:
-    """One of the first three, or none."""
+    """What sets recordings apart from clean ones: at most one of the first three."""
 
     shown: Hypothesis | None
-    """By the readings themselves,"""
-    line: Line | None
-    """by their spectrum, or by steps of the command,"""
-    compared: Compared | None
-    """or by comparison."""
-    decided: Decided | None
+    """A sensor fault that the readings themselves show."""
+    line: SignalFault | None
+    """A fault that a spectrum or the steps of a command show."""
+    comparison: Comparison | None
+    """The comparison of all faults by a base model."""
+    decision: Decision | None
 
     @property
     def left_open(self) -> bool:
         """Whether the sets differ by more than any two stretches of either do, and no fault explains that."""
-        if self.compared is None or self.decided is None or self.decided.named is not None:
+        if self.comparison is None or self.decision is None or self.decision.named is not None:
             return False
-        return self.compared.differ
+        return self.comparison.differ
 
     @property
-    def weighed(self) -> frozenset[str]:
-        """Effects that were undone."""
-        return frozenset(() if self.compared is None else (each.fault.effect for each in self.compared.weighed))
+    def tested_effects(self) -> frozenset[str]:
+        """Effects that the comparison tested."""
+        return frozenset(() if self.comparison is None else (each.fault.effect for each in self.comparison.faults))
 
 
 def contrast_of(
@@ -59,12 +60,12 @@ def contrast_of(
     shown = seen_directly(recordings, clean, effects)
     if shown:
         return Contrast(shown[0], None, None, None)
-    faulty, references = taken_of(recordings), taken_of(clean)
-    for name, look in ((HUM, hum_of), (STEPS, steps_of), (NOISE, noise_of)):
+    faulty, references = split_into_parts(recordings), split_into_parts(clean)
+    for name, look in ((HUM, find_hum), (STEPS, find_quantization), (NOISE, find_sensor_noise)):
         line = look(faulty, references) if faulty and references and name not in without else None
         if line is not None:
             return Contrast(None, line, None, None)
-    found = compared(recordings, clean, without, time_left)
+    found = compare(recordings, clean, without, time_left)
     return Contrast(
         None, None, found, None if found is None else decide(found, recordings[0].response.samples.shape[1])
     )

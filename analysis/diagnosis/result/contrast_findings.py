@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.contrast.compare import AS_ONE, Compared, Weighed
-from analysis.diagnosis.contrast.decide import BOUND, Decided
+from analysis.diagnosis.contrast.compare import AS_ONE, Comparison, JudgedFault
+from analysis.diagnosis.contrast.decide import BOUND, Decision
 from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.contrast.stream import FOLDS
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
@@ -35,15 +35,15 @@ BY_ITSELF = "This is seen in the readings themselves, and not in those of the cl
 
 
 def with_contrast(whole: Findings, found: Contrast, recording: Recording, beyond: float) -> Findings:
-    if found.compared is None or found.decided is None:
+    if found.comparison is None or found.decision is None:
         named = _shown(found, recording)
         if named is None:
             return replace(whole, remarks=(NOT_COMPARED, *whole.remarks))
         diagnosis = _with(whole.diagnosis, "partly_explained", (named,), ())
         remarks: tuple[str, ...] = (BY_ITSELF,)
     else:
-        diagnosis = _compared(whole.diagnosis, found.compared, found.decided, recording, whole.given.system)
-        remarks = (BESIDE.format(beyond), *(() if found.compared.complete else (OUT_OF_TIME,)))
+        diagnosis = _compared(whole.diagnosis, found.comparison, found.decision, recording, whole.given.system)
+        remarks = (BESIDE.format(beyond), *(() if found.comparison.complete else (OUT_OF_TIME,)))
     improved = _improved(whole.given, diagnosis.effects)
     return replace(
         whole, diagnosis=diagnosis, improved=improved, remarks=(*remarks, *whole.remarks), proposal=None, black_box=None
@@ -66,7 +66,7 @@ def _with(
 
 
 def _compared(
-    diagnosis: Diagnosis, found: Compared, decided: Decided, recording: Recording, system: UnitSystem
+    diagnosis: Diagnosis, found: Comparison, decided: Decision, recording: Recording, system: UnitSystem
 ) -> Diagnosis:
     best = decided.named
     named = () if best is None else (_named(best, decided, recording, system),)
@@ -81,13 +81,13 @@ def _compared(
     return replace(changed, fit=fit, error=error)
 
 
-def _errors(found: Compared, before: float, after: float) -> Errors:
+def _errors(found: Comparison, before: float, after: float) -> Errors:
     """Of the faulty set, as shares of its signal."""
     sizes = [float(np.sqrt(left / found.faulty_samples)) * found.faulty_share for left in (before, after)]
     return Errors(sizes[0], sizes[0], sizes[1], None)
 
 
-def _named(best: Weighed, decided: Decided, recording: Recording, system: UnitSystem) -> NamedEffect:
+def _named(best: JudgedFault, decided: Decision, recording: Recording, system: UnitSystem) -> NamedEffect:
     effect = best.fault.effect
     rivals = tuple(Rival(name, 0.0, True, "as good in its place on what was compared") for name in decided.alike)
     return NamedEffect(
@@ -102,12 +102,12 @@ def _named(best: Weighed, decided: Decided, recording: Recording, system: UnitSy
     )
 
 
-def _axis(weighed: Weighed, recording: Recording) -> str | None:
+def _axis(weighed: JudgedFault, recording: Recording) -> str | None:
     channels = recording.response.channels if weighed.fault.place == "sensor" else recording.command.channels
     return axis_letter(weighed.fault.axis, channels) if weighed.fault.axis in channels else None
 
 
-def _estimates(weighed: Weighed, recording: Recording, system: UnitSystem) -> dict[str, Estimate]:
+def _estimates(weighed: JudgedFault, recording: Recording, system: UnitSystem) -> dict[str, Estimate]:
     units = _units(weighed.fault, recording, system)
     return {
         name: Estimate(
@@ -128,7 +128,7 @@ def _units(fault: Fault, recording: Recording, system: UnitSystem) -> Mapping[st
     return {"stiffness": stiffness, "offset": unit, "cubic": f"1/({unit})^2", "square": f"1/({unit})"}
 
 
-def _candidate(weighed: Weighed, why: str, recording: Recording) -> Candidate:
+def _candidate(weighed: JudgedFault, why: str, recording: Recording) -> Candidate:
     return Candidate(
         effect=weighed.fault.effect,
         place=weighed.fault.place,

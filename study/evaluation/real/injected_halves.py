@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.contrast.bases import bases_of
-from analysis.diagnosis.contrast.ledger import weights_of
+from analysis.diagnosis.contrast.joint_products import weights_of
+from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.stream import Base
-from analysis.diagnosis.contrast.taken import Taken, taken_of
 from analysis.diagnosis.data.observed_parts import part_of, parts_of
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
@@ -115,7 +115,7 @@ def held_out_change(sound: Recording, rest: Recording, spoiled: Recording) -> fl
     The model is the base that a comparison begins with: forces along the motion where they hold, else each reading from
     its past. Nothing in it knows of faults.
     """
-    before, after, clean = (taken_of([each]) for each in (rest, spoiled, sound))
+    before, after, clean = (split_into_parts([each]) for each in (rest, spoiled, sound))
     if not before or not after or not clean:
         return None
     try:
@@ -126,7 +126,7 @@ def held_out_change(sound: Recording, rest: Recording, spoiled: Recording) -> fl
     return max(found, key=lambda times: abs(np.log(max(times, 1e-12))))
 
 
-def _error(base: Base, clean: tuple[Taken, ...], other: tuple[Taken, ...]) -> float:
+def _error(base: Base, clean: tuple[Part, ...], other: tuple[Part, ...]) -> float:
     """Rms of what is told of the others by a base that was fitted to the clean ones."""
     known, asked = _rows(base, clean), _rows(base, other)
     size = np.sqrt(np.mean(known**2, axis=0))
@@ -135,5 +135,5 @@ def _error(base: Base, clean: tuple[Taken, ...], other: tuple[Taken, ...]) -> fl
     return float(np.sqrt(np.mean((asked @ weights * size[0]) ** 2)))
 
 
-def _rows(base: Base, parts: tuple[Taken, ...]) -> FloatArray:
+def _rows(base: Base, parts: tuple[Part, ...]) -> FloatArray:
     return np.vstack([part[mask] for part, mask in zip(base.rows(parts), base.valid_samples(parts), strict=True)])

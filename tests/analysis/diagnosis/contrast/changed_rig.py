@@ -5,8 +5,8 @@ from functools import cache
 
 import numpy as np
 
-from analysis.diagnosis.contrast.compare import compared
-from analysis.diagnosis.contrast.decide import Decided, decide
+from analysis.diagnosis.contrast.compare import compare
+from analysis.diagnosis.contrast.decide import Decision, decide
 from analysis.diagnosis.reference.compare_with_reference import Contrast, contrast_of
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -69,8 +69,8 @@ def contrast(change: str = "", level: float = 0.0, without: tuple[str, ...] = ()
     return contrast_of([recording(seed, change, level)], [recording(1)], frozenset(without), time_left)
 
 
-def decided(faulty: Recording) -> Decided:
-    found = compared([faulty], [recording(1)], frozenset(), time_left)
+def decision(faulty: Recording) -> Decision:
+    found = compare([faulty], [recording(1)], frozenset(), time_left)
     assert found is not None
     return decide(found, 1)
 

@@ -15,14 +15,14 @@ from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 def test_a_fault_that_the_comparison_cannot_undo_is_left_open(rig):
     found = rig.contrast("coulomb_friction", 0.6, rig.UNDONE)
     assert found.left_open
-    assert not set(rig.UNDONE) & set(found.weighed)
-    assert "added_mass" in found.weighed
+    assert not set(rig.UNDONE) & set(found.faults)
+    assert "added_mass" in found.faults
 
 
 def test_nothing_is_left_open_where_a_fault_is_named(rig):
     found = rig.contrast("coulomb_friction", 0.6)
     assert not found.left_open
-    assert found.compared is not None and found.compared.complete
+    assert found.comparison is not None and found.comparison.complete
 
 
 @pytest.mark.parametrize("seed", [2, 3])

@@ -5,30 +5,30 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.contrast.compare import compared
+from analysis.diagnosis.contrast.compare import compare
 from analysis.diagnosis.contrast.decide import decide
 from equalizer.signals.recording import Recording
 
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_another_recording_of_the_same_device_names_nothing(rig, seed):
-    found = rig.contrast(seed=seed).decided
+    found = rig.contrast(seed=seed).decision
     assert found is not None and found.named is None
 
 
 def test_a_fault_that_may_sit_on_either_of_two_axes_is_not_named(rig):
-    found = rig.contrast("added_mass", 0.3).compared
+    found = rig.contrast("added_mass", 0.3).comparison
     assert found is not None
     best = decide(found, 1).named
     assert best is not None
     twin = replace(best, fault=replace(best.fault, axis="fy", site=1))
-    answer = decide(replace(found, weighed=(best, twin)), 1)
+    answer = decide(replace(found, faults=(best, twin)), 1)
     assert answer.named is None
     assert "fy" in answer.others[0][1]
 
 
 def test_an_effect_that_is_not_to_be_considered_is_not_named(rig):
-    found = rig.contrast("added_mass", 0.3, ("added_mass",)).decided
+    found = rig.contrast("added_mass", 0.3, ("added_mass",)).decision
     assert found is not None
     assert found.named is None or found.named.fault.effect != "added_mass"
 
@@ -43,7 +43,7 @@ def test_a_body_alone_cannot_tell_a_mass_from_a_gain(rig):
         force = mass * a + 0.02 * a.std() * random.normal(size=rig.COUNT)
         return replace(plain, command=replace(plain.command, samples=force[:, None]))
 
-    found = compared([body(2, 1.6)], [body(1, 1.2)], frozenset(), rig.time_left)
+    found = compare([body(2, 1.6)], [body(1, 1.2)], frozenset(), rig.time_left)
     assert found is not None
     answer = decide(found, 1)
     names = {law.fault.effect for law, _ in answer.others} if answer.named is None else set(answer.alike)
@@ -53,11 +53,11 @@ def test_a_body_alone_cannot_tell_a_mass_from_a_gain(rig):
 def test_recordings_of_rest_and_of_motion_are_not_compared(rig):
     """What a device does at rest is foretold by no recording of its motion."""
     resting = rig.read_as(2, lambda y: 0.01 * y)
-    assert compared([resting], [rig.recording(1)], frozenset(), rig.time_left) is None
-    assert compared([rig.recording(1)], [resting], frozenset(), rig.time_left) is None
+    assert compare([resting], [rig.recording(1)], frozenset(), rig.time_left) is None
+    assert compare([rig.recording(1)], [resting], frozenset(), rig.time_left) is None
 
 
 def test_what_is_cut_short_ends_with_what_it_has(rig):
-    found = compared([rig.recording(2, "added_mass", 0.3)], [rig.recording(1)], frozenset(), lambda: False)
+    found = compare([rig.recording(2, "added_mass", 0.3)], [rig.recording(1)], frozenset(), lambda: False)
     assert found is not None and not found.complete
     assert decide(found, 1).named is None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.contrast.compare import compared
+from analysis.diagnosis.contrast.compare import compare
 from analysis.diagnosis.contrast.decide import decide
 from analysis.diagnosis.result.contrast_findings import _named
 from equalizer.signals.recording import Recording
@@ -35,7 +35,7 @@ def two_drives(seed: int, gain: float = 1.0) -> Recording:
 @pytest.mark.parametrize("gain", [0.6, 1.4])
 def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(rig, gain):
     faulty = two_drives(3, gain)
-    found = compared([faulty], [two_drives(4)], frozenset(), rig.time_left)
+    found = compare([faulty], [two_drives(4)], frozenset(), rig.time_left)
     assert found is not None and not found.by_force
     answer = decide(found, 1)
     assert answer.named is not None
@@ -45,7 +45,7 @@ def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(r
 
 
 def test_two_drives_of_one_body_in_order_name_nothing(rig):
-    found = compared([two_drives(5)], [two_drives(4)], frozenset(), rig.time_left)
+    found = compare([two_drives(5)], [two_drives(4)], frozenset(), rig.time_left)
     assert found is not None
     assert decide(found, 1).named is None
 
@@ -66,7 +66,7 @@ def in_turns(seed: int, late: FloatArray) -> Recording:
 
 
 def test_a_logger_that_reads_all_channels_late_is_named_once(rig):
-    found = compared([in_turns(2, np.full(6, 2.0))], [in_turns(1, np.zeros(6))], frozenset(), rig.time_left)
+    found = compare([in_turns(2, np.full(6, 2.0))], [in_turns(1, np.zeros(6))], frozenset(), rig.time_left)
     assert found is not None
     answer = decide(found, 2)
     assert answer.named is not None
@@ -76,6 +76,6 @@ def test_a_logger_that_reads_all_channels_late_is_named_once(rig):
 
 def test_a_logger_that_is_late_now_and_then_in_both_sets_is_not_named(rig):
     faulty, clean = in_turns(2, np.array([0, 2, 1, 2, 0, 2.0])), in_turns(1, np.array([0, 0, 2, 0, 1, 0.0]))
-    found = compared([faulty], [clean], frozenset(), rig.time_left)
+    found = compare([faulty], [clean], frozenset(), rig.time_left)
     assert found is not None
     assert decide(found, 2).named is None

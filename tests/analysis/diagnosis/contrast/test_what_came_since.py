@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
-from analysis.diagnosis.contrast.compare import compared
+from analysis.diagnosis.contrast.compare import compare
+from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.stream import FOLDS
-from analysis.diagnosis.contrast.taken import taken_of
 from equalizer.signals.signal import FloatArray
 
 
@@ -23,14 +23,14 @@ from equalizer.signals.signal import FloatArray
     ],
 )
 def test_what_came_since_is_named_with_its_place_and_number(rig, change, level, number, place):
-    found = rig.contrast(change, level).decided
+    found = rig.contrast(change, level).decision
     assert found is not None and found.named is not None
     assert (found.named.fault.effect, found.named.fault.place) == (change, place)
     assert found.named.values[number] == pytest.approx(level, rel=0.15)
 
 
 def test_a_law_that_holds_the_named_one_takes_nothing_from_its_probability(rig):
-    found = rig.contrast("coulomb_friction", 0.6).decided
+    found = rig.contrast("coulomb_friction", 0.6).decision
     assert found is not None and found.named is not None
     assert found.named.fault.effect == "coulomb_friction"
     assert "asymmetric_friction" not in found.alike
@@ -41,7 +41,7 @@ def test_the_error_is_that_of_the_faulty_recording_however_many_clean_ones_there
     """Scaled by its own error, what is left of a set is at least as much as a description of its own leaves: also where
     there is no time to undo a fault."""
     for clean in ([rig.recording(1)], [rig.recording(seed) for seed in (1, 3, 4, 5)]):
-        found = compared([rig.recording(2, "viscous_damping", 2.0)], clean, frozenset(), lambda: False)
+        found = compare([rig.recording(2, "viscous_damping", 2.0)], clean, frozenset(), lambda: False)
         assert found is not None
         assert found.faulty_samples == pytest.approx(found.samples / (1 + len(clean)), rel=0.01)
         assert 1.0 <= found.plain[:FOLDS].sum() / found.faulty_samples < 2.0
@@ -61,18 +61,18 @@ def behind(gap: float):
 
 
 def test_play_before_a_sensor_is_named_with_its_gap(rig):
-    found = rig.decided(rig.read_as(2, behind(0.008)))
+    found = rig.decision(rig.read_as(2, behind(0.008)))
     assert found.named is not None and found.named.fault.effect == "sensor_play"
     assert found.named.values["gap"] == pytest.approx(0.008, rel=0.2)
 
 
 def test_a_drift_that_began_before_the_recording_is_no_offset(rig):
-    found = rig.decided(rig.read_as(2, lambda y: y + 0.04 * np.linspace(0.4, 1.0, len(y))))
+    found = rig.decision(rig.read_as(2, lambda y: y + 0.04 * np.linspace(0.4, 1.0, len(y))))
     assert found.named is not None and found.named.fault.effect == "sensor_drift"
 
 
 def test_an_offset_is_no_drift(rig):
-    found = rig.decided(rig.read_as(2, lambda y: y + 0.03))
+    found = rig.decision(rig.read_as(2, lambda y: y + 0.03))
     best = found.named or found.others[0][0]
     assert best.fault.effect == "sensor_offset" and "sensor_drift" not in found.alike
 
@@ -87,7 +87,7 @@ def test_a_drive_that_follows_slowly_is_named(rig):
     for k, wanted in enumerate(asked):
         reached += np.clip(wanted - reached, -limit, limit)
         given[k] = reached
-    part = taken_of([replace(plain, command=replace(plain.command, samples=asked[:, None]))])
+    part = split_into_parts([replace(plain, command=replace(plain.command, samples=asked[:, None]))])
     (fault,) = [each for each in actuator_faults(0, "fx", part, True) if each.effect == "slew_limit"]
     left = [np.std(variant.undo[0](part[0]).command[:, 0] - given) for variant in fault.variants]
     best = fault.variants[int(np.argmin(left))]

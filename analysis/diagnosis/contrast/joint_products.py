@@ -1,9 +1,8 @@
-"""What two sets of stretches have in common and what sets them apart, as products of columns.
+"""Joint least squares of one base model on two sets of stretches, one of them with a fault of unknown size.
 
-Both are described by one base, fitted to both at once: so nothing hangs on how a base goes on where only one of them
-has been. A fault is what the stretches of one set have and those of the other lack. Rows change by (size of the fault)
-x (change of the rows by a size of 1): exactly where the fault is linear, and about a size of 1 elsewhere. Products of
-the rows and their changes, block by block, then hold all that is needed.
+The base is fitted to both sets at once, so that nothing depends on how it extrapolates to where only one set has been.
+Undoing a fault changes the rows of one set by (size) x (change for size 1): exactly where the fault is linear, and to
+first order about size 1 elsewhere. Products of the rows and of their changes, block by block, hold all that is needed.
 """
 
 from collections.abc import Sequence
@@ -17,11 +16,11 @@ from equalizer.signals.signal import FloatArray
 
 Places = npt.NDArray[np.intp]
 RIDGE = 1e-9
-"""Of a column's mean power."""
+"""Ridge over a column's mean power."""
 BLOWN_UP = 1e16
-"""Of a product of columns of size 1."""
+"""Product of columns of size 1 above which undoing a fault is ill-conditioned."""
 ROUNDS = 3
-"""Of Gauss and Newton's steps."""
+"""Gauss-Newton steps."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,36 +28,36 @@ class Grams:
     """(blocks, k, k): products of the columns, and of those that change with each size."""
 
     blocks: FloatArray
-    moved: tuple[Places, ...]
+    changed_columns: tuple[Places, ...]
     """Per size, which columns change."""
     width: int
 
     @property
     def sound(self) -> bool:
-        """Undoing has not blown up what was measured."""
+        """Whether undoing the fault is well-conditioned."""
         return bool(np.isfinite(self.blocks).all() and np.abs(self.blocks).max(initial=0.0) < BLOWN_UP)
 
     def spread(self, sizes: FloatArray) -> FloatArray:
-        """(width, k): what turns the products into those of the rows with sizes undone."""
+        """(width, k): the matrix that turns the products into those of the rows with faults of these sizes undone."""
         found = np.zeros((self.width, self.blocks.shape[1]))
         found[:, : self.width] = np.eye(self.width)
         begin = self.width
-        for size, at in zip(sizes, self.moved, strict=True):
+        for size, at in zip(sizes, self.changed_columns, strict=True):
             found[at, begin + np.arange(len(at))] = size
             begin += len(at)
         return found
 
     def change(self, weights: FloatArray) -> FloatArray:
         """(sizes, k): the error's change with each size, as a sum of columns."""
-        found = np.zeros((len(self.moved), self.blocks.shape[1]))
+        found = np.zeros((len(self.changed_columns), self.blocks.shape[1]))
         begin = self.width
-        for number, at in enumerate(self.moved):
+        for number, at in enumerate(self.changed_columns):
             found[number, begin : begin + len(at)] = weights[at]
             begin += len(at)
         return found
 
-    def undone(self, sizes: FloatArray) -> FloatArray:
-        """(blocks, width, width): of the rows with sizes undone."""
+    def undo_sizes(self, sizes: FloatArray) -> FloatArray:
+        """(blocks, width, width): products of the rows with faults of these sizes undone."""
         spread = self.spread(sizes)
         return np.asarray(spread @ self.blocks @ spread.T)
 
@@ -68,7 +67,7 @@ class Grams:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pair:
-    """Blocks of one stream: those that a fault is asked for, and those that do without it."""
+    """Blocks of one stream: those in which a fault is undone, and those without it."""
 
     with_it: Grams
     at: tuple[int, ...]
@@ -87,14 +86,14 @@ class Fit:
         return float(self.errors.sum())
 
 
-def fitted(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
-    """The sizes that leave least, with every base fitted to both sides. variant: None = no fault."""
-    sizes = np.zeros(0) if variant is None else _start(variant)
+def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
+    """The sizes with the least error, every base fitted to both sides. variant: None = no fault."""
+    sizes = np.zeros(0) if variant is None else _starting_sizes(variant)
     for _ in range(0 if variant is None else ROUNDS):
         assert variant is not None
         pulls, grams = np.zeros(len(sizes)), np.zeros((len(sizes), len(sizes)))
         for pair in pairs:
-            pull, gram = _step(pair, sizes)
+            pull, gram = _newton_terms(pair, sizes)
             pulls += pull
             grams += gram
         grams += 1e-9 * max(float(np.trace(grams)) / len(grams), 1e-300) * np.eye(len(grams))
@@ -106,55 +105,56 @@ def fitted(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
     return Fit(sizes, sum((_errors(pair, sizes) for pair in pairs), np.zeros(1)))
 
 
-def left_with(pairs: Sequence[Pair], sizes: FloatArray) -> float:
-    """What these sizes leave."""
+def error_with_sizes(pairs: Sequence[Pair], sizes: FloatArray) -> float:
+    """Sum of squares with faults of these sizes undone."""
     return float(sum(_errors(pair, sizes).sum() for pair in pairs))
 
 
-def _start(variant: Variant) -> FloatArray:
+def _starting_sizes(variant: Variant) -> FloatArray:
     count = len(variant.undo)
     return np.ones(count) if variant.least > 0 else np.zeros(count)
 
 
 def weights_of(plain: FloatArray) -> FloatArray:
-    """(width,): 1, and minus what the columns tell of it."""
+    """(width,): 1, then minus the least-squares weights of the other columns: rows times it are residuals."""
     gram, pull = plain[1:, 1:], plain[1:, 0]
-    found = np.linalg.solve(_ridged(gram), pull)
+    found = np.linalg.solve(_add_ridge(gram), pull)
     return np.concatenate([[1.0], -found])
 
 
-def left_by_own(gram: FloatArray) -> float:
-    """By weights that are fitted to these products alone."""
+def error_of_own_fit(gram: FloatArray) -> float:
+    """Residual sum of squares with weights fitted to these products alone."""
     weights = weights_of(gram)
     return max(float(weights @ gram @ weights), 0.0)
 
 
-def _joined(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    whole, spread = pair.with_it.part(pair.at), pair.with_it.spread(_padded(pair, sizes))
+def _joint_products(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    whole, spread = pair.with_it.part(pair.at), pair.with_it.spread(_pad_sizes(pair, sizes))
     return whole, spread, np.asarray(spread @ whole @ spread.T + sum(pair.without))
 
 
-def _padded(pair: Pair, sizes: FloatArray) -> FloatArray:
-    return sizes if len(sizes) else np.zeros(len(pair.with_it.moved))
+def _pad_sizes(pair: Pair, sizes: FloatArray) -> FloatArray:
+    return sizes if len(sizes) else np.zeros(len(pair.with_it.changed_columns))
 
 
-def _step(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Of the sizes alone, the base's own numbers fitted along: half the error's slope and curvature."""
-    whole, spread, joined = _joined(pair, sizes)
+def _newton_terms(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Half the gradient and half the Gauss-Newton Hessian of the error by the sizes, with the base's weights eliminated
+    (variable projection)."""
+    whole, spread, joined = _joint_products(pair, sizes)
     weights = weights_of(joined)
     change = pair.with_it.change(weights)
     slope = change @ whole @ (spread.T @ weights)
     cross = change @ whole @ spread.T[:, 1:]
     own = change @ whole @ change.T
-    return np.asarray(slope), np.asarray(own - cross @ np.linalg.solve(_ridged(joined[1:, 1:]), cross.T))
+    return np.asarray(slope), np.asarray(own - cross @ np.linalg.solve(_add_ridge(joined[1:, 1:]), cross.T))
 
 
-def _ridged(gram: FloatArray) -> FloatArray:
+def _add_ridge(gram: FloatArray) -> FloatArray:
     return np.asarray(gram + (RIDGE * float(np.trace(gram)) / len(gram) + 1e-300) * np.eye(len(gram)))
 
 
 def _errors(pair: Pair, sizes: FloatArray) -> FloatArray:
-    _, spread, joined = _joined(pair, sizes)
+    _, spread, joined = _joint_products(pair, sizes)
     weights = weights_of(joined)
     at = spread.T @ weights
     blocks = pair.with_it.blocks[list(pair.at)]
@@ -163,11 +163,11 @@ def _errors(pair: Pair, sizes: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(np.concatenate([with_it, np.array(without)]), 0.0))
 
 
-def foretold(pairs: Sequence[Pair], sizes: FloatArray, block: int) -> float:
-    """The error of a block that is not among those that a fault was asked for; sizes and bases are of the others."""
+def held_out_error(pairs: Sequence[Pair], sizes: FloatArray, block: int) -> float:
+    """Sum of squares of a block that was left out, with sizes and base weights of the others."""
     found = 0.0
     for pair in pairs:
-        _, spread, joined = _joined(pair, sizes)
+        _, spread, joined = _joint_products(pair, sizes)
         at = spread.T @ weights_of(joined)
         found += max(float(at @ pair.with_it.blocks[block] @ at), 0.0)
     return found

@@ -1,5 +1,5 @@
-"""What the device in order is, step by step: each response from its past and the commands, by linear regression (ARX;
-Ljung, System Identification, 2nd ed., chapter 4.2). For what no balance of forces holds: voltages, many modes."""
+"""Base model by autoregression: each response from its past and the commands (ARX; Ljung, System Identification, 2nd
+ed., chapter 4.2). For devices that no force balance describes: voltages as responses, many modes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,29 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.balance.motion import low_pass_filter
-from analysis.diagnosis.contrast.taken import Taken
+from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 POWER = 0.999
-"""Of the response, that lies below the band's end;"""
+"""Share of the response's power below the band's end."""
 OVERSAMPLED = 3.0
-"""samples per period there, at least."""
+"""Samples per period of the band's end, at least."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StepBase:
+class AutoregressiveBase:
     """One response. Rows are its next value, then the past of all responses and commands, and 1."""
 
     channel: int
     order: int
     step: int
-    """Every so many samples are kept, after a low pass."""
+    """Decimation step, after a low pass."""
 
-    def rows(self, parts: Sequence[Taken], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
+    def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
         return tuple(self._rows(part) for part in parts)
 
-    def valid_samples(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
+    def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         found = []
         for part in parts:
             known = part.known[:: self.step]
@@ -39,8 +39,8 @@ class StepBase:
             found.append(~bad[self.order :])
         return tuple(found)
 
-    def _rows(self, part: Taken) -> FloatArray:
-        response, command = (thinned(samples, part.rate_hz, self.step) for samples in (part.response, part.command))
+    def _rows(self, part: Part) -> FloatArray:
+        response, command = (decimate(samples, part.rate_hz, self.step) for samples in (part.response, part.command))
         count = len(response) - self.order
         past = [response[self.order - lag : self.order - lag + count] for lag in range(1, self.order + 1)]
         pushed = [command[self.order - lag : self.order - lag + count] for lag in range(self.order + 1)]
@@ -48,11 +48,11 @@ class StepBase:
         return np.hstack([now, *past, *pushed, np.ones((count, 1))])
 
 
-def thinned(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
+def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
     return samples if step == 1 else low_pass_filter(samples, rate_hz, 0.4 * rate_hz / step)[::step]
 
 
-def likely_step(parts: Sequence[Taken]) -> int:
+def likely_step(parts: Sequence[Part]) -> int:
     ends = []
     for part in parts:
         moved = part.response - part.response.mean(axis=0)

@@ -1,4 +1,4 @@
-"""What was measured, part by part, as arrays that a fault can be undone in."""
+"""Parts of recordings without gaps, as arrays in which a fault can be undone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,14 +13,14 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
 LEAST_SAMPLES = 64
-"""Of a part."""
+"""Samples of a part at least."""
 MOST_SAMPLES = 40_000
-"""Of a recording, its last: enough to tell a fault that is worth it, and no more time than that needs."""
+"""Samples of a recording that are used at most, its last: enough to find a fault that matters, in bounded time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Taken:
-    """One part without gaps; what was missing inside is interpolated, and not `known`."""
+class Part:
+    """One part without long gaps; missing samples are interpolated, and not `known`."""
 
     recording: Recording
     """Of the part: rate, hold, names."""
@@ -37,43 +37,45 @@ class Taken:
     def rate_hz(self) -> float:
         return self.recording.sample_rate_hz
 
-    def observed(self) -> Observed:
-        """As the force balance reads it, all of it to be fitted to."""
+    def to_observed(self) -> Observed:
+        """The part as the force balance reads it, with all samples to fit."""
         recording = replace(
             self.recording,
             command=replace(self.recording.command, samples=self.command),
             response=replace(self.recording.response, samples=self.response),
-            position=_with(self.recording.position, self.position),
+            position=_replace_samples(self.recording.position, self.position),
         )
         none = np.zeros(len(self.known), dtype=np.bool_)
         return Observed(recording, self.command, self.response, self.known, none, none)
 
 
-def taken_of(recordings: Sequence[Recording]) -> tuple[Taken, ...]:
-    """Each part from its first known response to its last."""
-    found: list[Taken] = []
+def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
+    """The parts of recordings, each from its first known response to its last; short ones are left out."""
+    found: list[Part] = []
     for recording in recordings:
         for start, stop in parts_of(recording):
-            part = _trimmed(part_of(recording, max(start, len(recording) - MOST_SAMPLES), stop))
+            part = _trim(part_of(recording, max(start, len(recording) - MOST_SAMPLES), stop))
             if part is not None and len(part) >= LEAST_SAMPLES:
-                found.append(_taken(part))
+                found.append(_fill_part(part))
     return tuple(found)
 
 
-def _trimmed(part: Recording) -> Recording | None:
-    known = np.flatnonzero(_known(part))
+def _trim(part: Recording) -> Recording | None:
+    known = np.flatnonzero(_finite_samples(part))
     return part_of(part, int(known[0]), int(known[-1]) + 1) if len(known) else None
 
 
-def _known(part: Recording) -> Mask:
+def _finite_samples(part: Recording) -> Mask:
     signals = [part.response.samples, *([] if part.position is None else [part.position.samples])]
     return np.asarray(np.isfinite(np.hstack(signals)).all(axis=1), dtype=np.bool_)
 
 
-def _taken(part: Recording) -> Taken:
+def _fill_part(part: Recording) -> Part:
     position = None if part.position is None else filled_gaps(part.position.samples)
-    return Taken(part, filled_gaps(part.command.samples), filled_gaps(part.response.samples), position, _known(part))
+    return Part(
+        part, filled_gaps(part.command.samples), filled_gaps(part.response.samples), position, _finite_samples(part)
+    )
 
 
-def _with(signal: Signal | None, samples: FloatArray | None) -> Signal | None:
+def _replace_samples(signal: Signal | None, samples: FloatArray | None) -> Signal | None:
     return None if signal is None or samples is None else replace(signal, samples=samples)

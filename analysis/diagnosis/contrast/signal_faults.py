@@ -1,12 +1,12 @@
-"""What a signal shows by itself: a line of the mains (hum) or white noise in a response that neither its clean
-recording nor the command has, and a command in steps."""
+"""Faults that a signal's own spectrum or values show: mains hum or white noise in a response that neither the clean
+recordings nor the command have, and a quantized command."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.contrast.taken import Taken
+from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import STEP_FACTOR
 from equalizer.effects.starts.lattice import confirm_lattice_step, lattice_step
 from equalizer.plant.effect_vocabulary import Place
@@ -14,9 +14,9 @@ from equalizer.signals.signal import FloatArray
 
 MAINS_HZ = (50.0, 60.0)
 OFF_HZ = 0.5
-"""That mains or a logger's clock may be off."""
+"""Deviation of the mains frequency, or of a logger's clock, at most."""
 STANDS_OUT = 30.0
-"""Times the median power of its surroundings, as far as some hertz: noise does so in one of e^30 lines."""
+"""Power of a line over the median of its neighbourhood: noise exceeds it in one of e^30 lines."""
 NEW = 6.0
 """Times as far as on the clean recordings, and as in the command, that it must stand out."""
 
@@ -25,13 +25,13 @@ LOUDER = 4.0
 """Times the largest noise of any clean stretch that the smallest of the faulty ones must have: what changes with the
 motion is no noise of a sensor."""
 EVEN = 1.6
-"""By which two bands of white noise may differ at most."""
+"""Ratio of the powers of white noise in two bands at most."""
 STRETCHES = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Line:
-    """A fault, of responses or of commands."""
+class SignalFault:
+    """A fault of responses or of commands that needs no model."""
 
     effect: str
     place: Place
@@ -40,25 +40,27 @@ class Line:
     """Of the largest channel."""
 
 
-def hum_of(faulty: Sequence[Taken], clean: Sequence[Taken]) -> Line | None:
+def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
     found = [
         (*seen, channel)
         for channel in range(faulty[0].response.shape[1])
-        if (seen := _line(faulty, clean, channel)) is not None
+        if (seen := _find_mains_line(faulty, clean, channel)) is not None
     ]
     if not found:
         return None
     amplitude, frequency_hz, _ = max(found)
     channels = tuple(channel for _, _, channel in found)
-    return Line("mains_hum", "sensor", channels, {"amplitude": amplitude, "frequency": frequency_hz})
+    return SignalFault("mains_hum", "sensor", channels, {"amplitude": amplitude, "frequency": frequency_hz})
 
 
-def noise_of(faulty: Sequence[Taken], clean: Sequence[Taken]) -> Line | None:
-    """White noise has the same power in the highest eighth of the spectrum as in the one above its middle."""
+def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
+    """Added white noise: the same power in the highest eighth of the spectrum as in the eighth above its middle."""
     found: list[tuple[float, int]] = []
     for channel in range(faulty[0].response.shape[1]):
         here, usual = (
-            np.array([_floors(part.response[:, channel], stretch) for part in parts for stretch in _stretches(part)])
+            np.array(
+                [_noise_floors(part.response[:, channel], stretch) for part in parts for stretch in _stretches(part)]
+            )
             for parts in (faulty, clean)
         )
         if not len(here) or not len(usual):
@@ -69,29 +71,29 @@ def noise_of(faulty: Sequence[Taken], clean: Sequence[Taken]) -> Line | None:
             found.append((float(np.sqrt(new.mean())), channel))
     if not found:
         return None
-    return Line("sensor_noise", "sensor", tuple(channel for _, channel in found), {"rms": max(found)[0]})
+    return SignalFault("sensor_noise", "sensor", tuple(channel for _, channel in found), {"rms": max(found)[0]})
 
 
-def steps_of(faulty: Sequence[Taken], clean: Sequence[Taken]) -> Line | None:
-    """A command whose values lie on a lattice that is wider than a clean one's. Clean ones of few values, such as
-    steps, say nothing."""
+def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
+    """A command whose values lie on a coarser lattice than the clean one's. Clean commands of few values, such as
+    steps, are not used."""
     for channel in range(faulty[0].command.shape[1]):
         here, usual = (np.concatenate([part.command[:, channel] for part in parts]) for parts in (faulty, clean))
         step = lattice_step(here)
         many = len(np.unique(usual)) > 2 * len(np.unique(here))
         if many and step is not None and step > STEP_FACTOR * confirm_lattice_step(usual, step):
-            return Line("force_quantization", "actuator", (channel,), {"step": step})
+            return SignalFault("force_quantization", "actuator", (channel,), {"step": step})
     return None
 
 
-def _stretches(part: Taken) -> list[slice]:
+def _stretches(part: Part) -> list[slice]:
     count = max(len(part.response) // STRETCHES, 64)
     starts = range(0, len(part.response) - count + 1, count)
     return [slice(start, start + count) for start in starts if part.known[start : start + count].all()]
 
 
-def _floors(samples: FloatArray, stretch: slice) -> tuple[float, float]:
-    """Power that white noise would have in all, by either band."""
+def _noise_floors(samples: FloatArray, stretch: slice) -> tuple[float, float]:
+    """Variance of white noise, estimated in the highest eighth of the spectrum and in the one above its middle."""
     own = samples[stretch]
     window = np.hanning(len(own))
     moved = own - np.linspace(own[0], own[-1], len(own))
@@ -102,23 +104,23 @@ def _floors(samples: FloatArray, stretch: slice) -> tuple[float, float]:
     return last, middle
 
 
-def _line(faulty: Sequence[Taken], clean: Sequence[Taken], channel: int) -> tuple[float, float] | None:
-    """Amplitude and frequency."""
+def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int) -> tuple[float, float] | None:
+    """Amplitude and frequency (Hz) of the largest mains line; None where none stands out."""
     longest = max(faulty, key=lambda part: len(part.response))
     best: tuple[float, float] | None = None
     for mains in MAINS_HZ:
         if longest.rate_hz < 2.5 * mains:
             continue
-        ratio, amplitude, at = _standing_out(longest.response[:, channel], longest.rate_hz, mains)
-        usual = [_standing_out(part.response[:, channel], part.rate_hz, mains)[0] for part in clean]
-        driven = [_standing_out(column, longest.rate_hz, mains)[0] for column in longest.command.T]
+        ratio, amplitude, at = _line_power_ratio(longest.response[:, channel], longest.rate_hz, mains)
+        usual = [_line_power_ratio(part.response[:, channel], part.rate_hz, mains)[0] for part in clean]
+        driven = [_line_power_ratio(column, longest.rate_hz, mains)[0] for column in longest.command.T]
         if ratio > STANDS_OUT and ratio > NEW * max([1.0, *usual, *driven]) and (best is None or amplitude > best[0]):
             best = amplitude, at
     return best
 
 
-def _standing_out(samples: FloatArray, rate_hz: float, mains: float) -> tuple[float, float, float]:
-    """Power over that of the surroundings, amplitude, frequency."""
+def _line_power_ratio(samples: FloatArray, rate_hz: float, mains: float) -> tuple[float, float, float]:
+    """Power of the largest line near `mains` over the median around it, its amplitude and its frequency (Hz)."""
     window = np.hanning(len(samples))
     moved = samples - np.linspace(samples[0], samples[-1], len(samples))
     power = np.abs(np.fft.rfft((moved - moved.mean()) * window)) ** 2

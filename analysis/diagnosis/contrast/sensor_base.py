@@ -1,4 +1,4 @@
-"""One sensor by another: a measured velocity or acceleration by the measured position, differentiated.
+"""Base model of one sensor by another: a measured velocity or acceleration from the differentiated position.
 
 No physics of the device enters, so that what they do not share is a fault of either sensor.
 """
@@ -9,27 +9,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.balance.motion import differentiate, low_pass_filter
-from analysis.diagnosis.contrast.taken import Taken
+from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
 
 REACH = 2
-"""Samples before and after that tell of one: filters of the two sensors differ by so much."""
+"""Samples before and after that predict a reading: filters of the two sensors differ by so much."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WatchBase:
+class SensorBase:
     channel: int
     times: int
     """Derivatives between the two."""
     band_hz: float
     step: int
 
-    def rows(self, parts: Sequence[Taken], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
+    def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
         return tuple(self._rows(part) for part in parts)
 
-    def valid_samples(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
+    def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         found = []
         for part in parts:
             edge = int(part.rate_hz / self.band_hz) + 1
@@ -39,7 +39,7 @@ class WatchBase:
             found.append(inside[:: self.step][REACH:-REACH])
         return tuple(found)
 
-    def _rows(self, part: Taken) -> FloatArray:
+    def _rows(self, part: Part) -> FloatArray:
         assert part.position is not None
         read = low_pass_filter(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
         moved = differentiate(part.position[:, [self.channel]], part.rate_hz, self.band_hz, self.times)[:: self.step]
@@ -48,8 +48,8 @@ class WatchBase:
         return np.hstack([read[REACH : REACH + count], *near, np.ones((count, 1))])
 
 
-def watch_bases(parts: Sequence[Taken], band_hz: float, step: int) -> tuple[WatchBase, ...]:
-    """One per response that a position measures, too."""
+def sensor_bases(parts: Sequence[Part], band_hz: float, step: int) -> tuple[SensorBase, ...]:
+    """One base per response whose position is measured, too."""
     recording = parts[0].recording
     if recording.position is None or parts[0].position is None or not np.isfinite(band_hz):
         return ()
@@ -60,5 +60,5 @@ def watch_bases(parts: Sequence[Taken], band_hz: float, step: int) -> tuple[Watc
         for read, moved in zip(recording.response.quantities, recording.position.quantities, strict=True)
     ]
     return tuple(
-        WatchBase(channel, read - moved, band_hz, step) for channel, (read, moved) in enumerate(orders) if read > moved
+        SensorBase(channel, read - moved, band_hz, step) for channel, (read, moved) in enumerate(orders) if read > moved
     )
