@@ -51,22 +51,28 @@ class _Layout:
 
 def mismatch_map_pictures(maps: Maps, unit: str = "N") -> tuple[Picture, ...]:
     """unit: of the command. One per driving input, the one with most mismatch first and the others folded."""
-    inputs = sorted(
-        {cell.input for cells in maps.values() for cell in cells}, key=lambda each: (-_worst(maps, each), each)
-    )
-    return tuple(
-        Picture(
-            name=f"mismatch-map-{number}",
-            title=f"Where model and device disagree, driven by {input_}",
-            caption="Residual in units of what noise alone would leave: 1 is noise. Framed: more than noise and "
-            "what the model errs by elsewhere, at a false discovery rate of 1 %. Rows: measured channels; columns: "
-            f"octaves, by their lower edge{_level_words(maps, input_, unit)}; grey: not driven there; without "
-            f"a number: below {_NUMBERED:g}." + _grouped_words(maps, input_),
-            figure=draw_mismatch_map(maps, input_, unit),
-            folded=number > 1,
-            alternative=_in_words(maps, input_),
-        )
-        for number, input_ in enumerate(inputs, start=1)
+    return tuple(mismatch_map_picture(maps, number, unit) for number in range(len(driving_inputs(maps))))
+
+
+def driving_inputs(maps: Maps) -> tuple[str, ...]:
+    """The one with most mismatch first."""
+    inputs = {cell.input for cells in maps.values() for cell in cells}
+    return tuple(sorted(inputs, key=lambda each: (-_worst(maps, each), each)))
+
+
+def mismatch_map_picture(maps: Maps, number: int, unit: str) -> Picture:
+    """number: of the driving input."""
+    input_ = driving_inputs(maps)[number]
+    return Picture(
+        name=f"mismatch-map-{number + 1}",
+        title=f"Where model and device disagree, driven by {input_}",
+        caption="Residual in units of what noise alone would leave: 1 is noise. Framed: more than noise and "
+        "what the model errs by elsewhere, at a false discovery rate of 1 %. Rows: measured channels; columns: "
+        f"octaves, by their lower edge{_level_words(maps, input_, unit)}; grey: not driven there; without "
+        f"a number: below {_NUMBERED:g}." + _grouped_words(maps, input_),
+        figure=draw_mismatch_map(maps, input_, unit),
+        folded=number > 0,
+        alternative=_in_words(maps, input_),
     )
 
 

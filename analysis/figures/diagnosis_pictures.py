@@ -1,12 +1,13 @@
 """All figures of one diagnosis, in the order of the report."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
-from analysis.diagnosis.search.guard import Guard
+from analysis.diagnosis.search.guard import Guard, Part
 from analysis.figures.diagnosis_held_out import held_out_picture
-from analysis.figures.diagnosis_mismatch_map import mismatch_map_pictures
+from analysis.figures.diagnosis_mismatch_map import driving_inputs, mismatch_map_picture
 from analysis.figures.diagnosis_remainder import remainder_picture
 from analysis.figures.diagnosis_rivals import rivals_pictures
 from analysis.figures.diagnosis_signature import signature_pictures
@@ -17,22 +18,33 @@ from analysis.figures.untimed import in_samples
 
 def diagnosis_pictures(found: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:
     """Only what there is data for. guard: of figures whose drawing crashes, which are left out."""
+    drawn = (guard or Guard()).parts(map, diagnosis_drawings(found))
+    return tuple(picture for several in drawn for picture in several)
+
+
+def diagnosis_drawings(found: Findings) -> list[Part]:
+    """Each gives some of the pictures, and needs nothing of the others."""
     # Where a motion is imposed and the force measured, levels are the motion's, in a unit of their own.
     imposed = any(unit.startswith("N") for course in found.courses for unit in course.units)
     unit = "" if imposed else found.given.system.force
     held = found.courses, found.noise_rms, found.channel_errors
-    drawn: dict[str, Callable[[], Sequence[Picture]]] = {
-        "the mismatch map": lambda: mismatch_map_pictures(found.maps, unit),
-        "the map of states": lambda: state_map_pictures(found.state_maps),
-        "the figure of signatures": lambda: signature_pictures(found.signatures),
-        "the figure of rivals": lambda: rivals_pictures(found.explanation, found.axes or ("x", "y", "z")),
-        "the figure of held-out errors": lambda: [held_out_picture(*held)] if held[0] or held[2] else [],
-        "the spectrum of what is left": lambda: _remainder(found),
-    }
-    known = guard or Guard()
-    none: Sequence[Picture] = ()
-    pictures = [picture for name, draw in drawn.items() for picture in known.part(name, "its drawing", draw, none)]
-    return tuple(pictures if found.is_timed else map(in_samples, pictures))
+
+    def mapped(number: int) -> Sequence[Picture]:
+        return [mismatch_map_picture(found.maps, number, unit)]
+
+    drawn: list[tuple[str, Callable[[], Sequence[Picture]]]] = [
+        *(("the mismatch map", partial(mapped, number)) for number in range(len(driving_inputs(found.maps)))),
+        ("the map of states", lambda: state_map_pictures(found.state_maps)),
+        ("the figure of signatures", lambda: signature_pictures(found.signatures)),
+        ("the figure of rivals", lambda: rivals_pictures(found.explanation, found.axes or ("x", "y", "z"))),
+        ("the figure of held-out errors", lambda: [held_out_picture(*held)] if held[0] or held[2] else []),
+        ("the spectrum of what is left", lambda: _remainder(found)),
+    ]
+    return [Part(name, "its drawing", partial(_timed, draw, found.is_timed), ()) for name, draw in drawn]
+
+
+def _timed(draw: Callable[[], Sequence[Picture]], timed: bool) -> Sequence[Picture]:
+    return draw() if timed else [in_samples(picture) for picture in draw()]
 
 
 def _remainder(found: Findings) -> list[Picture]:

@@ -2,7 +2,7 @@
 
 import io
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import matplotlib
 from matplotlib.figure import Figure
@@ -57,3 +57,8 @@ def picture_svg(picture: Picture) -> str:
     if not picture.drawn:
         picture.drawn.append(inline_svg(picture.figure, picture.name, picture.title, picture.alternative))
     return picture.drawn[0]
+
+
+def without_figure(picture: Picture) -> Picture:
+    """A drawn one that can be sent from another process: its figure is empty."""
+    return replace(picture, figure=Figure())

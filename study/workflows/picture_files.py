@@ -1,10 +1,11 @@
 """Pictures of a report as files beside it: SVG for an editor, PNG for slides."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.figures.picture import Picture, picture_svg
+from analysis.figures.picture import Picture, picture_svg, without_figure
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.privacy import make_folder
@@ -16,20 +17,36 @@ FIGURE_DPI = 150
 
 def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
     """Into `folder`, which is made. Folded pictures are too many for slides: SVG only. Raises CannotWriteError."""
+    drawn = forked_map(drawn_picture, pictures)
+    for picture, each in zip(pictures, drawn, strict=True):
+        picture.drawn[:] = each.picture.drawn
+    write_drawn(folder, drawn)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnPicture:
+    """Can be sent from another process."""
+
+    picture: Picture
+    """Drawn; its figure is empty."""
+    png: bytes
+
+
+def drawn_picture(picture: Picture) -> DrawnPicture:
+    picture_svg(picture)
+    return DrawnPicture(without_figure(picture), b"" if picture.folded else _png(picture))
+
+
+def write_drawn(folder: Path, drawn: Iterable[DrawnPicture]) -> None:
+    """As `write_pictures`."""
     try:
         make_folder(folder)
     except OSError as problem:
         raise CannotWriteError(folder, problem) from problem
-    drawn = forked_map(_drawn, pictures)
-    for picture, (svg, png) in zip(pictures, drawn, strict=True):
-        picture.drawn[:] = [svg]
-        write_text(folder / f"{picture.name}.svg", svg, overwrite=True)
-        if png:
-            write_atomically(folder / f"{picture.name}.png", png, overwrite=True)
-
-
-def _drawn(picture: Picture) -> tuple[str, bytes]:
-    return picture_svg(picture), b"" if picture.folded else _png(picture)
+    for each in drawn:
+        write_text(folder / f"{each.picture.name}.svg", picture_svg(each.picture), overwrite=True)
+        if each.png:
+            write_atomically(folder / f"{each.picture.name}.png", each.png, overwrite=True)
 
 
 def _png(picture: Picture) -> bytes:

@@ -22,11 +22,10 @@ def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known
     is held there."""
     errors = fitting(measure, fitted.residuals)
     own = own_columns(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
-    columns = np.vstack([known.whole, own])
-    pulls = _stretches(measure, columns, errors)
+    pulls = _stretches(measure, known, own, errors)
     middle = pulls @ pulls.T
-    t = len(fitted.deviations)
-    information = columns @ columns.T
+    t, across = len(fitted.deviations), known.on(own)
+    information = np.block([[known.squares, across], [across.T, own @ own.T]])
     # The calibration is an observation of its own, one standard deviation wide.
     information[:t, :t] += np.eye(t)
     middle[:t, :t] += np.eye(t)
@@ -41,14 +40,15 @@ def _at_an_end(hypothesis: Hypothesis) -> Mask:
     return np.array(held, dtype=np.bool_)
 
 
-def _stretches(measure: ErrorMeasure, columns: FloatArray, errors: FloatArray) -> FloatArray:
-    """(numbers, stretches): each column's pull, stretch by stretch."""
+def _stretches(measure: ErrorMeasure, known: Sensitivity, own: FloatArray, errors: FloatArray) -> FloatArray:
+    """(t + numbers, stretches): each column's pull, stretch by stretch."""
     pulls, first = [], 0
     for record in measure.records:
         width = record.measured.shape[1] * max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
         last = first + int(record.fit.sum()) * record.measured.shape[1]
         for begin in range(first, last, width):
-            part = slice(begin, min(begin + width, last))
-            pulls.append(columns[:, part] @ errors[part])
+            end = min(begin + width, last)
+            part = slice(begin, end)
+            pulls.append(np.concatenate([known.over(begin, end) @ errors[part], own[:, part] @ errors[part]]))
         first = last
-    return np.array(pulls).T.reshape(len(columns), -1)
+    return np.array(pulls).T.reshape(len(known.columns) + len(own), -1)

@@ -49,10 +49,22 @@ class Sensitivity:
     @property
     def whole(self) -> FloatArray:
         """(t, samples): of all samples to fit, whichever period they are of."""
+        return self.over(0, self.columns.shape[1] if self.repeated is None else len(self.repeated) * self._channels)
+
+    def over(self, first: int, last: int) -> FloatArray:
+        """(t, last - first): of a run of the samples to fit, channel after channel at each instant; whole instants."""
         if self.repeated is None:
-            return self.columns
-        t, short = len(self.columns), int(self.repeated.max(initial=-1)) + 1
-        return self.columns.reshape(t, short, -1)[:, self.repeated].reshape(t, -1)
+            return self.columns[:, first:last]
+        t, c = len(self.columns), self._channels
+        where = self.repeated[first // c : last // c]
+        if len(where) and (np.diff(where) == 1).all():
+            return self.columns[:, c * where[0] : c * (where[-1] + 1)]
+        return self.columns.reshape(t, -1, c)[:, where].reshape(t, -1)
+
+    @property
+    def _channels(self) -> int:
+        assert self.repeated is not None
+        return int(self.columns.shape[1] // (int(self.repeated.max(initial=-1)) + 1))
 
     def _folded(self, errors: FloatArray) -> FloatArray:
         """Periods summed up. errors: (samples,), channel after channel at each instant."""

@@ -1,11 +1,13 @@
 """The folder of a diagnosis: the document, the improved model, the figures and the page."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from analysis.diagnosis.result.findings import Findings
-from analysis.figures.diagnosis_pictures import diagnosis_pictures
+from analysis.figures.diagnosis_pictures import diagnosis_drawings
+from analysis.figures.picture import Picture
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from study.local_clock import local_now
 from study.store.disk.provenance import Provenance, gather_provenance
@@ -13,7 +15,8 @@ from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME, write_diagnosis
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.crash_guard import crash_guard
-from study.workflows.picture_files import write_pictures
+from study.workflows.forked_map import forked_map
+from study.workflows.picture_files import DrawnPicture, drawn_picture, write_drawn
 
 
 def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> Findings:
@@ -24,12 +27,17 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
     improved = replace(findings.improved, provenance=origin.as_dict())
     write_mechanical_model(folder / MODEL_NAME, improved)
     guard = crash_guard()
-    pictures = diagnosis_pictures(findings, guard)
+    parts = [replace(part, work=partial(_drawn, part.work)) for part in diagnosis_drawings(findings)]
+    drawn = [each for several in guard.parts(forked_map, parts) for each in several]
     findings = replace(findings, remarks=(*guard.sentences, *findings.remarks))
-    write_pictures(folder / "figures", pictures)
-    page = render_diagnosis_report(findings, pictures, _shown(origin), local_now())
+    write_drawn(folder / "figures", drawn)
+    page = render_diagnosis_report(findings, [each.picture for each in drawn], _shown(origin), local_now())
     write_text(folder / PAGE_NAME, page)
     return findings
+
+
+def _drawn(draw: Callable[[], Sequence[Picture]]) -> list[DrawnPicture]:
+    return [drawn_picture(picture) for picture in draw()]
 
 
 def _shown(origin: Provenance) -> dict[str, str]:
