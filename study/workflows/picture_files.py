@@ -33,8 +33,13 @@ class DrawnPicture:
 
 
 def drawn_picture(picture: Picture) -> DrawnPicture:
-    picture_svg(picture)
-    return DrawnPicture(without_figure(picture), b"" if picture.folded else _png(picture))
+    svg, png = _drawn(picture)
+    picture.drawn[:] = [svg]
+    return DrawnPicture(without_figure(picture), png)
+
+
+def _drawn(picture: Picture) -> tuple[str, bytes]:
+    return picture_svg(picture), b"" if picture.folded else _png(picture)
 
 
 def write_drawn(folder: Path, drawn: Iterable[DrawnPicture]) -> None:
