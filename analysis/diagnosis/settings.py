@@ -35,7 +35,7 @@ LEVELS_TO_HOLD_ONE_BACK = 3  # principle: a level to choose by lies between two 
 CHOOSE_SHARE = 0.25  # of the fitting time, from its end, where no level can be kept back to choose by
 TEST_SHARE = 0.25  # of the whole time, from its end, where no segment has a role
 
-# Which error measure suits (`choose_measure`, `closed_loop`). By hand.
+# Which error measure suits (`measure_rule`, `closed_loop`). By hand.
 FED_BACK_SHARE = 0.1  # of the command's rms that must differ from the recorded excitation: then the loop is closed
 FORETOLD_SHARE = 0.05  # of what its own past leaves of a command that the responses may leave (test of Granger 1969)
 DIES_OUT_SHARE = 1 / 3  # of the longest record, within which a plant that holds itself comes to rest

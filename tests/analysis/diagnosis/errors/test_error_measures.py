@@ -9,7 +9,8 @@ from analysis.diagnosis.data.closed_loop import in_closed_loop
 from analysis.diagnosis.data.force_driven import force_driven
 from analysis.diagnosis.data.observed_parts import names_of_parts, observed_parts
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.errors.choose_measure import choose_measure, holds_itself, measure_of
+from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.measure_rule import choose_measure, holds_itself
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect

@@ -5,7 +5,8 @@ import pytest
 
 from analysis.diagnosis.confirm.fitting_measures import looks_of
 from analysis.diagnosis.document import Mismatch
-from analysis.diagnosis.errors.choose_measure import UNTIMED, measure_of
+from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.measure_rule import UNTIMED
 from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.wording import place_of
 from analysis.diagnosis.search.guard import Guard

@@ -1,0 +1,130 @@
+"""Which error measure suits recordings and a model, by a stated rule.
+
+Free simulation, from rest by the commands alone, is the strictest: nothing measured helps it. It cannot be asked of
+
+* a plant in closed loop that does not hold itself: the command then contains what the controller did about the very
+  physics that is missing. Where positions or velocities were measured, forces are compared instead: the one that
+  entered against the one that the model needs along the measured motion; where only accelerations were, windows;
+* a plant whose motion grows by itself within a window, as a levitated body or a pendulum on its head: it was recorded
+  under control, whether that shows or not, and is compared likewise;
+* a plant that integrates freely, whose slowest motion takes longer to die out than a third of the recording: any small
+  error grows without end. It is simulated in windows of 1 s or longer, each from a state estimated from the measured
+  motion, or, where no state can be estimated, compared by forces;
+* a recording that does not begin at rest: what its beginning left behind dies out, so its first seconds are left out;
+  where that would be more than a quarter of it, windows, too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from analysis.diagnosis.data.closed_loop import in_closed_loop
+from analysis.diagnosis.data.growth import runs_away
+from analysis.diagnosis.data.measured_motion import has_motion, time_unit
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.windows import WINDOW_S
+from analysis.diagnosis.settings import DIES_OUT_SHARE, MOST_LEFT_OUT, REST_S, REST_SHARE, SETTLED_CONSTANTS
+from equalizer.plant.mechanical_model import MechanicalModel
+
+Measure = Literal["free simulation", "windows", "predicted force"]
+UNTIMED = (
+    "No time is known: forces are compared as they stand beside the positions, sample by sample; nothing that hangs on "
+    "speed, acceleration or frequency is known."
+)
+IMPOSED = (
+    "The motion was imposed and the force measured, so the force that the model needs along the motion is compared "
+    "with the measured one."
+)
+CLOSED_LOOP = (
+    "The command hangs on the response and the model does not hold itself, so a simulation by the command alone would "
+    "drift; the force that the model needs along the measured motion is compared with the one that entered."
+)
+UNSTABLE = (
+    "By itself the model grows without end, so the device was held by a controller, and simulations say nothing; the "
+    "force that the model needs along the measured motion is compared with the one that entered."
+)
+CLOSED_LOOP_WINDOWS = (
+    "The command hangs on the response and the model does not hold itself; it is simulated in short windows, each "
+    "from a state estimated from the measured motion."
+)
+DRIFTS = (
+    "The model integrates freely, so that small errors would grow without end; it is simulated in short windows, each "
+    "from a state estimated from the measured motion."
+)
+NOT_AT_REST = (
+    "The recording does not begin at rest; the model is simulated in short windows, each from a state estimated from "
+    "the measured motion."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    measure: Measure
+    why: str
+    """A sentence for the reader; empty for a free simulation."""
+
+
+def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choice:
+    """The rule of this module's first lines."""
+    longest_s = max(len(record.command) / record.recording.sample_rate_hz for record in records)
+    holds, motion = holds_itself(model, longest_s), all(has_motion(record.recording, model) for record in records)
+    if motion and any(time_unit(record.recording) != "s" for record in records):
+        return Choice("predicted force", UNTIMED)
+    if any(record.recording.meta.get("imposed") for record in records):
+        return Choice("predicted force", IMPOSED)
+    if not holds and any(in_closed_loop(record.recording) for record in records):
+        return Choice("predicted force", CLOSED_LOOP) if motion else Choice("windows", CLOSED_LOOP_WINDOWS)
+    if motion and runs_away(model, WINDOW_S):
+        return Choice("predicted force", UNSTABLE)
+    if not holds:
+        return Choice("windows", DRIFTS)
+    if any(
+        _begins_moving(record) and _settling(record, model) > MOST_LEFT_OUT * len(record.command) for record in records
+    ):
+        return Choice("windows", NOT_AT_REST)
+    return Choice("free simulation", "")
+
+
+def holds_itself(model: MechanicalModel, longest_s: float) -> bool:
+    """Whether all motion dies out well within a recording (so that no pole is at or near the unit circle)."""
+    return _slowest(model) * DIES_OUT_SHARE * longest_s > 1
+
+
+def settled_after(record: Observed, model: MechanicalModel) -> int:
+    """Samples to leave out at the beginning, where that is in motion and short; 0 = none."""
+    after = _settling(record, model)
+    if after > MOST_LEFT_OUT * len(record.command) or not _begins_moving(record):
+        return 0
+    return int(np.ceil(after))
+
+
+def _settling(record: Observed, model: MechanicalModel) -> float:
+    """Samples until what was at first is gone."""
+    slowest = _slowest(model)
+    return SETTLED_CONSTANTS / slowest * record.recording.sample_rate_hz if slowest > 0 else np.inf
+
+
+def _slowest(model: MechanicalModel) -> float:
+    """Rate at which the slowest motion dies out, 1/s; below zero for one that grows."""
+    n = model.coordinates
+    motion = np.block(
+        [
+            [np.zeros((n, n)), np.eye(n)],
+            [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
+        ]
+    )
+    return -float(np.linalg.eigvals(motion).real.max())
+
+
+def _begins_moving(record: Observed) -> bool:
+    first = max(int(REST_S * record.recording.sample_rate_hz), 4)
+    known = record.measured[np.isfinite(record.measured).all(axis=1)]
+    if len(known) < 4 * first:
+        return False
+    means = known[: len(known) // first * first].reshape(-1, first, known.shape[1]).mean(axis=1)
+    changes = np.diff(means, axis=0)
+    away = np.abs(means[0]) > REST_SHARE * known.std(axis=0)
+    moves = np.abs(changes[0]) > REST_SHARE * np.sqrt(np.mean(changes**2, axis=0))
+    return bool(np.any(away & moves))
