@@ -35,7 +35,7 @@ def prepared(
     """recordings: alike, in the order of names. plain: one motion for each force, as a force balance needs it. short:
     few cycles are a remark and no refusal; None: as plain. Raises NothingToDiagnose."""
     found = [with_found_segments(each) for each in recordings]
-    told = [(name.rsplit(".", 1)[0], text) for name, (_, text) in zip(names, found, strict=True) if text]
+    told = [(name, text) for name, (_, text) in zip(names, found, strict=True) if text]
     repeats = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in told)
     read = tuple(each for each, _ in found)
     formed, said = plain_form(read) if plain else (read, ())

@@ -68,9 +68,9 @@ def test_with_nothing_as_good_nothing_is_named_and_what_was_left_out_is_known(ru
 @pytest.mark.parametrize("order", [(FRICTION, OPEN), (OPEN, FRICTION)])
 def test_of_two_the_one_that_is_open_goes_whichever_came_first(rubbing, order):
     base = rubbing.candidate(retuned_alone(rubbing))
-    one, both = candidate(rubbing, base, order[0]), candidate(rubbing, base, *order)
+    first, both = candidate(rubbing, base, order[0]), candidate(rubbing, base, *order)
     ends = [rubbing.confirmed(each) for each in (base, base, both)]
-    left = identified(rubbing, Explanation(*ends, ((one,), (both,)), (one, both)), always)
+    left = identified(rubbing, Explanation(*ends, ((first,), (both,)), (first, both)), always)
     assert (names(left), left.undetermined) == (["coulomb_friction"], ("viscous_damping",))
     assert [step.fitted.hypothesis.key for step in left.steps] == [left.rounds[0][0].fitted.hypothesis.key]
 
@@ -99,8 +99,8 @@ def fitted(context, *claims):
     """As a search ends: each claim fitted beside those before it."""
     base = context.candidate(retuned_alone(context))
     steps, at = [], base
-    for one in claims:
-        start = evaluated(context.measure, context.tuning, at.fitted.deviations, together(at.fitted.hypothesis, one))
+    for newest in claims:
+        start = evaluated(context.measure, context.tuning, at.fitted.deviations, together(at.fitted.hypothesis, newest))
         at = context.candidate(refine(context, start))
         steps.append(at)
     ends = [context.confirmed(each) for each in (base, base, at)]

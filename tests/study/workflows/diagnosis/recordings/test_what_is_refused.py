@@ -25,8 +25,10 @@ def test_a_model_of_another_size_is_named(files, findings, tmp_path, made):
 
 
 def test_an_unstable_model_is_named(files, findings, tmp_path, made):
-    one = made.device(1)
-    wild = MechanicalModel("wild", "acceleration", one.mass, -one.damping, one.stiffness, one.input, one.output)
+    sound = made.device(1)
+    wild = MechanicalModel(
+        "wild", "acceleration", sound.mass, -sound.damping, sound.stiffness, sound.input, sound.output
+    )
     write_mechanical_model(tmp_path / "wild.toml", wild)
     assert "unstable" in refused_with(files, findings, tmp_path, model=tmp_path / "wild.toml").happened
 

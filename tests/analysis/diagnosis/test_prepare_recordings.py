@@ -1,0 +1,24 @@
+"""Recordings in the form in which they are compared: what is said of them."""
+
+import numpy as np
+
+from analysis.diagnosis.prepare_recordings import prepared
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ = 100.0
+
+
+def repeating(seed: int) -> Recording:
+    push = np.tile(np.random.default_rng(seed).standard_normal(400), 5)
+    moved = np.convolve(push, 0.9 ** np.arange(80))[: len(push)]
+    return Recording(
+        "cart",
+        Signal(push[:, None], RATE_HZ, "force", "N", ("fx",)),
+        Signal(np.append(0.0, moved[:-1])[:, None], RATE_HZ, "position", "m", ("x",)),
+    )
+
+
+def test_recordings_are_called_by_their_names_whatever_is_in_these():
+    remarks = prepared((repeating(1), repeating(2)), ("pull 1.5 N", "pull 2.5 N"), plain=False).remarks
+    assert [remark.split(":")[0] for remark in remarks] == ["pull 1.5 N", "pull 2.5 N"]
