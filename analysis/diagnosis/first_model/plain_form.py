@@ -31,14 +31,15 @@ Recordings = tuple[Recording, ...]
 Step = Callable[[Recordings], tuple[Recordings, str]]
 
 
-def plain_form(recordings: Sequence[Recording]) -> tuple[Recordings, tuple[str, ...]]:
-    """recordings: alike in channels, units and rate. And a sentence for each change."""
+def plain_form(recordings: Sequence[Recording], turns: bool = True) -> tuple[Recordings, tuple[str, ...]]:
+    """recordings: alike in channels, units and rate. And a sentence for each change. turns: commands that are counted
+    against their motion are turned round; not where a model says already how they are counted."""
     found, said = tuple(recordings), []
-    steps = (
+    steps: tuple[Step, ...] = (
         with_named_motion, _conditions, _moving_commands, _moving_responses, _pushing_responses,
-        restored, _still, _summed, turned_round,
+        restored, _still, _summed,
     )  # fmt: skip
-    for step in steps:
+    for step in (*steps, turned_round) if turns else steps:
         found, sentence = step(found)
         said.append(sentence)
     return found, tuple(filter(None, said))
@@ -161,16 +162,17 @@ def _summed(recordings: Recordings) -> tuple[Recordings, str]:
     others = [name for k, name in enumerate(command.channels) if k != main]
     return (
         tuple(
-            replace(
-                each,
-                command=replace(each.command.select_channels([main]), samples=each.command.samples @ gains[:, None]),
-                excitation=None,
-            )
+            replace(each, command=_sum(each.command, gains, main),
+                    excitation=None if each.excitation is None else _sum(each.excitation, gains, main))
             for each in recordings
         ),
         f"{listed(others)} {_verb(others, 'drives')} the same motion as {command.channels[main]}: one command was made "
         f"of them, {' + '.join(f'{gain:.3g} x {name}' for gain, name in zip(gains, command.channels, strict=True))}.",
     )  # fmt: skip
+
+
+def _sum(signal: Signal, gains: FloatArray, main: int) -> Signal:
+    return replace(signal.select_channels([main]), samples=signal.samples @ gains[:, None])
 
 
 def _gains(recordings: Recordings) -> tuple[FloatArray, int]:

@@ -3,6 +3,9 @@
 Mass, damping and dry friction take work out of a drive. Counted the other way round they would give it, and no law of
 the motion has the signs that physics has. So forces are balanced with both signs, mass and damping not below zero in
 either; where the turned sign leaves clearly less on held-out folds, it is the device's. A spring alone tells nothing.
+
+A recording says in its `meta` which commands were turned round, and a model of the device is written for the commands
+as they were recorded: see `as_recorded`.
 """
 
 from collections.abc import Sequence
@@ -16,9 +19,13 @@ from analysis.diagnosis.balance.structures import Structure, is_better
 from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.wording import listed
+from equalizer.effects.turned_commands import with_turned_commands
+from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
+TURNED = "turned commands"
+"""Note of a recording: the channels of its commands that were turned round."""
 CLEARLY = 0.1
 """Share of the folds' error power that the turned sign must take; as much as a linear law must."""
 
@@ -41,10 +48,23 @@ def turned_round(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
     sign = np.ones(count)
     sign[against] = -1.0
     verb = "is" if len(names) == 1 else "are"
-    return tuple(_turned(each, imposed, sign) for each in recordings), (
+    told = {TURNED: names}
+    turned = tuple(_turned(replace(each, meta={**each.meta, **told}), imposed, sign) for each in recordings)
+    return turned, (
         f"{listed(names)} {verb} counted against the motion: as recorded, the device would give work instead of taking "
-        f"it. The sign was turned round; where the device is a source of work, say so by a model of your own."
+        f"it. The sign was turned round, and a model that is written has it in its input matrix; where the device is a "
+        f"source of work, say so by a model of your own."
     )
+
+
+def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
+    """model: of the recording as it is compared, where commands may have been turned round. The same device, driven by
+    the commands as they were recorded."""
+    channels, turned = recording.command.channels, recording.meta.get(TURNED)
+    if not isinstance(turned, Sequence) or not set(turned) & set(channels):
+        return model
+    signs = [-1.0 if channel in turned else 1.0 for channel in channels]
+    return with_turned_commands(model, signs, channels, recording.response.channels)
 
 
 def _against(motions: Sequence[Motion], axis: int) -> bool:
@@ -59,7 +79,8 @@ def _against(motions: Sequence[Motion], axis: int) -> bool:
 def _turned(recording: Recording, imposed: bool, sign: FloatArray) -> Recording:
     if imposed:
         return replace(recording, response=_times(recording.response, sign))
-    return replace(recording, command=_times(recording.command, sign), excitation=None)
+    excitation = None if recording.excitation is None else _times(recording.excitation, sign)
+    return replace(recording, command=_times(recording.command, sign), excitation=excitation)
 
 
 def _times(signal: Signal, sign: FloatArray) -> Signal:

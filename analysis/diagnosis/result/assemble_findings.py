@@ -9,6 +9,7 @@ import numpy as np
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.first_model.turned_round import as_recorded
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, maps_of, whole_mismatch
@@ -30,6 +31,7 @@ from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE
 from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import axis_letter, model_effects
+from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -44,19 +46,19 @@ def assembled(
     what clean recordings differ by."""
     context, found, judged = searched.context, searched.found, searched.judged
     measure, tuning = context.whole, context.tuning
-    recording, fitted = measure.records[0].recording, found.after.fitted
-    said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
+    recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.placed()
+    said, (improved, retuned) = said_of(recording, tuning.model), _models(searched, recording)
     channels, errors = channel_names(recording, len(measure.noise)), _errors(searched)
     maps, courses = maps_of(measure, found.stages, floors, learned, context.map_), _courses(measure, found, names)
     looked = looks_of(searched, floors[0], maps)
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
     document = _document(searched, errors, (maps, looked.local), proposal)
-    effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
     return Findings(
         diagnosis=document,
         explanation=found,
         given=tuning.model,
-        improved=replace(tuning.tuned(fitted.deviations), effects=effects),
+        improved=improved,
+        retuned=retuned,
         named=placed,
         evidence=looked.evidence,
         courses=courses,
@@ -76,6 +78,15 @@ def assembled(
         split_s=_split_s(measure),
         own_errors=errors[: len(tuning.names)] * tuning.deviation,
     )
+
+
+def _models(searched: Searched, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
+    """With the named effects and without, driven by the commands as they were recorded."""
+    tuning, found = searched.context.tuning, searched.found
+    fitted, said = found.after.fitted, said_of(recording, tuning.model)
+    effects = (*tuning.model.effects, *model_effects(fitted.hypothesis.placed(), said.inputs, said.outputs))
+    with_them = replace(tuning.tuned(fitted.deviations), effects=effects)
+    return as_recorded(with_them, recording), as_recorded(tuning.tuned(found.retuned.fitted.deviations), recording)
 
 
 def _remarks(

@@ -101,7 +101,7 @@ class Findings(Summarised):
     given: MechanicalModel
     """What it began from; see `fitted`."""
     improved: MechanicalModel
-    """Re-tuned, with the named effects among its `effects`."""
+    """Re-tuned, with the named effects among its `effects`; driven by the commands as they were recorded."""
     named: tuple[PlacedEffect, ...]
     evidence: tuple[Evidence, ...]
     """Of the re-tuned model, per recording."""
@@ -138,6 +138,8 @@ class Findings(Summarised):
     """Per axis, the one to be drawn first."""
     split_s: Mapping[str, float] = field(default_factory=dict)
     """Seconds by "fit", "choose", "test"."""
+    retuned: MechanicalModel | None = None
+    """Without new physics; as `improved`."""
     own_errors: FloatArray | None = None
     """(t,): standard errors of the changes of the model's own numbers, as `tuning` counts them; NaN = not computed."""
 

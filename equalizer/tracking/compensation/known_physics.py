@@ -15,6 +15,7 @@ import numpy as np
 from equalizer.effects.discovered_law import axis_names
 from equalizer.laws.law import Law as FoundLaw
 from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray
@@ -63,7 +64,7 @@ def compensate(
     if identified_with_n is not None and not identified_with_n > 0:
         raise ValueError(f"identified_with_n is {identified_with_n}; it must be a force above zero")
     rate_hz = model.sample_rate_hz
-    motion = planned_motion(wanted, rate_hz, model.band_hz, lead_s(physics, rate_hz))
+    motion = along_axes(planned_motion(wanted, rate_hz, model.band_hz, lead_s(physics, rate_hz)), physics)
     reasons = [(effect, why_not(effect, model.input_channels)) for effect in physics.effects]
     used = tuple(effect for effect, reason in reasons if not reason)
     gain = axis_gains(physics, model.input_channels, model.output_channels)
@@ -80,6 +81,17 @@ def compensate(
     share = 1.0 if cap_n is None else fitting_share(forces, difference, cap_n)
     not_used = tuple((effect, reason) for effect, reason in reasons if reason)
     return Compensation(forces + share * difference, used, not_used, share)
+
+
+def along_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion:
+    """motion: as the responses count it. As the driven axes do, along which the effects act: they point where their
+    commands push, which is the other way where a model's input or output says so."""
+    seen = physics.output @ driven_axes(physics)
+    columns = motion.position.shape[1]
+    if min(seen.shape) < columns:
+        return motion
+    way = np.where(np.diagonal(seen)[:columns] < 0, -1.0, 1.0)
+    return PlannedMotion(motion.position * way, motion.velocity * way, motion.acceleration * way)
 
 
 def axes_of(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:

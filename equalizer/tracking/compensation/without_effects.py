@@ -13,7 +13,13 @@ from equalizer.laws.evaluate import evaluate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.tracking.compensation.effect_roles import lead_s, why_not
-from equalizer.tracking.compensation.known_physics import axes_of, axis_gains, force_law, slip_speed
+from equalizer.tracking.compensation.known_physics import (
+    along_axes,
+    axes_of,
+    axis_gains,
+    force_law,
+    slip_speed,
+)
 from equalizer.tracking.feedforward.planned_motion import planned_motion
 
 HIGHEST_SHARE = 3.0
@@ -34,7 +40,8 @@ def without_effects(recording: Recording, physics: MechanicalModel, excited_hz: 
         raise ValueError("the recording has missing samples; a motion cannot be integrated across them")
     rate_hz = recording.sample_rate_hz
     band_hz = (LOWEST_SHARE * excited_hz[0], min(HIGHEST_SHARE * excited_hz[1], 0.45 * rate_hz))
-    motion = planned_motion(recording.response.samples, rate_hz, band_hz, lead_s(physics, rate_hz))
+    planned = planned_motion(recording.response.samples, rate_hz, band_hz, lead_s(physics, rate_hz))
+    motion = along_axes(planned, physics)
     gain, freed = axis_gains(physics, inputs, outputs), recording.command.samples.copy()
     for effect in physics.effects:
         for axis in axes_of(effect, inputs, outputs):

@@ -175,13 +175,14 @@ def _refused(wanted: RealRecording, answer: str) -> RealAnswer:
 
 
 def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherTest:
-    """Nothing is fitted to it but, where the map says so, its volume."""
+    """Nothing is fitted to it but, where the map says so, its volume. The models are as recorded, so that which way the
+    commands are counted was decided once, for all recordings of the device."""
     title, free = test.source.map.title, test.source.map.diagnosis.volume_free
     try:
         recording = imported(test)
         if _is_plain(wanted):
-            (recording,) = all_force_driven(plain_form((recording,))[0])
-        retuned, after = (played_error(recording, model, "all") for model in (retuned_model(found), found.improved))
+            (recording,) = all_force_driven(plain_form((recording,), turns=False)[0])
+        retuned, after = (played_error(recording, model, "all") for model in (_retuned(found), found.improved))
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         said = problem.happened if isinstance(problem, StudyError) else f"{problem}."
         return FurtherTest(test.name, title, "", None, None, problem=said)
@@ -199,10 +200,9 @@ def _whole(name: str, recording: Recording, retuned: PlayedError, after: PlayedE
     )
 
 
-def retuned_model(found: Findings) -> MechanicalModel:
-    """Re-tuned without new physics."""
-    assert found.tuning is not None
-    return found.tuning.tuned(found.explanation.retuned.fitted.deviations)
+def _retuned(found: Findings) -> MechanicalModel:
+    assert found.retuned is not None
+    return found.retuned
 
 
 def _pair(wanted: RealRecording, read: _Read, found: Findings) -> PairOutcome:

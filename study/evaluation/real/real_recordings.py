@@ -13,7 +13,7 @@ from analysis.diagnosis.types import TimeBudget
 from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import LeftError, StudyError, WrongUseError
-from study.evaluation.real.diagnose_real import RealDiagnosis, crashed, diagnose_real, retuned_model
+from study.evaluation.real.diagnose_real import RealDiagnosis, crashed, diagnose_real
 from study.evaluation.real.inject_real import carriers, injected_outcomes
 from study.evaluation.real.kept_answers import (
     ANSWER_NAME,
@@ -184,5 +184,6 @@ def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:
     with new_folder(folder) as part:
         if done.findings is not None:
             write_diagnosis_into(part, done.findings, done.parents)
-            write_mechanical_model(part / RETUNED_NAME, retuned_model(done.findings))
+            assert done.findings.retuned is not None
+            write_mechanical_model(part / RETUNED_NAME, done.findings.retuned)
         write_real_answer(part / ANSWER_NAME, done.answer, origin)

@@ -8,6 +8,7 @@ from typing import Any
 from analysis.diagnosis.data.carried_weight import weighted
 from analysis.diagnosis.first_model.choose_structure import Choice, first_structure
 from analysis.diagnosis.first_model.model_structures import KINDS, Kind, Number, StructureRefused
+from analysis.diagnosis.first_model.turned_round import as_recorded
 from analysis.diagnosis.result.unit_doubt import constant_sentence
 from analysis.wording import typeset
 from equalizer.plant.mechanical_model import suggest_word
@@ -60,7 +61,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
         "compared": choice.fit.compared,
         "held_out_error": max(choice.fit.held_out),
     }
-    write_mechanical_model(plan.out, replace(choice.fit.model, provenance=origin))
+    write_mechanical_model(plan.out, replace(as_recorded(choice.fit.model, found.recordings[0]), provenance=origin))
     on_progress(1.0)
     return FirstModel(
         plan, choice, (*found.remarks, *filter(None, [constant_sentence(choice.fit.model)]), *choice.fit.remarks)

@@ -8,6 +8,10 @@ import pytest
 from analysis.diagnosis import diagnose_values as module
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.diagnose import DiagnosisSettings
+from analysis.diagnosis.errors.played_errors import played_error
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.effect import PlacedEffect
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -63,6 +67,31 @@ def test_without_a_model_the_first_one_is_of_the_clean_recordings(monkeypatch):
     assert np.array_equal(seen["fitted to"][0].response.samples, clean.response.samples)
     assert (seen["model"], seen["settings"].fitted) == (MODEL, True)
     assert "fitted" in found["remarks"]
+
+
+def test_the_improved_model_is_of_the_commands_as_they_were_recorded():
+    """Dry friction and a constant pull, and a command counted against its motion."""
+    model = MechanicalModel("slide", "velocity", 0.5 * np.eye(1), 2 * np.eye(1), np.zeros((1, 1)), np.eye(1), np.eye(1))
+    acting = [
+        PlacedEffect(EFFECTS[name], (0,), values)
+        for name, values in (("coulomb_friction", {"level": 0.5}), ("constant_force", {"force": 0.3}))
+    ]
+    force = np.convolve(np.random.default_rng(3).standard_normal(6000), np.hanning(60), "same")[:, None]
+    force *= 3 / force.std()
+    speed = simulate_mechanism(model, force, RATE_HZ, acting).response
+    against = Recording(
+        "slide", Signal(-force, RATE_HZ, "force", "N", ("fx",)), Signal(speed, RATE_HZ, "velocity", "m/s", ("vx",))
+    )
+
+    found = module.diagnose_values(against)
+
+    assert found.improved.input[0, 0] == found.retuned.input[0, 0] == -1
+    pull, friction = found.improved.effects
+    assert (pull.kind, friction.kind) == ("constant_force", "coulomb_friction")
+    assert pull.parameters["force"] == pytest.approx(-0.3, rel=0.05)
+    assert friction.parameters["level"] == pytest.approx(0.5, rel=0.05)
+    without, with_them = (played_error(against, each, "test").as_it_is for each in (found.retuned, found.improved))
+    assert with_them < 0.2 * without < 0.1
 
 
 class FINDINGS:

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.motion import motion_signal
+from analysis.diagnosis.data.closed_loop import in_closed_loop
 from analysis.diagnosis.data.driven_response import answer
 from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.first_model.plain_form import plain_form
 from analysis.diagnosis.settings import ANSWER_DEVIATIONS
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import Signal
 
 RATE_HZ = 100.0
@@ -249,6 +250,33 @@ def test_a_command_that_is_counted_against_its_motion_is_turned_round(seed, fric
     (found,), (said,) = plain_form((turned(recording),))
     np.testing.assert_array_equal(found.command.samples, recording.command.samples)
     assert said.startswith("u is counted against the motion")
+
+
+@pytest.mark.parametrize("hold", [Hold.BAND_LIMITED, Hold.LINEAR])
+def test_what_was_decided_beforehand_is_turned_with_the_command(hold):
+    """It tells of a controller where the command alone cannot."""
+    push, decided = smooth(2000, 1), smooth(2000, 2)
+    recording = of([("u", "force", "N", push)], [("v", "velocity", "m/s", speed_of(push))])
+    beside = replace(recording.command, samples=decided[:, None])
+    recording = replace(turned(recording), hold=hold, excitation=replace(beside, samples=-beside.samples))
+
+    (found,), _ = plain_form((recording,))
+
+    np.testing.assert_array_equal(found.excitation.samples, beside.samples)
+    assert in_closed_loop(found)
+    assert not in_closed_loop(replace(found, excitation=found.command))
+
+
+def test_what_was_decided_beforehand_is_summed_with_the_commands():
+    first, second = smooth(2000, 1), smooth(2000, 2)
+    recording = of(
+        [("u1", "force", "N", first), ("u2", "force", "N", second)],
+        [("v", "velocity", "m/s", speed_of(first + 0.5 * second))],
+    )
+
+    (found,), _ = plain_form((replace(recording, excitation=recording.command),))
+
+    np.testing.assert_allclose(found.excitation.samples, found.command.samples)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -11,6 +11,7 @@ from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
 from study.evaluation.real.real_summary import real_lines
 from study.importing.model_library import model_for, shipped_models
+from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.real_answer_file import read_real_answer
 from study.workflows.files.validate import validate_file
 
@@ -120,6 +121,55 @@ def test_one_recording_is_answered_and_the_others_are_said(folder: Path, tmp_pat
     before = kept.stat().st_mtime_ns
     assert diagnose_folder(RealPlan(folder, tmp_path / "out"), silent).results.answers[0] == axis
     assert kept.stat().st_mtime_ns == before
+
+
+PULLED = """
+device = "spring"
+files = ["FILE.npz"]
+
+[[clock]]
+rate_hz = 500
+
+[[channel]]
+role = "command"
+name = "f"
+value = "u"
+unit = "N"
+
+[[channel]]
+role = "response"
+name = "x"
+value = "x"
+unit = "m"
+
+[diagnosis]
+tests = "TESTS"
+"""
+
+
+def test_which_way_a_command_is_counted_is_decided_once_for_the_tests_too(tmp_path: Path) -> None:
+    """The test moves so slowly that a spring is all that it shows, which tells no sign."""
+    whole, time_s = tmp_path / "recordings" / "spring", np.arange(int(RATE_HZ * SECONDS)) / RATE_HZ
+    whole.mkdir(parents=True)
+    a, b = np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]]), np.array([[0.0], [1 / MASS]])
+    rows, below, _ = cont2discrete((a, b, np.array([[1.0, 0.0]]), np.zeros((1, 1))), 1 / RATE_HZ)[:3]
+    noise = lfilter([0.1], [1.0, -0.9], np.random.default_rng(4).normal(size=len(time_s)))
+    slow = np.sin(2 * np.pi * 0.25 * time_s) * np.minimum(time_s, 1.0)
+    for name, tests, u, read in (("run", "", noise, 1e-7), ("slow", "run", slow, 5e-5)):
+        state, x = np.zeros(2), np.zeros(len(u))
+        for k, force in enumerate(u):
+            x[k] = state[0]
+            state = rows @ state + below[:, 0] * force
+        np.savez(whole / f"{name}.npz", u=-u, x=x + read * np.random.default_rng(5).normal(size=len(x)))
+        (whole / f"{name}.toml").write_text(PULLED.replace("FILE", name).replace("TESTS", tests))
+
+    (answer,) = diagnose_folder(RealPlan(whole.parent, tmp_path / "out"), silent).results.answers
+
+    assert any("counted against the motion" in remark for remark in answer.remarks)
+    (further,) = answer.further
+    assert further.retuned < 0.2
+    for name in ("improved.toml", "retuned.toml"):
+        assert read_mechanical_model(tmp_path / "out" / "spring" / "run" / name).input[0, 0] == -1
 
 
 def test_a_recording_at_which_the_program_crashes_is_said_and_the_others_are_answered(

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.diagnosis.errors.played_errors import played_error
 from analysis.diagnosis.first_model.choose_structure import first_structure
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -150,6 +151,18 @@ def test_motion_in_and_force_out_is_turned_round(tmp_path):
     plain = recorded(device(0.4, 6.0, 900.0))
     done = fitted(tmp_path, replace(plain, command=plain.response, response=plain.command), "mass-spring")
     assert done.choice.fit.numbers[2].value == pytest.approx(900.0, rel=0.05)
+
+
+def test_the_file_says_which_way_a_command_is_counted(tmp_path):
+    plain = recorded(device(0.4, 6.0, 900.0))
+    against = replace(plain, command=replace(plain.command, samples=-plain.command.samples))
+    done = fitted(tmp_path, against, "mass-spring")
+
+    model = read_mechanical_model(done.plan.out)
+    assert model.input[0, 0] == -1
+    assert any("counted against the motion" in remark for remark in done.remarks)
+    assert played_error(against, model, "test").as_it_is < 0.02
+    assert played_error(plain, model, "test").as_it_is > 1
 
 
 def test_the_file_is_accepted_for_a_diagnosis(tmp_path):

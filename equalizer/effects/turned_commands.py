@@ -1,0 +1,90 @@
+"""A mechanical model of the same device whose commands are counted the other way round.
+
+An axis points where its command pushes, so that with the command its coordinate turns round, and every force along it:
+F(x, v) becomes -F(-x, -v). Most laws are the same both ways; the table says which numbers of the others turn.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, axis_names
+from equalizer.effects.placing import axis_letter, placed_effects
+from equalizer.laws.law import Law
+from equalizer.laws.tree import Apply, Node, Variable, written
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
+from equalizer.signals.signal import FloatArray
+
+TURNED: Mapping[str, str] = {
+    "constant_force": "force", "position_dependent_friction": "slope_per_m", "asymmetric_stiffness": "k2",
+    "gravity_torque": "angle", "cogging": "phase", "end_stop": "position", "pose_dependent_inertia": "per_m",
+}  # fmt: skip
+"""Effects that differ with the direction, and their number that changes its sign."""
+SWAPPED = {"asymmetric_friction": ("level_positive", "level_negative")}
+TILTED = {"extra_mode": ("tilt_next", "tilt_after_next")}
+"""Numbers that couple an axis to those after it."""
+
+
+def with_turned_commands(
+    model: MechanicalModel, signs: Sequence[float], inputs: tuple[str, ...], outputs: tuple[str, ...]
+) -> MechanicalModel:
+    """To the command times `signs`, 1 or -1 each, it answers as `model` does to the command. Raises PlacingError."""
+    way = np.asarray(signs, dtype=np.float64)
+    effects = [each for effect in model.effects for each in _turned_effects(model, effect, way, (inputs, outputs))]
+    return replace(model, input=model.input * way, effects=tuple(effects))
+
+
+def _turned_effects(
+    model: MechanicalModel, effect: ModelEffect, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]
+) -> tuple[ModelEffect, ...]:
+    """One; one per axis where it differs with the direction and stood at all of them."""
+    inputs, outputs = channels
+    if effect.law is None and effect.kind not in (*TURNED, *SWAPPED, *TILTED):
+        return (effect,)
+    if effect.law is not None and effect.law.acts_on == "response":
+        return (effect,)
+    (placed,) = placed_effects(replace(model, effects=(effect,)), inputs, outputs)
+    if effect.law is not None:
+        return (replace(effect, law=_turned_law(effect.law, placed.sites[0], way, channels)),)
+    letters = [effect.axis] if effect.axis is not None else [axis_letter(inputs[site], inputs) for site in placed.sites]
+    return tuple(
+        replace(effect, axis=letter, parameters=_turned_numbers(effect, site, way))
+        for site, letter in zip(placed.sites, letters, strict=True)
+    )
+
+
+def _turned_numbers(effect: ModelEffect, site: int, way: FloatArray) -> dict[str, float]:
+    numbers = dict(effect.parameters)
+    for place, name in enumerate(TILTED.get(effect.kind, ()), start=1):
+        if name in numbers:
+            numbers[name] *= float(way[site] * way[(site + place) % len(way)])
+    if way[site] > 0:
+        return numbers
+    turned = TURNED.get(effect.kind, "")
+    if turned in numbers:
+        numbers[turned] = -numbers[turned]
+    if effect.kind in SWAPPED:
+        first, second = SWAPPED[effect.kind]
+        numbers[first], numbers[second] = numbers[second], numbers[first]
+    return numbers
+
+
+def _turned_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]) -> Law:
+    """With the signals of turned axes negated, and what it gives, where its own axis is turned."""
+    inputs, outputs = channels
+    letters, against = axis_names(inputs), set[str]()
+    for axis in np.flatnonzero(way < 0):
+        against |= {inputs[axis], *(prefix + letters[axis] for prefix in (*DERIVATIVES, COMMAND))}
+        against |= {outputs[axis]} if len(outputs) == len(inputs) else set()
+    tree = _negated(law.tree, against)
+    return replace(law, expression=written(Apply("neg", (tree,)) if way[site] < 0 else tree, None, None))
+
+
+def _negated(node: Node, against: set[str]) -> Node:
+    match node:
+        case Variable(name) if name in against:
+            return Apply("neg", (node,))
+        case Apply(name, parts):
+            return Apply(name, tuple(_negated(part, against) for part in parts))
+    return node
