@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, axis_names
-from equalizer.effects.placing import axis_letter, placed_effects
+from equalizer.effects.placing import axis_letter, place_effects
 from equalizer.laws.law import Law
 from equalizer.laws.tree import Apply, Node, Variable, written
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
@@ -44,7 +44,7 @@ def _turned_effects(
         return (effect,)
     if effect.law is not None and effect.law.acts_on == "response":
         return (effect,)
-    (placed,) = placed_effects(replace(model, effects=(effect,)), inputs, outputs)
+    (placed,) = place_effects(replace(model, effects=(effect,)), inputs, outputs)
     if effect.law is not None:
         return (replace(effect, law=_turned_law(effect.law, placed.sites[0], way, channels)),)
     letters = [effect.axis] if effect.axis is not None else [axis_letter(inputs[site], inputs) for site in placed.sites]

@@ -9,15 +9,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.judge_laws import Balance, family_of
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
-from analysis.diagnosis.balance.structures import values_of
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
+from analysis.diagnosis.confirm.laws_to_play import (
+    CONSTANT,
+    as_claim,
+    can_be_played,
+    constants_of,
+    refitted,
+    released_numbers,
+)
+from analysis.diagnosis.errors.hypothesis import together
 from analysis.diagnosis.errors.output_error import evaluated
-from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import final_errors
@@ -26,10 +31,8 @@ from analysis.diagnosis.search.search_context import FittedCandidate, SearchCont
 from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
 from analysis.diagnosis.search.without_effect import without_effect
 from analysis.diagnosis.settings import HELD_OUT_ERROR, INTERVAL_FACTOR
-from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.signal import FloatArray
 
-CONSTANT = "constant_force"
 CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
 """Effects that are numbers of a fitted model, and their values."""
 SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
@@ -41,7 +44,8 @@ ONLY_BESIDE_CALIBRATION = (
 VAGUE = 1.96 * INTERVAL_FACTOR
 """Standard errors of a logarithm from which an interval reaches a number that is none."""
 HELD_BY_SIMULATION = 0.9
-"""Times the re-tuned model's held-out error that the completed one may leave at most, in the measure that suits."""
+"""Times the held-out error without new physics that the completed model may leave at most, in the measure that suits.
+"""
 
 
 def searched_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> Searched | None:
@@ -51,30 +55,29 @@ def searched_by_balance(context: SearchContext, balances: Sequence[Balance], rep
         (axis, law)
         for axis, balance in enumerate(balances)
         for law in balance.named
-        if law.law.effect != CONSTANT and _plays(balance.search.regression.beside.own, law)
+        if law.law.effect != CONSTANT and can_be_played(balance.search.regression.beside.own, law)
     ]
     if not named:
         return None
-    constant = _constants(balances)
+    constant = constants_of(balances)
     given = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), constant)
     before, retuned = context.confirmed(context.candidate(given)), context.candidate(refine(context, given))
     confirmed = context.confirmed(retuned)
-    named = _refitted(balances, named)
+    named, plain = refitted(balances, named), Explanation(before, confirmed, confirmed, (), ()).plain
     while named:
-        steps, after = _from_starts(context, balances, (retuned, confirmed), named)
-        ends = (before, confirmed, after)
-        explained = Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
+        steps, after = _from_starts(context, balances, (retuned, plain), named)
+        explained = Explanation(before, confirmed, after, tuple((step,) for step in steps), tuple(steps))
         vague: int | None = len(named) - 1
         errors: FloatArray | None = None
-        if _borne_out(confirmed, ends[2]):
+        if _borne_out(plain, after):
             errors = final_errors(context, explained)
             vague = _vague(explained, errors[len(context.tuning.names) :], len(constant.claims))
         if vague is None:
-            sealed = float(np.nanmax(ends[2].score.test, initial=0.0))
+            sealed = float(np.nanmax(after.score.test, initial=0.0))
             whole = repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
             judged = Judgement("explained" if whole else "partly_explained", True)
             return Searched(context, explained, judged, errors=errors)
-        named = _refitted(balances, [law for number, law in enumerate(named) if number != vague])
+        named = refitted(balances, [law for number, law in enumerate(named) if number != vague])
     return None
 
 
@@ -102,7 +105,7 @@ def unconfirmed_beside_motion(seen: Searched) -> Searched:
     found, told = seen.found, []
     doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
     for place in reversed(doubtful):
-        gain = held_out_gain(seen.context.whole, found.retuned, seen.context.confirmed(found.steps[place]))
+        gain = held_out_gain(seen.context.whole, found.plain, seen.context.confirmed(found.steps[place]))
         if gain is not None and gain.gain > 0:
             told.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, ONLY_BESIDE_CALIBRATION))
         if len(found.steps) > 1:
@@ -117,23 +120,8 @@ def unconfirmed_beside_motion(seen: Searched) -> Searched:
 
 def _takes_enough(context: SearchContext, found: Explanation) -> bool:
     """Whether the last effect takes a notable share of the held-out error power beside those before it."""
-    before = context.confirmed(found.steps[-2]) if len(found.steps) > 1 else found.retuned
-    left, without = (float(np.nanmean(np.log(each.score.test))) for each in (found.after, before))
-    return not left > without + np.log(1 - NOTABLE) / 2
-
-
-def _refitted(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
-    """With the numbers that the balances give these laws alone."""
-    found = []
-    for axis, law in named:
-        if law.place == NO_COLUMN:
-            found.append((axis, law))
-            continue
-        regression = balances[axis].search.regression
-        places = [other.place for of, other in named if of == axis and other.place != NO_COLUMN]
-        values = values_of(regression, places)[places.index(law.place)]
-        found.append((axis, law if values is None else replace(law, values=values)))
-    return found
+    before = context.confirmed(found.steps[-2]) if len(found.steps) > 1 else found.plain
+    return not found.after.held_out > before.held_out + np.log(1 - NOTABLE) / 2
 
 
 def _from_starts(
@@ -142,16 +130,16 @@ def _from_starts(
     without: tuple[FittedCandidate, FittedCandidate],
     named: Sequence[tuple[int, JudgedLaw]],
 ) -> tuple[list[FittedCandidate], FittedCandidate]:
-    """The steps, and the last of them on all samples. without: the re-tuned model, and the same on all samples. From
-    the balance's linear numbers; where that ends beside the law, from the model's own."""
-    retuned, confirmed = without
-    released = _released(context.tuning, balances, [law.place for _, law in named])
+    """The steps, and the last of them on all samples. without: the re-tuned model, and what there is without new
+    physics on all samples. From the balance's linear numbers; where that ends beside the law, from the model's own."""
+    retuned, plain = without
+    released = released_numbers(context.tuning, balances, [law.place for _, law in named])
     steps = _steps(context, retuned, named, released)
     after = context.confirmed(steps[-1])
-    if np.any(released) and not _borne_out(confirmed, after):
+    if np.any(released) and not _borne_out(plain, after):
         again = _steps(context, retuned, named, np.zeros(len(released)))
         other = context.confirmed(again[-1])
-        if np.nanmean(np.log(other.score.test)) < np.nanmean(np.log(after.score.test)):
+        if other.held_out < after.held_out:
             return again, other
     return steps, after
 
@@ -163,7 +151,7 @@ def _steps(
     whole = retuned.fitted.hypothesis
     steps = [retuned for _ in whole.claims]
     for axis, law in named:
-        start = evaluated(context.measure, context.tuning, deviations, together(whole, _claimed(axis, law)))
+        start = evaluated(context.measure, context.tuning, deviations, together(whole, as_claim(axis, law)))
         found = refine(context, start)
         steps.append(context.candidate(found))
         whole, deviations = found.hypothesis, found.deviations
@@ -196,54 +184,5 @@ def leaves_open(searched: Searched) -> bool:
     )
 
 
-def _constants(balances: Sequence[Balance]) -> Hypothesis:
-    """A constant force along each axis: a weight, or the offset of an amplifier or sensor, which no model's matrices
-    hold."""
-    whole = NOTHING
-    for axis, balance in enumerate(balances):
-        regression = balance.search.regression
-        if regression.prior is not None:
-            continue
-        force = -float(regression.weights(regression.columns_of(()))[-1])
-        if force:
-            claim = Claim(EFFECTS[CONSTANT], "one", (axis,))
-            whole = together(whole, claimed(claim, [{"force": force}]))
-    return whole
-
-
-def _plays(own: int, weighed: JudgedLaw) -> bool:
-    effect = EFFECTS.get(weighed.law.effect)
-    if effect is None or weighed.law.channel != own:
-        return False
-    return all(
-        parameter.name in weighed.values and parameter.lower <= weighed.values[parameter.name] <= parameter.upper
-        for parameter in effect.parameters
-    )
-
-
-def _claimed(axis: int, weighed: JudgedLaw) -> Hypothesis:
-    effect = EFFECTS[weighed.law.effect]
-    return claimed(Claim(effect, "one", (axis,)), [{p.name: weighed.values[p.name] for p in effect.parameters}])
-
-
-def _released(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
-    """Mass, damping and stiffness as they are beside laws of the only balance, not as they were fitted without them."""
-    start = np.zeros(len(tuning.names))
-    if any(balance.search.regression.prior is not None for balance in balances):
-        return start
-    model = tuning.model
-    if len(balances) != 1 or model.coordinates != 1:
-        return start
-    regression = balances[0].search.regression
-    weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
-    given = (model.mass, model.damping, model.stiffness)
-    for place, (weight, matrix) in enumerate(zip(weights, given, strict=False)):
-        if place == 0:
-            weight = max(weight, matrix[0, 0] / 10)
-        start[place] = np.clip((weight - matrix[0, 0]) / tuning.deviation[place], -3.9, 3.9)
-    return start
-
-
-def _borne_out(retuned: FittedCandidate, after: FittedCandidate) -> bool:
-    left, right = (float(np.mean(np.log(each.score.test))) for each in (retuned, after))
-    return not np.isfinite(left) or right <= left + np.log(HELD_BY_SIMULATION)
+def _borne_out(plain: FittedCandidate, after: FittedCandidate) -> bool:
+    return not np.isfinite(plain.held_out) or after.held_out <= plain.held_out + np.log(HELD_BY_SIMULATION)

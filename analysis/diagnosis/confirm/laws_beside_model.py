@@ -66,8 +66,8 @@ def objection(seen: Searched, balances: Sequence[Balance]) -> str:
     context, found = seen.context, seen.found
     if not found.steps:
         return "it takes too little of the error to be added"
-    whole = held_out_gain(context.whole, found.retuned, found.after)
-    before = context.confirmed(found.steps[-2]) if len(found.steps) > 1 else found.retuned
+    whole = held_out_gain(context.whole, found.plain, found.after)
+    before = context.confirmed(found.steps[-2]) if len(found.steps) > 1 else found.plain
     last = held_out_gain(context.whole, before, found.after)
     if whole is None or last is None:
         return "too little was held out to confirm it"
@@ -127,7 +127,7 @@ def _unconfirmed(seen: Searched, why_not: str) -> tuple[Unconfirmed, ...]:
         first.setdefault(candidate.newest, candidate)
     found = []
     for place, candidate in enumerate([*first.values()][:SHOWN]):
-        gain = held_out_gain(seen.context.whole, seen.found.retuned, seen.context.confirmed(candidate))
+        gain = held_out_gain(seen.context.whole, seen.found.plain, seen.context.confirmed(candidate))
         if gain is not None and gain.gain > 0:
             found.append(Unconfirmed(candidate.fitted.hypothesis, gain.gain, why_not if place == 0 else _behind(gain)))
     return tuple(sorted(found, key=lambda each: -each.gain))

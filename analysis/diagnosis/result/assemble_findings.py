@@ -152,7 +152,7 @@ def _named(searched: Searched, errors: FloatArray, said: Said) -> tuple[NamedEff
     if found.statistic is not None or len(found.steps) != len(effects):
         return effects
     between = [context.confirmed(step) for step in found.steps[:-1]]
-    return with_gains(effects, context.whole, (found.retuned, *between, found.after))
+    return with_gains(effects, context.whole, (found.plain, *between, found.after))
 
 
 def _proposal(context: SearchContext, found: Explanation, judged: Judgement) -> Proposal | None:

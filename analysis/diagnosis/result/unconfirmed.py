@@ -50,7 +50,7 @@ def _gain_of(box: BlackBox | None) -> float:
 def with_gains(
     effects: Sequence[NamedEffect], measure: ErrorMeasure, stages: Sequence[FittedCandidate]
 ) -> tuple[NamedEffect, ...]:
-    """stages: with the sealed samples, the re-tuned model and what stood after each effect."""
+    """stages: with the sealed samples, the model without new physics and what stood after each effect."""
     named = []
     for place, effect in enumerate(effects):
         gain = held_out_gain(measure, stages[place], stages[place + 1])

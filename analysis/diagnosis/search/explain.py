@@ -108,6 +108,12 @@ class Explanation:
     """A fit, and the standard errors of all its numbers, where they were computed already; as `final_errors`."""
 
     @property
+    def plain(self) -> FittedCandidate:
+        """Without new physics, what foretells the held-out samples better: re-tuning may follow what was fitted to, and
+        what is found must not be measured by the harm that it undoes."""
+        return min(self.retuned, self.before, key=lambda candidate: candidate.held_out)
+
+    @property
     def stages(self) -> dict[str, Fitted]:
         return {"before": self.before.fitted, "retuned": self.retuned.fitted, "after": self.after.fitted}
 

@@ -37,6 +37,12 @@ class FittedCandidate:
         """Name of the effect that was added last."""
         return self.fitted.hypothesis.claims[-1].effect.name
 
+    @property
+    def held_out(self) -> float:
+        """Mean logarithm of the channels' held-out errors; infinite where there is none, or where it runs away."""
+        left = float(np.mean(np.log(self.score.test)))
+        return np.inf if np.isnan(left) else left
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchContext:

@@ -17,6 +17,7 @@ from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
 from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.search.verdict import Judgement
 from equalizer.effects.catalogue import EFFECTS
 
@@ -51,7 +52,7 @@ def test_a_law_goes_by_its_main_number_and_a_refinement_by_any(laws, errors, dro
 
 
 def ends_at(error):
-    return SimpleNamespace(score=SimpleNamespace(test=np.array([error])))
+    return FittedCandidate(None, SimpleNamespace(test=np.array([error])))
 
 
 @pytest.mark.parametrize(
@@ -69,18 +70,50 @@ def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_be
         return [ends_at(from_balance if np.any(deviations) else from_model)]
 
     monkeypatch.setattr(by_balance, "_steps", steps)
-    monkeypatch.setattr(by_balance, "_released", lambda tuning, balances, laws: np.array([1.0, -2.0]))
+    monkeypatch.setattr(by_balance, "released_numbers", lambda tuning, balances, laws: np.array([1.0, -2.0]))
     context = SimpleNamespace(tuning=None, confirmed=lambda candidate: candidate)
     _, after = _from_starts(context, (), (ends_at(8.0), ends_at(8.0)), ())
     assert after.score.test[0] == end
     assert len(tried) == starts
 
 
+@pytest.mark.parametrize(
+    ("given", "retuned", "plain"), [(1.0, 2.0, 1.0), (2.0, 1.0, 1.0), (1.0, np.nan, 1.0), (np.inf, 3.0, 3.0)]
+)
+def test_without_new_physics_stands_what_foretells_better(given, retuned, plain):
+    found = Explanation(ends_at(given), ends_at(retuned), ends_at(0.5), (), ())
+    assert found.plain.score.test[0] == plain
+
+
+@pytest.mark.parametrize(("given", "is_named"), [(4.0, True), (1.0, False)])
+def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkeypatch, given, is_named):
+    """Re-tuning followed what was fitted to, to 4; the law brings that back to 1.1."""
+    law = SimpleNamespace(law=SimpleNamespace(effect="coulomb_friction"), place=0)
+    regression = SimpleNamespace(beside=SimpleNamespace(own=0))
+    balance = SimpleNamespace(named=(law,), search=SimpleNamespace(regression=regression))
+    patched = {
+        "can_be_played": lambda own, weighed: True, "constants_of": lambda balances: SimpleNamespace(claims=()),
+        "refitted": lambda balances, named: named, "evaluated": lambda *of: given, "refine": lambda *of: 4.0,
+        "final_errors": lambda *of: np.zeros(1), "_vague": lambda *of: None,
+        "_from_starts": lambda *of: ([ends_at(1.1)], ends_at(1.1)),
+    }  # fmt: skip
+    for name, stand_in in patched.items():
+        monkeypatch.setattr(by_balance, name, stand_in)
+    context = SimpleNamespace(
+        measure=None, tuning=SimpleNamespace(names=()), candidate=ends_at, confirmed=lambda each: each
+    )
+    found = by_balance.searched_by_balance(context, (balance,), False)
+    assert (found is not None) == is_named
+
+
 def candidate(*names):
     hypothesis = SimpleNamespace(claims=names)
     score = SimpleNamespace(worst_channel=9.0, mean_log_error=9.0, test=np.array([9.0]))
     return SimpleNamespace(
-        newest=names[-1] if names else "", fitted=SimpleNamespace(hypothesis=hypothesis), score=score
+        newest=names[-1] if names else "",
+        fitted=SimpleNamespace(hypothesis=hypothesis),
+        score=score,
+        held_out=float(np.log(9.0)),
     )
 
 

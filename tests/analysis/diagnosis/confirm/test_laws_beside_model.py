@@ -94,7 +94,7 @@ def test_chance_is_no_gain():
 def searched(after, rival=None):
     context = SimpleNamespace(whole=MEASURE, confirmed=lambda each: each)
     rounds = ((after, *(() if rival is None else (rival,))),)
-    found = SimpleNamespace(steps=(after,), retuned=candidate(NOISE), after=after, rounds=rounds)
+    found = SimpleNamespace(steps=(after,), plain=candidate(NOISE), after=after, rounds=rounds)
     return SimpleNamespace(context=context, found=found)
 
 

@@ -1,0 +1,79 @@
+"""Laws that a force balance named as hypotheses of a simulation: which it can play, from which numbers."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.actuator import NO_COLUMN
+from analysis.diagnosis.balance.judge_laws import Balance
+from analysis.diagnosis.balance.judged_law import JudgedLaw
+from analysis.diagnosis.balance.structures import values_of
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
+from analysis.diagnosis.errors.tuning import Tuning
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.signals.signal import FloatArray
+
+CONSTANT = "constant_force"
+
+
+def can_be_played(own: int, judged: JudgedLaw) -> bool:
+    effect = EFFECTS.get(judged.law.effect)
+    if effect is None or judged.law.channel != own:
+        return False
+    return all(
+        parameter.name in judged.values and parameter.lower <= judged.values[parameter.name] <= parameter.upper
+        for parameter in effect.parameters
+    )
+
+
+def refitted(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
+    """With the numbers that the balances give these laws alone."""
+    found = []
+    for axis, law in named:
+        if law.place == NO_COLUMN:
+            found.append((axis, law))
+            continue
+        regression = balances[axis].search.regression
+        places = [other.place for of, other in named if of == axis and other.place != NO_COLUMN]
+        values = values_of(regression, places)[places.index(law.place)]
+        found.append((axis, law if values is None else replace(law, values=values)))
+    return found
+
+
+def constants_of(balances: Sequence[Balance]) -> Hypothesis:
+    """A constant force along each axis: a weight, or the offset of an amplifier or sensor, which no model's matrices
+    hold."""
+    whole = NOTHING
+    for axis, balance in enumerate(balances):
+        regression = balance.search.regression
+        if regression.prior is not None:
+            continue
+        force = -float(regression.weights(regression.columns_of(()))[-1])
+        if force:
+            claim = Claim(EFFECTS[CONSTANT], "one", (axis,))
+            whole = together(whole, claimed(claim, [{"force": force}]))
+    return whole
+
+
+def as_claim(axis: int, judged: JudgedLaw) -> Hypothesis:
+    effect = EFFECTS[judged.law.effect]
+    return claimed(Claim(effect, "one", (axis,)), [{p.name: judged.values[p.name] for p in effect.parameters}])
+
+
+def released_numbers(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
+    """Mass, damping and stiffness as they are beside laws of the only balance, not as they were fitted without them."""
+    start = np.zeros(len(tuning.names))
+    if any(balance.search.regression.prior is not None for balance in balances):
+        return start
+    model = tuning.model
+    if len(balances) != 1 or model.coordinates != 1:
+        return start
+    regression = balances[0].search.regression
+    weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
+    given = (model.mass, model.damping, model.stiffness)
+    for place, (weight, matrix) in enumerate(zip(weights, given, strict=False)):
+        if place == 0:
+            weight = max(weight, matrix[0, 0] / 10)
+        start[place] = np.clip((weight - matrix[0, 0]) / tuning.deviation[place], -3.9, 3.9)
+    return start
