@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, axis_names
 from equalizer.effects.placing import axis_letter, place_effects
 from equalizer.laws.law import Law
-from equalizer.laws.tree import Apply, Node, Variable, written
+from equalizer.laws.tree import Apply, Node, Variable, format_formula
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.signal import FloatArray
 
@@ -78,7 +78,7 @@ def _turned_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str,
         against |= {inputs[axis], *(prefix + letters[axis] for prefix in (*DERIVATIVES, COMMAND))}
         against |= {outputs[axis]} if len(outputs) == len(inputs) else set()
     tree = _negated(law.tree, against)
-    return replace(law, expression=written(Apply("neg", (tree,)) if way[site] < 0 else tree, None, None))
+    return replace(law, expression=format_formula(Apply("neg", (tree,)) if way[site] < 0 else tree, None, None))
 
 
 def _negated(node: Node, against: set[str]) -> Node:
