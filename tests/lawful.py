@@ -69,7 +69,7 @@ def arena_of(recording: Recording, model: MechanicalModel | None = None) -> tupl
     given = model or device(1)
     measure = measure_of([recording], given).measure
     tuning = tuning_of(given, recording.command.channels)
-    context = SearchContext(measure.shortened(), measure, tuning, map)
+    context = SearchContext(measure.shorten(), measure, tuning, map)
     before = evaluated(context.measure, tuning, np.zeros(len(tuning.names)), NOTHING)
     given_, retuned = (context.confirmed(context.candidate(fitted)) for fitted in (before, retuned_alone(context)))
     return context, Explanation(given_, retuned, retuned, (), ())

@@ -196,7 +196,7 @@ def _search_context(recording: Recording, look: Look, settings: DiagnosisSetting
     measure = look.chosen.measure
     model = with_units_of(look.model, recording.command.units, recording.response.units, time_unit(recording))
     tuning = tuning_of(model, recording.command.channels)
-    return SearchContext(measure.shortened(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
+    return SearchContext(measure.shorten(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
 
 
 def _by_search(

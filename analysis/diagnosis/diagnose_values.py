@@ -13,7 +13,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 
-def _untold(what: str, share: float) -> None:
+def _ignore_progress(what: str, share: float) -> None:
     """No progress is shown."""
 
 
@@ -22,7 +22,7 @@ def diagnose_values(
     model: MechanicalModel | None = None,
     settings: DiagnosisSettings | None = None,
     map_: Mapper = map,
-    progress: Progress = _untold,
+    progress: Progress = _ignore_progress,
 ) -> Findings:
     """Which physics a model of the device lacks.
 

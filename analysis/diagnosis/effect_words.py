@@ -1,4 +1,4 @@
-"""What people call the effects of the vocabulary, where they say an effect sits, and how they read out its numbers."""
+"""Plain words for the effects of the vocabulary: their nouns, their places, and how their parameters are read out."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -98,7 +98,7 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
 
 @dataclass(frozen=True, slots=True)
 class LawWords:
-    """Of a law that the vocabulary lacks."""
+    """Words, units and place of a law that the vocabulary lacks."""
 
     words: EffectWords
     units: Mapping[str, tuple[str, str]] = field(default_factory=dict)
@@ -165,13 +165,13 @@ OF_THE_WHOLE = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", 
 
 
 def noun_of(effect: str) -> str:
-    """What people call it; its own name with spaces where there is no word for it."""
+    """The plain noun of an effect; its name with spaces where it has none."""
     known = _words(effect)
     return known.noun if known else effect.replace("_", " ")
 
 
 def place_of(effect: str) -> Place:
-    """Of one of the vocabulary, or of a law that it lacks."""
+    """Where an effect of the vocabulary acts, or a law that it lacks."""
     known = EFFECTS_BY_NAME.get(effect)
     law = LAW_WORDS.get(effect)
     return known.place if known is not None else "mechanism" if law is None else law.place
@@ -183,7 +183,7 @@ def _words(effect: str) -> EffectWords | None:
 
 
 def unit_of(effect: str, parameter: str, system: UnitSystem) -> str:
-    """Of a parameter; 1 where it is not known."""
+    """The unit of an effect's parameter; "1" where it is not known."""
     if effect in LAW_WORDS:
         linear, turning = LAW_WORDS[effect].units.get(parameter, ("1", "1"))
         return turning if system.rotational else system.express(linear)

@@ -1,4 +1,4 @@
-"""A law that has no name, as a diagnosis writes it."""
+"""A discovered law as the diagnosis document writes it: a formula with its variables."""
 
 from typing import Annotated, Self
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.command_gaps import across_gaps
-from analysis.diagnosis.data.force_driven import all_force_driven
-from analysis.diagnosis.data.found_segments import with_found_segments
+from analysis.diagnosis.data.command_gaps import bridge_gaps
+from analysis.diagnosis.data.force_driven import all_as_force_driven
+from analysis.diagnosis.data.found_segments import find_segments
 from analysis.diagnosis.data.input_checks import FEW_CYCLES, NothingToDiagnose, require_different, require_something
 from analysis.diagnosis.first_model.plain_form import plain_form
 from analysis.wording import begun, listed
@@ -34,12 +34,12 @@ def prepared(
 ) -> PreparedRecordings:
     """recordings: alike, in the order of names. plain: one motion for each force, as a force balance needs it. short:
     few cycles are a remark and no refusal; None: as plain. Raises NothingToDiagnose."""
-    found = [with_found_segments(each) for each in recordings]
+    found = [find_segments(each) for each in recordings]
     told = [(name, text) for name, (_, text) in zip(names, found, strict=True) if text]
     repeats = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in told)
     read = tuple(each for each, _ in found)
     formed, said = plain_form(read) if plain else (read, ())
-    driven, gaps = across_gaps(all_force_driven(formed), names)
+    driven, gaps = bridge_gaps(all_as_force_driven(formed), names)
     kept = comparable(driven, names, plain if short is None else short)
     return PreparedRecordings(kept.recordings, (*repeats, *said, *gaps, *kept.remarks))
 

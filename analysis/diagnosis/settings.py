@@ -28,7 +28,7 @@ MOST_GROWTH = 1.0  # e-foldings of a model by itself over the longest recording;
 ANSWER_DEVIATIONS = 5.0  # standard deviations of coherence above noise alone, from which the device answers
 ANSWER_COHERENCE = 0.5  # coherence that must stand out twice as far, or the recordings are too short to be judged
 
-# How samples are split, and how well a model is trusted (`observed`). By hand.
+# How samples are split, and how well a model is trusted (`observe`). By hand.
 MODEL_FLOOR = 0.002  # share of a channel's rms that counts as noise; principle: no model is exact
 LEVELS_TO_STRATIFY = 2  # principle: with more than one, the end of the time would hold one alone
 LEVELS_TO_HOLD_ONE_BACK = 3  # principle: a level to choose by lies between two that are fitted to

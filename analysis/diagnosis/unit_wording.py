@@ -1,4 +1,4 @@
-"""A physical value as people write it: a sensible prefix, as many digits as its interval bears, raised exponents."""
+"""Formats physical values: unit prefix, as many digits as the confidence interval allows, raised exponents."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class Scale:
 
 
 def scale_of(unit: str, magnitude: float) -> Scale:
-    """For values of about this size. unit: SI in ASCII."""
+    """The displayed unit and its factor for values of about this size. unit: SI in ASCII."""
     size = abs(magnitude) if np.isfinite(magnitude) else 0.0
     if unit == "kg":
         return Scale(1.0, "kg") if size >= 1 or size == 0 else Scale(1e3, "g")
@@ -33,12 +33,12 @@ def scale_of(unit: str, magnitude: float) -> Scale:
         return Scale(1.0, "kg m²") if size >= 0.01 or size == 0 else Scale(1e7, "g cm²")
     kept = _KEPT[0] <= size < _KEPT[1] and unit not in _ALWAYS_PREFIXED
     if kept or size == 0 or unit in _NEVER_PREFIXED or unit.startswith("1/"):
-        return Scale(1.0, written(unit))
+        return Scale(1.0, typeset_unit(unit))
     factor, prefix = max((prefixed for prefixed in _PREFIXES if prefixed[0] <= size * (1 + 1e-9)), default=_PREFIXES[0])
-    return Scale(1 / factor, prefix + written(unit))
+    return Scale(1 / factor, prefix + typeset_unit(unit))
 
 
-def written(unit: str) -> str:
+def typeset_unit(unit: str) -> str:
     """ "m/s^2" as "m/s²", "1/m" as "per m"; a plain number has none."""
     shown = "" if unit == "1" else f"per {unit[2:]}" if unit.startswith("1/") else unit
     for ascii_, raised in _RAISED.items():
@@ -83,7 +83,7 @@ def share_text(share: float) -> str:
 
 
 def _decimals(value: float, interval: tuple[float, float] | None) -> int:
-    """So many that the interval's half is written with one digit."""
+    """Decimals with which half the interval's width has one significant digit."""
     size = np.floor(np.log10(abs(value))) if value else 0.0
     if interval is None or not interval[1] > interval[0]:
         return int(max(0, _DIGITS - 1 - size))

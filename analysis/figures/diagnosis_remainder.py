@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from analysis.diagnosis.result.remainder_spectrum import RemainderSpectrum
-from analysis.diagnosis.unit_wording import written
+from analysis.diagnosis.unit_wording import typeset_unit
 from analysis.figures.diagnosis_style import AFTER, RETUNED, power_of_ten
 from analysis.figures.picture import Picture
 from analysis.figures.style import GREY, new_figure, plain_axes, say_nothing_to_draw
@@ -54,7 +54,7 @@ def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
         axes.loglog(spectrum.frequency_hz, spectrum.noise, color=GREY, linewidth=4, alpha=0.4)
     for stage, values in ((RETUNED, spectrum.retuned), (AFTER, spectrum.after)):
         axes.loglog(spectrum.frequency_hz, values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
-    axes.set_title(f"{spectrum.channel} ({written(spectrum.unit)}/√Hz)", fontsize=9, loc="left", pad=3)
+    axes.set_title(f"{spectrum.channel} ({typeset_unit(spectrum.unit)}/√Hz)", fontsize=9, loc="left", pad=3)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))

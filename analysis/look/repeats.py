@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.found_segments import decided_command, found_period
-from analysis.diagnosis.noise.periods import look_samples, settled_periods
+from analysis.diagnosis.data.found_segments import decided_command, find_period
+from analysis.diagnosis.noise.periods import period_samples, settled_periods
 from analysis.look.channels import Stretch, rms
 from analysis.look.check import Check
 from analysis.wording import listed, typeset
@@ -46,7 +46,7 @@ def repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
     marked = [(segment.start, segment.stop) for segment in recording.segments]
     for places in (marked, list(stretches)):  # a segment that was split for a test may hold less than two periods
         start, stop = max(places, key=lambda place: place[1] - place[0], default=(0, 0))
-        if period := found_period(decided_command(recording).samples[start:stop]):
+        if period := find_period(decided_command(recording).samples[start:stop]):
             as_said = replace(recording, segments=(Segment(start, stop, "multisine", 0.0, period),))
             return Repeats(period, (start, stop), _noise(as_said, declared=False))
     return Repeats(0, (0, 0), ())
@@ -55,15 +55,15 @@ def repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
 def _noise(recording: Recording, *, declared: bool) -> tuple[RepeatNoise, ...]:
     found = []
     for periods in settled_periods(recording):
-        if periods.looks < 2:
+        if periods.count < 2:
             continue
-        looks = look_samples(recording.response.samples, periods)
+        looks = period_samples(recording.response.samples, periods)
         mean = looks.mean(axis=0)
-        between = np.sqrt(np.sum((looks - mean) ** 2, axis=(0, 1)) / ((periods.looks - 1) * periods.length))
+        between = np.sqrt(np.sum((looks - mean) ** 2, axis=(0, 1)) / ((periods.count - 1) * periods.length))
         sizes = np.array([rms(column) for column in mean.T])
         share = tuple((between / np.where(sizes > 0, sizes, np.inf)).tolist())
         number = periods.index + 1 if declared else 0
-        found.append(RepeatNoise(number, periods.length, periods.looks, periods.settled, share))
+        found.append(RepeatNoise(number, periods.length, periods.count, periods.settled, share))
     return tuple(found)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.diagnosis.data.found_segments import with_found_segments
+from analysis.diagnosis.data.found_segments import find_segments
 from analysis.look.clock import odd_rate
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.recording_checks import recording_problems
@@ -79,7 +79,7 @@ def build_recording(
         for number, part in enumerate(planned):
             counter = _Counter(number * steps / len(planned), steps, on_progress)
             parts.append(_part(wanted, part, said, counter, budget))
-        recording, repeats = with_found_segments(_joined(wanted, parts, units))
+        recording, repeats = find_segments(_joined(wanted, parts, units))
     except ImportProblemError as error:
         raise ImportRefusedError(what, str(error)) from error
     if problems := recording_problems(recording):

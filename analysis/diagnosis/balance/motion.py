@@ -13,7 +13,7 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from analysis.diagnosis.balance.band import band_begin_hz, band_end_hz
-from analysis.diagnosis.data.measured_motion import filled_gaps
+from analysis.diagnosis.data.measured_motion import fill_gaps
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -110,7 +110,7 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
     moved = [signal for signal in signals if signal is not None]
     order = DERIVATIVE_OF_QUANTITY[moved[0].quantities[0]]
     rate_hz = records[0].recording.sample_rate_hz
-    filled = [filled_gaps(signal.samples) for signal in moved]
+    filled = [fill_gaps(signal.samples) for signal in moved]
     untimed = any(record.recording.meta.get("time") == "unknown" for record in records)
     if band_hz is None:
         band_hz = np.inf if untimed else band_end_hz(filled, rate_hz, order)
@@ -158,7 +158,7 @@ def _motion(
     )
     return Motion(
         rate_hz, band_hz, max(int(rate_hz / (OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
-        acceleration, filled_gaps(record.command), condition, record.fit | record.choose, record.test, lowest_hz,
+        acceleration, fill_gaps(record.command), condition, record.fit | record.choose, record.test, lowest_hz,
     )  # fmt: skip
 
 
@@ -178,7 +178,7 @@ def _motion_without_clock(
     """Without a clock: positions, and which way each changes from sample to sample."""
     return Motion(
         record.recording.sample_rate_hz, np.inf, 1, names, 0, samples, np.gradient(samples, axis=0),
-        np.zeros_like(samples), filled_gaps(record.command), condition, record.fit | record.choose, record.test,
+        np.zeros_like(samples), fill_gaps(record.command), condition, record.fit | record.choose, record.test,
     )  # fmt: skip
 
 
@@ -234,7 +234,7 @@ def _standardised_conditions(records: Sequence[Observed]) -> list[FloatArray]:
     signals = [getattr(record.recording, "condition", None) for record in records]
     if any(signal is None for signal in signals):
         return [np.zeros((len(record.command), 0)) for record in records]
-    filled = [filled_gaps(signal.samples) for signal in signals if signal is not None]
+    filled = [fill_gaps(signal.samples) for signal in signals if signal is not None]
     whole = np.vstack(filled)
     spread = whole.std(axis=0)
     varying = spread > 0

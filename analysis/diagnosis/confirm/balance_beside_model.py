@@ -14,7 +14,7 @@ from analysis.diagnosis.balance.given_base import GivenBase
 from analysis.diagnosis.balance.judge_laws import OF_SIGNAL, Balance, judge_laws
 from analysis.diagnosis.balance.motion import OVERSAMPLED, Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.structures import search_structures
-from analysis.diagnosis.data.carried_weight import carrying
+from analysis.diagnosis.data.carried_weight import add_carried_weight
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observed_parts
@@ -80,7 +80,7 @@ class _Seen:
 def _seen(record: Observed, motion: Motion, model: MechanicalModel) -> _Seen:
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
     known = place_effects(model, recording.command.channels, recording.response.channels)
-    at = _structure(carrying(model, recording), known)
+    at = _structure(add_carried_weight(model, recording), known)
     whole = needed_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     course = whole.axis_position, whole.axis_velocity, whole.axis_acceleration
     entered = actuator_force(model, motion.force, rate_hz, known, recording.hold)
@@ -124,7 +124,7 @@ def _of_modes(
     moved = band_motion(seen, motion.rate_hz, motion.band_hz)
     steps = MOVED * np.eye(len(tuning.names))[first:]
     here, *there = (
-        needed_force(_structure(carrying(tuning.tuned(step), recording), known), moved).force
+        needed_force(_structure(add_carried_weight(tuning.tuned(step), recording), known), moved).force
         for step in (0 * steps[0], *steps)
     )
     yield from ((each - here) / MOVED for each in there)

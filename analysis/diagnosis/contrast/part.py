@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.measured_motion import filled_gaps
+from analysis.diagnosis.data.measured_motion import fill_gaps
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import part_of, parts_of
 from analysis.diagnosis.types import Mask
@@ -71,9 +71,9 @@ def _finite_samples(part: Recording) -> Mask:
 
 
 def _fill_part(part: Recording) -> Part:
-    position = None if part.position is None else filled_gaps(part.position.samples)
+    position = None if part.position is None else fill_gaps(part.position.samples)
     return Part(
-        part, filled_gaps(part.command.samples), filled_gaps(part.response.samples), position, _finite_samples(part)
+        part, fill_gaps(part.command.samples), fill_gaps(part.response.samples), position, _finite_samples(part)
     )
 
 

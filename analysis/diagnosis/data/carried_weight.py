@@ -1,4 +1,4 @@
-"""A known weight that a device carried while one recording was made: the model carries it there, too."""
+"""Adds a known weight that the device carried during one recording to the model of that recording."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,19 +12,19 @@ ADDED_MASS, ADDED_INERTIA = "added_mass_kg", "added_inertia_kg_m2"
 """Keys of a recording's `meta`: along every driven axis, beside what the model has."""
 
 
-def carrying(model: MechanicalModel, recording: Recording) -> MechanicalModel:
+def add_carried_weight(model: MechanicalModel, recording: Recording) -> MechanicalModel:
     added = recording.meta.get(_key(model), 0.0)
-    return heavier(model, float(added)) if added else model
+    return add_mass(model, float(added)) if added else model
 
 
-def heavier(model: MechanicalModel, added: float) -> MechanicalModel:
-    """With as much more mass (or inertia) along every driven axis."""
+def add_mass(model: MechanicalModel, added: float) -> MechanicalModel:
+    """The model with `added` kg (kg m^2) more mass (inertia) along every driven axis."""
     axes = driven_axes(model)
     return replace(model, mass=model.mass + added * axes @ axes.T)
 
 
 def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
-    """Sentences without a full stop."""
+    """What is wrong with the recordings' stated weights, as sentences without a full stop; empty where nothing is."""
     key = _key(model)
     other = ADDED_MASS if key == ADDED_INERTIA else ADDED_INERTIA
     problems = [
@@ -40,8 +40,8 @@ def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], nam
     return tuple(problems)
 
 
-def weighted(recordings: Sequence[Recording]) -> bool:
-    """Whether any says that it was made with a weight."""
+def has_carried_weight(recordings: Sequence[Recording]) -> bool:
+    """Whether any recording was made with a carried weight."""
     return any(key in recording.meta for recording in recordings for key in (ADDED_MASS, ADDED_INERTIA))
 
 

@@ -7,13 +7,13 @@ from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray
 
 PAST = 6
-"""Samples of each that it is told by."""
+"""Past samples of each signal that the command is predicted from."""
 _LEAST = 200
 
 
-def in_closed_loop(recording: Recording) -> bool:
-    """By the excitation that was recorded beside the command, else by whether the responses up to each sample tell the
-    command that is written just after (Granger 1969)."""
+def is_in_closed_loop(recording: Recording) -> bool:
+    """Whether the recording was made under feedback: by the excitation recorded beside the command, else by whether the
+    responses up to each sample help predict the command that is written just after (Granger 1969)."""
     command = recording.command.samples
     if recording.excitation is not None:
         by_feedback = command - recording.excitation.samples
@@ -21,10 +21,10 @@ def in_closed_loop(recording: Recording) -> bool:
     if recording.hold is not Hold.ZERO_ORDER:
         # The command before a sample already depends on the one after it.
         return False
-    return any(_told_by(command[:, axis], recording) for axis in range(command.shape[1]))
+    return any(_is_predicted_by_responses(command[:, axis], recording) for axis in range(command.shape[1]))
 
 
-def _told_by(command: FloatArray, recording: Recording) -> bool:
+def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> bool:
     signals = [recording.response.samples]
     if recording.position is not None:
         signals.append(recording.position.samples)
@@ -36,12 +36,12 @@ def _told_by(command: FloatArray, recording: Recording) -> bool:
         return False
     own = np.column_stack([command[rows - back] for back in range(1, PAST + 1)] + [np.ones(len(rows))])
     others = np.column_stack([seen[rows - back] for back in range(PAST)])
-    alone, helped = _left(command[rows], own), _left(command[rows], np.hstack([own, others]))
-    # A smooth command is told by its own past alone, and nothing can be said.
+    alone, helped = _residual_rms(command[rows], own), _residual_rms(command[rows], np.hstack([own, others]))
+    # A smooth command is predicted by its own past alone, and nothing can be said.
     return bool(alone > 1e-6 * _rms(command[:, None]) and helped < FORETOLD_SHARE * alone)
 
 
-def _left(aim: FloatArray, by: FloatArray) -> float:
+def _residual_rms(aim: FloatArray, by: FloatArray) -> float:
     scale = np.linalg.norm(by, axis=0)
     columns = by / np.where(scale > 0, scale, 1.0)
     found = np.linalg.lstsq(columns, aim, rcond=1e-12)[0]

@@ -1,4 +1,4 @@
-"""Recordings whose command misses samples, as loggers lose them: bridged where nothing can have happened, else cut."""
+"""Fills short gaps in a recorded command by interpolation, and cuts the recording at long ones."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,22 +14,23 @@ from equalizer.signals.signal import FloatArray
 Stretch = tuple[int, int]
 
 
-def across_gaps(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """And a sentence for each recording that was changed; one that would lose too much stays as it is."""
-    found = [_across(recording, name) for recording, name in zip(recordings, names, strict=True)]
+def bridge_gaps(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
+    """The recordings with gaps in their commands filled or cut out, and a sentence for each that was changed. One that
+    would lose too much stays as it is."""
+    found = [_bridge_or_cut(recording, name) for recording, name in zip(recordings, names, strict=True)]
     return tuple(each for each, _ in found), tuple(said for _, said in found if said)
 
 
-def _across(recording: Recording, name: str) -> tuple[Recording, str]:
+def _bridge_or_cut(recording: Recording, name: str) -> tuple[Recording, str]:
     missing: Mask = np.asarray(np.isnan(recording.command.samples).any(axis=1))
     if not missing.any() or missing.all():
         return recording, ""
     edges = np.flatnonzero(np.diff(missing, prepend=False, append=False)).reshape(-1, 2)
     gaps = [(int(start), int(stop)) for start, stop in edges]
-    whole = _interpolated(recording.command.samples)
-    wide = [gap for gap in gaps if not _bridged(recording.command.samples, gap[1] - gap[0])]
+    whole = _interpolate(recording.command.samples)
+    wide = [gap for gap in gaps if not _can_bridge(recording.command.samples, gap[1] - gap[0])]
     narrow = [gap for gap in gaps if gap not in wide]
-    parts = [part for stretch in parts_of(recording) for part in _outside(stretch, wide)]
+    parts = [part for stretch in parts_of(recording) for part in _stretches_between(stretch, wide)]
     if sum(stop - start for start, stop in parts) < LEAST_KEPT * int((~missing).sum()):
         return recording, ""
     filled = replace(recording, command=replace(recording.command, samples=whole))
@@ -47,9 +48,9 @@ def _across(recording: Recording, name: str) -> tuple[Recording, str]:
     return filled, f"{name} misses the command in places: {', '.join(said)}."
 
 
-def _bridged(samples: FloatArray, gap: int) -> bool:
-    """Whether straight lines over so many missing samples foretell the command where it is known: then it cannot have
-    done much in them."""
+def _can_bridge(samples: FloatArray, gap: int) -> bool:
+    """Whether straight lines over so many samples fit the command where it is known: then it changes little in a gap of
+    that length."""
     before, after = (gap + 1) // 2, (gap + 2) // 2
     middle = samples[before : len(samples) - after]
     if not len(middle):
@@ -62,8 +63,8 @@ def _bridged(samples: FloatArray, gap: int) -> bool:
     return bool(np.all(left <= BRIDGED * spread))
 
 
-def _outside(stretch: Stretch, gaps: Sequence[Stretch]) -> list[Stretch]:
-    """What gaps leave of a stretch, where it is long enough to be compared."""
+def _stretches_between(stretch: Stretch, gaps: Sequence[Stretch]) -> list[Stretch]:
+    """The stretches between gaps that are long enough to be compared."""
     begin, left = stretch[0], []
     for start, stop in (*gaps, (stretch[1], stretch[1])):
         left.append((begin, min(max(start, begin), stretch[1])))
@@ -71,7 +72,7 @@ def _outside(stretch: Stretch, gaps: Sequence[Stretch]) -> list[Stretch]:
     return [(start, stop) for start, stop in left if stop - start >= LEAST_SAMPLES]
 
 
-def _interpolated(samples: FloatArray) -> FloatArray:
+def _interpolate(samples: FloatArray) -> FloatArray:
     whole, places = np.array(samples), np.arange(len(samples))
     for column in whole.T:
         known = np.isfinite(column)

@@ -1,4 +1,4 @@
-"""Which lines of a period were driven, and what the silent ones detect.
+"""Classifies the spectral lines of a periodic excitation: driven ones, and silent ones that detect distortion.
 
 A device that is linear answers on driven lines only. Where all driven lines are odd multiples of one, odd distortion
 falls on odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon 2016). Measured from the excitation as
@@ -59,7 +59,7 @@ def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines |
     )
 
 
-def held_samples(command: npt.NDArray[np.float64]) -> int:
+def hold_length(command: npt.NDArray[np.float64]) -> int:
     """Over how many samples each value of the command is held. command: (n, inputs)"""
     moves = np.flatnonzero(np.any(np.diff(command, axis=0) != 0, axis=1))
     return int(np.gcd.reduce(np.diff(moves))) if len(moves) > 16 else 1

@@ -1,9 +1,9 @@
-"""Whether the responses depend on the commands at all, by coherence.
+"""Tests by coherence whether the responses depend on the commands at all.
 
-By the multiple coherence at the lines that the commands drive (Bendat and Piersol, Random Data, 4th ed., 7.3), which
-for K stretches of noise and r independent commands follows a beta distribution with r and K - r degrees of freedom.
-Stretches of a short recording may be shorter than the device's memory; a response that the commands' past foretells on
-held-out samples answers all the same. So does one that foretells its command: beside dry friction or under control, a
+The statistic is the multiple coherence at the lines that the commands drive (Bendat and Piersol, Random Data, 4th ed.,
+7.3), which for K stretches of noise and r independent commands follows a beta distribution with r and K - r degrees of
+freedom. Stretches of a short recording may be shorter than the device's memory, so a response that the commands' past
+predicts on held-out samples counts, too. So does one that predicts its command: beside dry friction or under control, a
 slow force that follows the motion may be hidden below a command's own noise.
 """
 
@@ -20,17 +20,17 @@ from equalizer.signals.spectral_density import hann
 STRETCHES = 12
 """Per command."""
 DRIVEN = 0.01
-"""Of the strongest line's power."""
+"""Power of a driven line, over the strongest line's, at least."""
 SHARED_BY_WINDOW = 2.0
-"""Neighbouring lines share so much of a Hann window that so many count as one."""
+"""Lines that count as one: neighbours are correlated by the Hann window."""
 RANK = 1e-6
 MEMORY, MOST_TAPS, RIDGE = 0.1, 100, 1e-3
-"""Of a recording, that its filter spans; the filter's numbers per command at most; and their shrinkage."""
+"""Share of a recording that the predicting filter spans, its numbers per command at most, and its ridge."""
 
 
-def answer(recordings: Sequence[Recording]) -> float | None:
-    """In standard deviations of what chance brings, that of the best response channel; None where the recordings are
-    too short to tell. recordings: alike, commands without gaps."""
+def response_significance(recordings: Sequence[Recording]) -> float | None:
+    """Excess coherence of the best response channel in standard deviations of that of noise; None where the recordings
+    are too short to tell. recordings: alike, commands without gaps."""
     inputs, outputs = _spectra(recordings)
     if not len(inputs):
         return None
@@ -45,18 +45,18 @@ def answer(recordings: Sequence[Recording]) -> float | None:
     if (ANSWER_COHERENCE - expected.mean()) / spread < 2 * ANSWER_DEVIATIONS:
         return None
     sure = float(((found.mean(axis=0) - expected.mean()) / spread).max())
-    told = sure >= ANSWER_DEVIATIONS or not any(_follow(recording) for recording in recordings)
+    told = sure >= ANSWER_DEVIATIONS or not any(_is_predictable(recording) for recording in recordings)
     return sure if told else None
 
 
-def _follow(recording: Recording) -> bool:
+def _is_predictable(recording: Recording) -> bool:
     command, response = recording.command.samples, recording.response.samples
-    return _foretold(response, command, ahead=False) or _foretold(command, response, ahead=True)
+    return _predicts(response, command, ahead=False) or _predicts(command, response, ahead=True)
 
 
-def _foretold(y: FloatArray, signals: FloatArray, ahead: bool) -> bool:
-    """Whether a filter of signals, fitted to the first half, takes so much of a channel of y in the second. ahead: half
-    of the filter lies in the signals' future, as a derivative does."""
+def _predicts(y: FloatArray, signals: FloatArray, ahead: bool) -> bool:
+    """Whether a linear filter of signals (n, k), fitted to the first half, predicts a channel of y (n, c) in the
+    second. ahead: half of the filter lies in the signals' future, as that of a derivative does."""
     n = len(y)
     every = max(int(MEMORY * n) // MOST_TAPS, 1)
     taps = min(int(MEMORY * n), MOST_TAPS)
@@ -85,7 +85,7 @@ def _spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, ComplexArra
 
 
 def _stretches(recording: Recording, length: int) -> Iterator[tuple[ComplexArray, ComplexArray]]:
-    """Without what is at rest, or has gaps."""
+    """Spectra of commands and responses per stretch, without stretches at rest or with gaps."""
     window = hann(length)[:, None]
     for start in range(0, len(recording) - length + 1, length):
         u, y = (part.samples[start : start + length] for part in (recording.command, recording.response))

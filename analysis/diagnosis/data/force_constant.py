@@ -1,4 +1,4 @@
-"""Commands of a current, a voltage or no unit as forces, where the constant between them was stated."""
+"""Converts commands in A, V or no unit to forces or torques, by a stated force constant."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,7 +10,7 @@ from equalizer.signals.signal import Signal
 from equalizer.signals.unit_system import FORCES, system_of
 
 PUSHED = {"m": ("force", "N"), "rad": ("torque", "N m")}
-"""By the motion's unit: what a command is then, and its unit."""
+"""Quantity and unit of the converted command, by the motion's unit."""
 
 
 class NoForceConstant(ValueError):  # noqa: N818 - an answer that a user reads
@@ -18,7 +18,8 @@ class NoForceConstant(ValueError):  # noqa: N818 - an answer that a user reads
 
 
 def with_force_constant(recording: Recording, constants: Sequence[float]) -> tuple[Recording, str]:
-    """constants: of all commands, or each command's own, in N or N m per unit of the command. And a sentence."""
+    """The recording with its commands as forces, and a sentence about it. constants: one for all commands or one each,
+    in N or N m per unit of the command. Raises NoForceConstant."""
     command, moved = recording.command, system_of(recording.command.units, recording.response.units).length
     if moved not in PUSHED:
         raise NoForceConstant(

@@ -9,7 +9,7 @@ from equalizer.signals.recording import Recording
 _FORCES = frozenset({"force", "torque"})
 
 
-def force_driven(recording: Recording) -> Recording:
+def as_force_driven(recording: Recording) -> Recording:
     """The measured force as the command and the imposed motion as the response, and `imposed` in its meta; any other
     recording as it is."""
     moves = set(recording.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
@@ -25,5 +25,5 @@ def force_driven(recording: Recording) -> Recording:
     )
 
 
-def all_force_driven(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
-    return tuple(force_driven(recording) for recording in recordings)
+def all_as_force_driven(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    return tuple(as_force_driven(recording) for recording in recordings)

@@ -1,4 +1,4 @@
-"""Segments of a recording that has none: parts whose command repeats exactly, with their period and level.
+"""Finds periodic segments in a recording that names none: parts whose command repeats exactly.
 
 A period is only stated where the command itself, sample by sample, is the same one period later, all through the part:
 what was measured with noise, or repeats nearly, is left without. Where no part repeats, nothing is stated at all.
@@ -30,9 +30,9 @@ ROUNDED = 1e-3
 MOST_SAMPLES = 2**19
 
 
-def with_found_segments(recording: Recording) -> tuple[Recording, str]:
-    """And a sentence about what was found; the same recording and no sentence where it has segments, or where no part
-    of its command repeats."""
+def find_segments(recording: Recording) -> tuple[Recording, str]:
+    """The recording with the segments found, and a sentence about them; unchanged and without a sentence where it has
+    segments, or where no part of its command repeats."""
     if recording.segments:
         return recording, ""
     parts = parts_of(recording)
@@ -44,11 +44,11 @@ def with_found_segments(recording: Recording) -> tuple[Recording, str]:
         Segment(start, stop, _kind(decided[start:stop], period), _peak(recording.command, start, stop), period)
         for (start, stop), period in zip(parts, periods, strict=True)
     )
-    return replace(recording, segments=segments), _said(segments)
+    return replace(recording, segments=segments), _segments_sentence(segments)
 
 
 def decided_command(recording: Recording) -> Signal:
-    """What was decided beforehand: the excitation where there is one that moves, else the command."""
+    """The signal that was designed beforehand: the excitation where one was recorded and varies, else the command."""
     excitation = recording.excitation
     if excitation is None:
         return recording.command
@@ -57,9 +57,9 @@ def decided_command(recording: Recording) -> Signal:
 
 
 def exact_period(command: FloatArray) -> int:
-    """Samples after which all of the command is the same again; 0 where it is not, or not often enough. An odd multiple
-    of the shortest, where that is too short to tell anything by itself. command: (n, m)"""
-    period = found_period(command)
+    """Period in samples after which the command (n, m) repeats exactly; 0 where it does not, or not often enough. An
+    odd multiple of the shortest period where that is too short to be of use."""
+    period = find_period(command)
     if not period or len(command) // period < LEAST_WHOLE or not _is_same(command[period:], command[:-period]):
         return 0
     if period >= LEAST_BY_ITSELF:
@@ -70,8 +70,8 @@ def exact_period(command: FloatArray) -> int:
     return multiple if multiple >= LEAST_BY_ITSELF else 0
 
 
-def found_period(command: FloatArray) -> int:
-    """The shortest after which the command repeats, nearly, once more or oftener; 0 where none is. command: (n, m)"""
+def find_period(command: FloatArray) -> int:
+    """The shortest period in samples after which the command (n, m) nearly repeats, by autocorrelation; 0 = none."""
     used = command[:MOST_SAMPLES]
     sizes = np.std(used, axis=0) if used.size else np.zeros(command.shape[1])
     if not np.isfinite(used).all() or not (sizes > 0).any() or len(used) < 2 * SHORTEST:
@@ -90,7 +90,7 @@ def found_period(command: FloatArray) -> int:
 
 
 def _correlation(samples: FloatArray) -> FloatArray:
-    """(n,): with itself, a number of samples later, by the energy of both where they overlap."""
+    """(n,): autocorrelation by lag, normalised by the energy of both copies where they overlap."""
     n = len(samples)
     size = 2 ** int(np.ceil(np.log2(2 * n)))
     spectrum = np.fft.rfft(samples, size, axis=0)
@@ -102,7 +102,7 @@ def _correlation(samples: FloatArray) -> FloatArray:
 
 
 def _is_same(later: FloatArray, before: FloatArray) -> bool:
-    """Each channel, but for the rounding of its numbers."""
+    """Whether each channel is the same, but for rounding."""
     if not np.isfinite(later).all() or not np.isfinite(before).all():
         return False
     for column, other in zip(later.T, before.T, strict=True):
@@ -128,7 +128,7 @@ def _peak(command: Signal, start: int, stop: int) -> float:
     return float(np.abs(known).max()) if known.size else 0.0
 
 
-def _said(segments: Sequence[Segment]) -> str:
+def _segments_sentence(segments: Sequence[Segment]) -> str:
     periodic = [segment for segment in segments if segment.period]
     periods = listed([str(period) for period in sorted({segment.period for segment in periodic})])
     levels = listed([f"{level:.4g}" for level in sorted({segment.amplitude for segment in periodic})])

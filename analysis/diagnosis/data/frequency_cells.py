@@ -16,12 +16,12 @@ def octaves_between(from_hz: float, to_hz: float) -> tuple[Band, ...]:
     return tuple((2.0**power, 2.0 ** (power + 1)) for power in range(first, last + 1))
 
 
-def within(frequency_hz: FloatArray, band_hz: Band) -> Mask:
+def lines_in_band(frequency_hz: FloatArray, band_hz: Band) -> Mask:
     """(lines,): lower edge included, upper edge excluded."""
     return np.asarray((frequency_hz >= band_hz[0] * (1 - 1e-9)) & (frequency_hz < band_hz[1] * (1 - 1e-9)))
 
 
-def driving_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[str, ...]:
+def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[str, ...]:
     """Which inputs were driven in a segment. power: (inputs,). An input that only reacts, by a feedback, stays below a
     hundredth of the strongest where the excitation was recorded."""
     if power.max(initial=0.0) == 0:

@@ -8,12 +8,12 @@ from equalizer.signals.lockin import ComplexArray
 
 
 def growth_rate(model: MechanicalModel) -> float:
-    """Of its fastest growing or slowest dying motion, 1/s; negative where all motion dies out."""
-    return float(motions(model).real.max())
+    """Largest real part of the model's eigenvalues, 1/s; negative where all free motion decays."""
+    return float(free_motion_rates(model).real.max())
 
 
-def motions(model: MechanicalModel) -> ComplexArray:
-    """(2 coordinates,): rates of its free motions, 1/s; those of swings come in pairs."""
+def free_motion_rates(model: MechanicalModel) -> ComplexArray:
+    """(2 coordinates,): eigenvalues of the model, 1/s; those of oscillations come in pairs."""
     n = model.coordinates
     motion = np.block(
         [
@@ -24,6 +24,6 @@ def motions(model: MechanicalModel) -> ComplexArray:
     return np.asarray(np.linalg.eigvals(motion), dtype=np.complex128)
 
 
-def runs_away(model: MechanicalModel, longest_s: float) -> bool:
+def is_unstable_within(model: MechanicalModel, longest_s: float) -> bool:
     """Whether undisturbed motion grows noticeably within the longest recording."""
     return growth_rate(model) * longest_s > MOST_GROWTH

@@ -1,5 +1,5 @@
-"""Checks before a diagnosis: recordings of one device, a model of that device, enough data. What fails here is refused
-and gets no verdict, not even `unexplained`."""
+"""Input checks of a diagnosis: recordings of one device, a model of that device, enough data. What fails is refused and
+gets no verdict, not even `unexplained`."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 
 from analysis.diagnosis.data.carried_weight import weight_problems
-from analysis.diagnosis.data.driven_response import answer
-from analysis.diagnosis.data.growth import growth_rate, motions
+from analysis.diagnosis.data.driven_response import response_significance
+from analysis.diagnosis.data.growth import free_motion_rates, growth_rate
 from analysis.diagnosis.data.observed_parts import samples_to_fit
 from analysis.diagnosis.settings import (
     ANSWER_DEVIATIONS,
@@ -40,7 +40,7 @@ class NothingToDiagnose(ValueError):  # noqa: N818 - an answer that a user reads
 def require_alike(
     recordings: Sequence[Recording], names: Sequence[str], what_now: str = "diagnose them one by one"
 ) -> None:
-    """Of one device with the same channels, units and rate. Raises NothingToDiagnose."""
+    """Requires recordings with the same channels, units and rate. Raises NothingToDiagnose."""
     if not recordings:
         raise NothingToDiagnose(("there is no recording",))
     first, problems = recordings[0], []
@@ -57,17 +57,20 @@ def require_alike(
 
 
 def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> None:
-    """A command throughout, and responses that move, for long enough. Raises NothingToDiagnose."""
+    """Requires a command without gaps and responses that change and depend on it, for long enough. Raises
+    NothingToDiagnose."""
     problems = [
         problem for recording, name in zip(recordings, names, strict=True) for problem in _gaps(recording.command, name)
     ]
     problems += [
-        problem for recording, name in zip(recordings, names, strict=True) for problem in _absurd(recording, name)
+        problem
+        for recording, name in zip(recordings, names, strict=True)
+        for problem in _impossible_values(recording, name)
     ]
-    problems += _never(recordings)
+    problems += _constant_signals(recordings)
     if not problems:
         known = sum(int(np.isfinite(recording.response.samples).all(axis=1).sum()) for recording in recordings)
-        cycles = sum(_cycles(recording) for recording in recordings)
+        cycles = sum(_command_cycles(recording) for recording in recordings)
         if known < LEAST_SAMPLES:
             problems.append(f"{known} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
         elif known < SHORTEST_SAMPLES and known / recordings[0].sample_rate_hz < SHORTEST_S:
@@ -83,7 +86,7 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
         elif cycles < LEAST_CYCLES:
             needed = f"at least {LEAST_CYCLES:g} are needed, one part to fit and one to test"
             problems.append(f"the recording holds about {cycles:.2g} {FEW_CYCLES}; {needed}")
-        elif (sure := answer(recordings)) is not None and sure < ANSWER_DEVIATIONS:
+        elif (sure := response_significance(recordings)) is not None and sure < ANSWER_DEVIATIONS:
             problems.append(
                 "the responses have nothing to do with the commands: what they share is no more than noise shares with "
                 "anything, so the recording is noise, of another device, or its command was not played"
@@ -93,7 +96,8 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
 
 
 def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> None:
-    """A recording that is taken twice would be tested by what it was fitted to. Raises NothingToDiagnose."""
+    """Requires recordings that differ: one given twice would be tested by what it was fitted to. Raises
+    NothingToDiagnose."""
     problems = [
         f"{names[two]} holds the same samples as {names[first]}, and a recording counts once"
         for first, two in combinations(range(len(recordings)), 2)
@@ -105,13 +109,22 @@ def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> 
 
 
 def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) -> None:
-    """recordings: alike. Raises NothingToDiagnose where the model cannot be of their device."""
+    """Requires a model that can be of the recordings' device. recordings: alike. Raises NothingToDiagnose."""
     first = recordings[0]
     names = [recording.device or f"recording {number}" for number, recording in enumerate(recordings, 1)]
-    problems = (*_size(model, first), *_kind(model, first), *_absurd_model(model))
+    problems = (
+        *_unlike_channel_counts(model, first),
+        *_unlike_quantities(model, first),
+        *_impossible_model_values(model),
+    )
     problems = problems or weight_problems(model, recordings, names)
     if not problems:
-        problems = (*_idle(model, first), *_runaway(model, recordings), *_fast(model, first), *_effects(model, first))
+        problems = (
+            *_unconnected_channels(model, first),
+            *_instability(model, recordings),
+            *_too_fast_modes(model, first),
+            *_misplaced_effects(model, first),
+        )
     if problems:
         raise NothingToDiagnose(problems)
 
@@ -126,7 +139,7 @@ def _gaps(command: Signal, name: str) -> Iterator[str]:
         )
 
 
-def _absurd(recording: Recording, name: str) -> Iterator[str]:
+def _impossible_values(recording: Recording, name: str) -> Iterator[str]:
     for side in ("command", "response", "position"):
         signal: Signal | None = getattr(recording, side)
         for channel in range(0 if signal is None else len(signal.channels)):
@@ -139,7 +152,7 @@ def _absurd(recording: Recording, name: str) -> Iterator[str]:
                 )
 
 
-def _never(recordings: Sequence[Recording]) -> Iterator[str]:
+def _constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
     if all(np.ptp(recording.command.samples, axis=0).max(initial=0.0) == 0 for recording in recordings):
         yield "the command never changes, so the device was not excited"
     for side in ("response", "position"):
@@ -153,14 +166,14 @@ def _never(recordings: Sequence[Recording]) -> Iterator[str]:
                 yield f"{side} {name} never changes: it was not connected, or nothing moved"
 
 
-def _cycles(recording: Recording) -> float:
-    """Of the frequency below which most of the command's power lies; constant parts excite nothing."""
+def _command_cycles(recording: Recording) -> float:
+    """Cycles of the frequency below which most of the command's power lies, its mean left out."""
     power = (np.abs(np.fft.rfft(recording.command.samples, axis=0)) ** 2).sum(axis=1)
     power[0] = 0.0
     return float(np.searchsorted(np.cumsum(power), CYCLES_SHARE * power.sum())) if power.any() else 0.0
 
 
-def _size(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+def _unlike_channel_counts(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     for side, own, channels in (
         ("command", model.inputs, recording.command.channels),
         ("response", model.outputs, recording.response.channels),
@@ -173,27 +186,27 @@ def _size(model: MechanicalModel, recording: Recording) -> Iterator[str]:
             )
 
 
-def _kind(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+def _unlike_quantities(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     other = [quantity for quantity in recording.response.quantities if quantity != model.quantity]
     if other:
         words = ", ".join(sorted(set(other)))
         yield f"the model answers with {model.quantity}, but the recording's response is {words}"
-    turning = _turning(recording)
+    turning = _is_rotational(recording)
     if turning is not None and turning != model.rotational:
         kinds = ("translational (kg, N, m)", "rotational (kg m^2, N m, rad)")
         own, its = kinds[model.rotational], kinds[turning]
         yield f"the model is {own}, but the recording is {its}: {_words(recording.response)}"
 
 
-def _turning(recording: Recording) -> bool | None:
-    """None where the units do not tell, such as volts."""
+def _is_rotational(recording: Recording) -> bool | None:
+    """Whether the response is an angle or its derivative; None where the units do not tell, such as volts."""
     units = recording.response.units
     if any(unit.split("/")[0] == "rad" for unit in units):
         return True
     return False if any(unit.split("/")[0] == "m" for unit in units) else None
 
 
-def _absurd_model(model: MechanicalModel) -> Iterator[str]:
+def _impossible_model_values(model: MechanicalModel) -> Iterator[str]:
     for name in ("mass", "damping", "stiffness", "input", "output"):
         size = float(np.abs(getattr(model, name)).max())
         if size > LARGEST_VALUE:
@@ -202,8 +215,8 @@ def _absurd_model(model: MechanicalModel) -> Iterator[str]:
         yield f"the model's lightest motion has a mass of {lightest:.3g}, which no device has"
 
 
-def _idle(model: MechanicalModel, recording: Recording) -> Iterator[str]:
-    """What drives or sees nothing."""
+def _unconnected_channels(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    """Inputs of the model that drive nothing, or the same motion, and outputs that see nothing."""
     idle = [name for name, column in zip(recording.command.channels, model.input.T, strict=True) if not column.any()]
     blind = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
     if idle:
@@ -217,7 +230,7 @@ def _idle(model: MechanicalModel, recording: Recording) -> Iterator[str]:
         yield f"the model's output lets {', '.join(blind)} see nothing"
 
 
-def _runaway(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
+def _instability(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
     fastest = growth_rate(model)
     longest_s = max(len(recording) / recording.sample_rate_hz for recording in recordings)
     if fastest * longest_s > MOST_GROWTH:
@@ -227,9 +240,9 @@ def _runaway(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterato
         )
 
 
-def _fast(model: MechanicalModel, recording: Recording) -> Iterator[str]:
-    """Where the rate is a thousand times too low, most likely."""
-    swings_hz = np.abs(motions(model).imag) / (2 * np.pi)
+def _too_fast_modes(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    """A slowest mode above half the sample rate: most likely the rate is stated a thousand times too low."""
+    swings_hz = np.abs(free_motion_rates(model).imag) / (2 * np.pi)
     slowest_hz = min((float(swing_hz) for swing_hz in swings_hz if swing_hz > 0), default=0.0)
     if slowest_hz > recording.sample_rate_hz / 2:
         yield (
@@ -238,7 +251,7 @@ def _fast(model: MechanicalModel, recording: Recording) -> Iterator[str]:
         )
 
 
-def _effects(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+def _misplaced_effects(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     try:
         place_effects(model, recording.command.channels, recording.response.channels)
     except PlacingError as problem:

@@ -1,4 +1,4 @@
-"""What a linear prediction of a course from its own past is made of (an autoregression; Yule 1927, Walker 1931)."""
+"""Sample autocovariances of a time series, from which an autoregression is fitted (Yule 1927, Walker 1931)."""
 
 import numpy as np
 
@@ -6,6 +6,6 @@ from equalizer.signals.signal import FloatArray
 
 
 def lagged_products(course: FloatArray, lags: int) -> FloatArray:
-    """(lags + 1, c): sums of lagged products of a course (n, c); what is not known counts as 0."""
+    """(lags + 1, c): sums of lagged products of a time series (n, c); missing samples count as 0."""
     filled: FloatArray = np.where(np.isfinite(course).all(axis=1, keepdims=True), course, 0.0)
     return np.array([np.sum(filled[k:] * filled[: len(filled) - k], axis=0) for k in range(lags + 1)])

@@ -1,4 +1,4 @@
-"""The motion that a recording holds, as positions of the driven axes' own outputs, and its noise."""
+"""The measured positions of the driven axes, integrated from velocities where needed, and their noise."""
 
 from dataclasses import dataclass
 
@@ -32,8 +32,8 @@ def measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFl
     if _has_position(recording, model):
         assert recording.position is not None
         noise = floor.position if floor.position is not None else floor.response
-        return MeasuredMotion(filled_gaps(recording.position.samples[:, :m]), noise.density[:, :m])
-    samples = undo_low_pass(filled_gaps(recording.response.samples[:, :m]), rate_hz, model.sensor.bandwidth_hz)
+        return MeasuredMotion(fill_gaps(recording.position.samples[:, :m]), noise.density[:, :m])
+    samples = undo_low_pass(fill_gaps(recording.response.samples[:, :m]), rate_hz, model.sensor.bandwidth_hz)
     density = floor.response.density[:, :m]
     if DERIVATIVE_OF_QUANTITY[model.quantity] == 0:
         return MeasuredMotion(samples, density)
@@ -47,7 +47,7 @@ def _has_position(recording: Recording, model: MechanicalModel) -> bool:
     return recording.position is not None and recording.position.samples.shape[1] == model.outputs
 
 
-def filled_gaps(samples: FloatArray) -> FloatArray:
+def fill_gaps(samples: FloatArray) -> FloatArray:
     """Samples (n, k), interpolated across what is missing; zero where a channel holds nothing."""
     whole, places = np.array(samples, dtype=np.float64), np.arange(len(samples))
     for column in whole.T:

@@ -16,13 +16,13 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 EXPECTED = 0.1
-"""Rms by which a missing force may change, as a share of the command's,"""
+"""Rms change of a missing force within `CHANGES_S`, over the command's rms."""
 CHANGES_S = 0.005
-"""within such a time."""
+"""Time in s in which a missing force may change by `EXPECTED`."""
 _LEAK = 1e-5
-"""Share of the state that is forgotten per sample: where sensors see no drift, a filter without it does not exist."""
-_STIRRED = 1e-12
-"""Variance that all states gain per sample, in their own size: an equation of exact states has no stable solution."""
+"""Share of the state that is forgotten per sample: without it, states that no sensor observes have no steady filter."""
+_PROCESS_NOISE = 1e-12
+"""Process noise of all states per sample, in their own size: without it the Riccati equation has no stable solution."""
 _DOUBLINGS = 40
 _MATRIX = types.float64[:, ::1]
 _READ = types.Array(types.float64, 2, "C", readonly=True)
@@ -85,7 +85,7 @@ class SmoothedMotion:
     """(n, m), N"""
 
 
-def smoothed_motion(model: MechanicalModel, record: Observed, forces: FloatArray, unit: FloatArray) -> SmoothedMotion:
+def smooth_motion(model: MechanicalModel, record: Observed, forces: FloatArray, unit: FloatArray) -> SmoothedMotion:
     """forces: (n, m), what enters along the axes over each sample's time, effects included. unit: (c,), standard
     deviations of the measured channels. Raises numpy.linalg.LinAlgError where no filter exists."""
     rate_hz, m = record.recording.sample_rate_hz, model.inputs
@@ -93,12 +93,12 @@ def smoothed_motion(model: MechanicalModel, record: Observed, forces: FloatArray
     advance = np.eye(size + m)
     advance[:size, :size], advance[:size, size:] = steps.advance, steps.by_axis_force
     advance *= 1 - _LEAK
-    look, direct = _looks(steps, record.measured.shape[1])
+    look, direct = _observation_matrices(steps, record.measured.shape[1])
     expected = EXPECTED * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12
     walk = np.concatenate([np.zeros(size), expected**2 / (CHANGES_S * rate_hz)])
-    gain, back = _gains(advance, look / unit[:, None], walk, _large(steps, expected))
+    gain, back = _smoother_gains(advance, look / unit[:, None], walk, _state_sizes(steps, expected))
     gain = gain / unit[None, :]
-    seen = _without_direct(model, record, forces, direct)
+    seen = _subtract_feedthrough(model, record, forces, direct)
     pushed = np.hstack([forces @ steps.by_axis_force.T, np.zeros((len(forces), m))])
     out = np.zeros((len(forces), size + m))
     first = seen[np.isfinite(seen).all(axis=1)][:1]
@@ -111,7 +111,7 @@ def smoothed_motion(model: MechanicalModel, record: Observed, forces: FloatArray
     return SmoothedMotion(out[:, :size], moved[:, :m], moved[:, m:], out[:, size:])
 
 
-def _looks(steps: LinearSteps, channels: int) -> tuple[FloatArray, FloatArray]:
+def _observation_matrices(steps: LinearSteps, channels: int) -> tuple[FloatArray, FloatArray]:
     """(c, s + m) of the state and the missing force; (c, m) of the force that acted just before."""
     p, m = len(steps.position), steps.by_axis_force.shape[1]
     of_state = np.vstack([steps.response, steps.position])[:channels]
@@ -119,7 +119,9 @@ def _looks(steps: LinearSteps, channels: int) -> tuple[FloatArray, FloatArray]:
     return np.ascontiguousarray(np.hstack([of_state, of_force])), of_force
 
 
-def _without_direct(model: MechanicalModel, record: Observed, forces: FloatArray, direct: FloatArray) -> FloatArray:
+def _subtract_feedthrough(
+    model: MechanicalModel, record: Observed, forces: FloatArray, direct: FloatArray
+) -> FloatArray:
     seen, p = np.array(record.measured), model.outputs
     if model.sensor.bandwidth_hz > 0:
         seen[:, :p] = undo_low_pass(seen[:, :p], record.recording.sample_rate_hz, model.sensor.bandwidth_hz)
@@ -127,20 +129,22 @@ def _without_direct(model: MechanicalModel, record: Observed, forces: FloatArray
     return seen
 
 
-def _large(steps: LinearSteps, expected: FloatArray) -> FloatArray:
-    """(s + m,): how far the expected force takes each state while it changes."""
+def _state_sizes(steps: LinearSteps, expected: FloatArray) -> FloatArray:
+    """(s + m,): sizes of position, velocity and force that the expected missing force reaches within `CHANGES_S`."""
     n = len(steps.advance) // 2
     fast = np.abs(steps.by_axis_force[n:]) @ expected / steps.step_s * CHANGES_S
     fast = np.maximum(fast, 1e-6 * fast.max())
     return np.concatenate([fast * CHANGES_S, fast, expected])
 
 
-def _gains(advance: FloatArray, look: FloatArray, walk: FloatArray, large: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Of the filter, (s, c), and of the way back, (s, s). look: of channels in units of their noise. Solved in units in
-    which the states are alike large."""
+def _smoother_gains(
+    advance: FloatArray, look: FloatArray, walk: FloatArray, large: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Gains of the Kalman filter (s, c) and of the backward pass (s, s). look: observation matrix of channels in units
+    of their noise. Solved in units in which all states have about the same size."""
     eye = np.eye(len(look))
     scaled, seeing = advance * large[None, :] / large[:, None], look * large[None, :]
-    stirred = np.diag(walk / large**2) + _STIRRED * np.eye(len(advance))
+    stirred = np.diag(walk / large**2) + _PROCESS_NOISE * np.eye(len(advance))
     foreseen = _steady_covariance(scaled, seeing, stirred)
     gain = np.linalg.solve(seeing @ foreseen @ seeing.T + eye, seeing @ foreseen).T
     if np.abs(np.linalg.eigvals(scaled - scaled @ gain @ seeing)).max() >= 1:
@@ -151,8 +155,8 @@ def _gains(advance: FloatArray, look: FloatArray, walk: FloatArray, large: Float
 
 
 def _steady_covariance(advance: FloatArray, seeing: FloatArray, stirred: FloatArray) -> FloatArray:
-    """Of what is foreseen, by doubling the time that the filter has run (Anderson 1978; noise of the channels is 1).
-    Raises numpy.linalg.LinAlgError where it does not settle."""
+    """Steady prediction covariance by the doubling algorithm (Anderson 1978; noise of the channels is 1). Raises
+    numpy.linalg.LinAlgError where it does not converge."""
     along, told, found = advance.T, seeing.T @ seeing, stirred
     for _ in range(_DOUBLINGS):
         through = np.linalg.solve(np.eye(len(along)) + told @ found, np.hstack([along, told]))

@@ -26,14 +26,14 @@ class Observed:
     measured: FloatArray
     """(n, c)"""
     fit: Mask
-    """(n,): samples that parameters are fitted to,"""
+    """(n,): samples that parameters are fitted to."""
     choose: Mask
-    """that explanations are chosen by,"""
+    """(n,): validation samples, by which explanations are chosen."""
     test: Mask
-    """and that are only looked at in the end."""
+    """(n,): held-out samples, used only in the end."""
 
-    def unsealed(self) -> "Observed":
-        """With the first half of each sealed stretch to fit and to choose by, the second still sealed."""
+    def unseal_half(self) -> "Observed":
+        """With the first half of each held-out stretch to fit and to choose by, the second still held out."""
         edges = np.flatnonzero(np.diff(np.concatenate([[0], self.test.astype(np.int8), [0]]))).reshape(-1, 2)
         fit, choose, test = self.fit.copy(), self.choose.copy(), self.test.copy()
         for start, stop in edges.tolist():
@@ -43,8 +43,8 @@ class Observed:
             test[start:half] = False
         return replace(self, fit=fit, choose=choose, test=test)
 
-    def shortened(self) -> "Observed":
-        """Up to the last sample to fit or to choose by; the recording itself stays whole."""
+    def shorten(self) -> "Observed":
+        """Cut after the last sample to fit or to choose by; the recording itself stays whole."""
         end = int(np.flatnonzero(self.fit | self.choose)[-1]) + 1 if (self.fit | self.choose).any() else len(self.fit)
         sealed = np.zeros(end, dtype=np.bool_)
         return Observed(
@@ -52,15 +52,16 @@ class Observed:
         )
 
 
-def observed(recording: Recording, responses: int) -> Observed:
-    """responses: how many position channels belong to the model's outputs; a position of another width is left out."""
-    measured, known = measured_of(recording, responses)
+def observe(recording: Recording, responses: int) -> Observed:
+    """A recording with its samples' roles. responses: number of the model's outputs; a position with another number of
+    channels is left out."""
+    measured, known = measured_signals(recording, responses)
     fit, choose, test = (mask & known for mask in roles(recording.segments, len(recording)))
     return Observed(recording, recording.command.samples, measured, fit, choose, test)
 
 
-def measured_of(recording: Recording, responses: int) -> tuple[FloatArray, Mask]:
-    """(n, c), the response and, where it has so many channels, the position; and where all of it is known."""
+def measured_signals(recording: Recording, responses: int) -> tuple[FloatArray, Mask]:
+    """Response and, where it has as many channels, position (n, c), and the mask of samples where all are known."""
     signals = [recording.response.samples]
     if recording.position is not None and recording.position.samples.shape[1] == responses:
         signals.append(recording.position.samples)
@@ -78,13 +79,13 @@ def roles(segments: tuple[Segment, ...], length: int, tested: bool = False) -> t
     fitted to show only noise; else the last quarter of the time is.
     """
     inside = [s for s in segments if s.kind != "rest"]
-    test = _covered([s for s in inside if s.role == "test"], length)
+    test = _segment_mask([s for s in inside if s.role == "test"], length)
     fitted = [s for s in inside if s.role == "fit"] or [s for s in inside if s.role != "test"]
-    fit = _covered(fitted, length) if fitted else ~test
+    fit = _segment_mask(fitted, length) if fitted else ~test
     if inside and all(s.role == "test" for s in inside):
         fit[:] = False
     elif not test.any() and not tested:
-        test = _ends(fitted, length)
+        test = _segment_ends(fitted, length)
         fit &= ~test
     choose = _middle_level(fitted, length) & fit
     if not choose.any():
@@ -93,24 +94,24 @@ def roles(segments: tuple[Segment, ...], length: int, tested: bool = False) -> t
     return fit & ~choose, choose, test
 
 
-def noise_in_units(measured: FloatArray, noise: FloatArray) -> FloatArray:
-    """(c,): what a channel's errors are counted in: its noise, and a share of its signal below which no model goes."""
+def error_units(measured: FloatArray, noise: FloatArray) -> FloatArray:
+    """(c,): unit of each channel's errors: its noise and, in quadrature, a share of its rms below which no model is."""
     rms = np.sqrt(np.nanmean(measured**2, axis=0))
     return np.asarray(np.sqrt(noise**2 + (MODEL_FLOOR * rms) ** 2))
 
 
-def _covered(segments: list[Segment], length: int) -> Mask:
+def _segment_mask(segments: list[Segment], length: int) -> Mask:
     mask = np.zeros(length, dtype=np.bool_)
     for segment in segments:
         mask[segment.start : segment.stop] = True
     return mask
 
 
-def _ends(segments: list[Segment], length: int) -> Mask:
+def _segment_ends(segments: list[Segment], length: int) -> Mask:
     """The last quarter of each segment, or of the time where there is one level or none."""
     mask = np.zeros(length, dtype=np.bool_)
     if len(_levels(segments)) < LEVELS_TO_STRATIFY:
-        places = np.flatnonzero(_covered(segments, length)) if segments else np.arange(length)
+        places = np.flatnonzero(_segment_mask(segments, length)) if segments else np.arange(length)
         mask[places[int((1 - TEST_SHARE) * len(places)) :]] = True
         return mask
     for segment in segments:
@@ -131,4 +132,4 @@ def _middle_level(segments: list[Segment], length: int) -> Mask:
     if len(levels) < LEVELS_TO_HOLD_ONE_BACK:
         return np.zeros(length, dtype=np.bool_)
     middle = levels[len(levels) // 2]
-    return _covered([segment for segment in segments if segment.amplitude == middle], length)
+    return _segment_mask([segment for segment in segments if segment.amplitude == middle], length)

@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import Observed, measured_of, roles
+from analysis.diagnosis.data.observed import Observed, measured_signals, roles
 from analysis.diagnosis.settings import CHOOSE_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
 MOST_PERIODS = 4
-"""Of a segment, that decisions are made by: more of them repeat what is known, and take time."""
+"""Periods of a segment that decisions are made by: more of them repeat what is known, and take time."""
 LEAST_SAMPLES = 32
-"""Of a part that is worth comparing."""
+"""Samples of a part that is worth comparing, at least."""
 
 
 def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Observed, ...]:
@@ -25,13 +25,13 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
     """
     marked = [segment.role for recording in recordings for segment in recording.segments]
     if marked and all(role == "test" for role in marked):
-        recordings = [_unmarked(recording) for recording in recordings]
+        recordings = [_clear_roles(recording) for recording in recordings]
     tested = any(segment.role == "test" for recording in recordings for segment in recording.segments)
     found: list[Observed] = []
     for recording in recordings:
-        measured, known = measured_of(recording, responses)
+        measured, known = measured_signals(recording, responses)
         fit, choose, test = roles(recording.segments, len(recording), tested)
-        masks = (*_without_repeats(fit & known, choose & known, ~_repeated(recording)), test & known)
+        masks = (*_without_repeats(fit & known, choose & known, ~_surplus_periods(recording)), test & known)
         for start, stop in parts_of(recording):
             cut: tuple[Mask, ...] = tuple(mask[start:stop] for mask in masks)
             part = part_of(recording, start, stop)
@@ -40,13 +40,13 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
 
 
 def samples_to_fit(recordings: Sequence[Recording]) -> int:
-    """With a response, and a position where it has one per response channel."""
+    """Number of samples to fit that have a response, and a position where there is one per response channel."""
     return sum(int(record.fit.sum()) for record in observed_parts(recordings, len(recordings[0].response.channels)))
 
 
 def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
-    """Where all that was to choose by is missing or only repeats what was fitted to, the last quarter of what is left
-    is."""
+    """The masks without surplus periods. Where nothing new is left to choose by, the last quarter of the fit samples
+    is taken for it."""
     if (choose & new).any() or not (fit & new).any():
         return fit & new, choose & new
     places = np.flatnonzero(fit & new)
@@ -56,8 +56,8 @@ def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
     return fit & new & ~chosen, chosen
 
 
-def _repeated(recording: Recording) -> Mask:
-    """(n,): what comes after enough periods of a segment."""
+def _surplus_periods(recording: Recording) -> Mask:
+    """(n,): samples after the first `MOST_PERIODS` periods of a segment."""
     mask = np.zeros(len(recording), dtype=np.bool_)
     for segment in recording.segments:
         if segment.period > 0:
@@ -82,7 +82,9 @@ def part_of(recording: Recording, start: int, stop: int) -> Recording:
     if (start, stop) == (0, len(recording)):
         return recording
     segments = [
-        _moved(segment, start, stop) for segment in recording.segments if segment.stop > start and segment.start < stop
+        _shift_segment(segment, start, stop)
+        for segment in recording.segments
+        if segment.stop > start and segment.start < stop
     ]
     return replace(
         recording,
@@ -100,16 +102,17 @@ def _part(signal: Signal | None, start: int, stop: int) -> Signal | None:
     return None if signal is None else signal.part(start, stop)
 
 
-def _moved(segment: Segment, start: int, stop: int) -> Segment:
+def _shift_segment(segment: Segment, start: int, stop: int) -> Segment:
     return replace(segment, start=max(segment.start, start) - start, stop=min(segment.stop, stop) - start)
 
 
-def _unmarked(recording: Recording) -> Recording:
+def _clear_roles(recording: Recording) -> Recording:
     return replace(recording, segments=tuple(replace(segment, role="") for segment in recording.segments))
 
 
 def names_of_parts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
-    """As `observed_parts` has them: of the recording, and which part where there are several."""
+    """Names of the parts in the order of `observed_parts`: the recording's, with the part's number where there are
+    several."""
     found: list[str] = []
     for number, recording in enumerate(recordings):
         own = names[number] if number < len(names) else f"recording {number + 1}"

@@ -1,4 +1,4 @@
-"""Recordings about the point that a device works at.
+"""Adds the constant command of the operating point that a linear model lacks.
 
 A linear model that was fitted to what changes holds no constants: the level that a constant command keeps, or the zero
 of a sensor. Played from the command as it is, it misses by far more than by its dynamics.
@@ -15,12 +15,12 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 SOFTEST = 1e-6
-"""Of the largest, the smallest stiffness that a position is held by at all."""
+"""Smallest over largest stiffness at least, for a position to be held at all."""
 
 
 def about_operating_point(recordings: Sequence[Recording], model: MechanicalModel) -> tuple[Recording, ...] | None:
-    """With the constant added to the commands with which the model keeps the mean position of what may be fitted to;
-    None where the response is no position, or nothing holds it."""
+    """The recordings with a constant added to their commands, with which the model keeps the mean measured position of
+    the fit samples. None where the response is no position, or no stiffness holds it."""
     if DERIVATIVE_OF_QUANTITY[model.quantity] != 0:
         return None
     size = np.linalg.svd(model.stiffness, compute_uv=False)
@@ -35,7 +35,7 @@ def about_operating_point(recordings: Sequence[Recording], model: MechanicalMode
 
 
 def _means(recordings: Sequence[Recording], responses: int) -> tuple[FloatArray, FloatArray]:
-    """Of commands and responses, over what may be fitted to."""
+    """Means of commands (m,) and responses (p,) over the samples to fit and to choose by."""
     records = observed_parts(recordings, responses)
     masks = [record.fit | record.choose for record in records]
     pushed = np.vstack([record.command[mask] for record, mask in zip(records, masks, strict=True)])

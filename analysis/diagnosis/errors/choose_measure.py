@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.data.measured_motion import has_motion
-from analysis.diagnosis.data.observed import Observed, noise_in_units
+from analysis.diagnosis.data.observed import Observed, error_units
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.effect_words import EFFECT_WORDS
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
@@ -69,7 +69,7 @@ def measure_of(
     )
     floors = tuple(noise_floor(record.recording) for record in records)
     noise = _noise(floors, records)
-    unit = noise_in_units(np.vstack([record.measured for record in records]), noise)
+    unit = error_units(np.vstack([record.measured for record in records]), noise)
     choice = choose_measure((*records, *others), model)
     if compared == "motion" and choice.measure == "predicted force":
         choice = Choice("windows", ASKED_MOTION)

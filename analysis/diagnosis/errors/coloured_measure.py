@@ -40,8 +40,8 @@ class ColouredMeasure:
     def with_floor(self, rms: FloatArray) -> Self:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
-    def shortened(self) -> Self:
-        return replace(self, plain=self.plain.shortened())
+    def shorten(self) -> Self:
+        return replace(self, plain=self.plain.shorten())
 
     def can_observe(self, effect: Effect) -> bool:
         return self.plain.can_observe(effect)

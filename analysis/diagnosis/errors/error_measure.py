@@ -43,7 +43,7 @@ class ErrorMeasure(Protocol):
     def with_floor(self, rms: FloatArray) -> Self:
         """rms: (c,), in each channel's own unit: so much more counts as noise, and no error as less than that."""
 
-    def shortened(self) -> Self:
+    def shorten(self) -> Self:
         """Without the samples behind the last that decisions may see."""
 
     def can_observe(self, effect: Effect) -> bool:

@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from analysis.diagnosis.data.carried_weight import carrying
+from analysis.diagnosis.data.carried_weight import add_carried_weight
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.unexplained_motion import evidence_of
 from equalizer.effects.effect import Effect, PlacedEffect
@@ -35,9 +35,9 @@ class FreeSimulation:
     def with_floor(self, rms: FloatArray) -> Self:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
-    def shortened(self) -> "FreeSimulation":
+    def shorten(self) -> "FreeSimulation":
         kept = [record for record in self.records if (record.fit | record.choose).any()]
-        return replace(self, records=tuple(record.shortened() for record in kept))
+        return replace(self, records=tuple(record.shorten() for record in kept))
 
     def can_observe(self, effect: Effect) -> bool:
         return True
@@ -59,7 +59,7 @@ class FreeSimulation:
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         seen = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
-        model = carrying(model, signals)
+        model = add_carried_weight(model, signals)
         return simulate(model, record.command, signals.sample_rate_hz, (*self.known, *effects), signals.hold, seen)
 
     def evidence(
@@ -68,7 +68,7 @@ class FreeSimulation:
         found = []
         for record, left in zip(self.records, residuals, strict=True):
             played = self._played(model, effects, record, simulate_mechanism)
-            there = carrying(model, record.recording)
+            there = add_carried_weight(model, record.recording)
             found.append(evidence_of(there, record, played, left, (self.unit, self.noise)))
         return tuple(found)
 

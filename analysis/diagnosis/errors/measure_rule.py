@@ -20,8 +20,8 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.diagnosis.data.closed_loop import in_closed_loop
-from analysis.diagnosis.data.growth import runs_away
+from analysis.diagnosis.data.closed_loop import is_in_closed_loop
+from analysis.diagnosis.data.growth import is_unstable_within
 from analysis.diagnosis.data.measured_motion import has_motion, time_unit
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.windows import WINDOW_S
@@ -74,9 +74,9 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
         return Choice("predicted force", UNTIMED)
     if any(record.recording.meta.get("imposed") for record in records):
         return Choice("predicted force", IMPOSED)
-    if not holds and any(in_closed_loop(record.recording) for record in records):
+    if not holds and any(is_in_closed_loop(record.recording) for record in records):
         return Choice("predicted force", CLOSED_LOOP) if motion else Choice("windows", CLOSED_LOOP_WINDOWS)
-    if motion and runs_away(model, WINDOW_S):
+    if motion and is_unstable_within(model, WINDOW_S):
         return Choice("predicted force", UNSTABLE)
     if not holds:
         return Choice("windows", DRIFTS)

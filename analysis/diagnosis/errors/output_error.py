@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.data.growth import runs_away
+from analysis.diagnosis.data.growth import is_unstable_within
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.tuning import Tuning
@@ -173,7 +173,7 @@ def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensit
         step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, low, high)
         there = replace(from_.hypothesis, point=from_.hypothesis.point + step[t:])
         try:
-            if runs_away(tuning.tuned(from_.deviations + step[:t]), _longest_s(measure)):
+            if is_unstable_within(tuning.tuned(from_.deviations + step[:t]), _longest_s(measure)):
                 continue
             tried = evaluated(measure, tuning, from_.deviations + step[:t], there)
         except (MechanicalModelError, np.linalg.LinAlgError):

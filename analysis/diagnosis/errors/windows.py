@@ -9,8 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from analysis.diagnosis.data.carried_weight import carrying
-from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smoothed_motion
+from analysis.diagnosis.data.carried_weight import add_carried_weight
+from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.free_simulation import channels
 from analysis.diagnosis.errors.unexplained_motion import without_gaps
@@ -59,9 +59,9 @@ class Windows:
     def with_floor(self, rms: FloatArray) -> Self:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
-    def shortened(self) -> "Windows":
+    def shorten(self) -> "Windows":
         kept = [
-            (record.shortened(), states)
+            (record.shorten(), states)
             for record, states in zip(self.records, self.states, strict=True)
             if (record.fit | record.choose).any()
         ]
@@ -87,7 +87,7 @@ class Windows:
     ) -> tuple[SimulationResult, FloatArray]:
         """And what is left, (n, c)."""
         recording, p = record.recording, model.outputs
-        model = carrying(model, recording)
+        model = add_carried_weight(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         length = samples_of(self.window_s, recording.sample_rate_hz)
         played = simulate_windows(
@@ -131,9 +131,9 @@ class Windows:
     ) -> Evidence:
         played, left = self._seen(model, effects, record, states)
         recording, p = record.recording, model.outputs
-        model = carrying(model, recording)
+        model = add_carried_weight(model, recording)
         entered = actuator_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
-        found = smoothed_motion(model, record, entered + played.axis_force, self.unit)
+        found = smooth_motion(model, record, entered + played.axis_force, self.unit)
         measured, predicted = without_gaps(record.measured, left * self.unit, played)
         seen = measured.shape[1] > p
         return Evidence(
@@ -165,7 +165,7 @@ def windows_of(
     for record in records:
         rate_hz = record.recording.sample_rate_hz
         entered = actuator_force(model, record.command, rate_hz, (), record.recording.hold)
-        motion: SmoothedMotion = smoothed_motion(carrying(model, record.recording), record, entered, unit)
+        motion: SmoothedMotion = smooth_motion(add_carried_weight(model, record.recording), record, entered, unit)
         states.append(motion.states[:: samples_of(window_s, rate_hz)])
     return Windows(records, tuple(states), unit, noise, window_s)
 

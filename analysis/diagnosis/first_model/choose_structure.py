@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
-from analysis.diagnosis.data.closed_loop import in_closed_loop
+from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.first_model.model_structures import (
     GAINED,
     Balanced,
@@ -126,7 +126,7 @@ def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Cal
     """The same, or two-mode where a free simulation of held-out samples speaks for it."""
     if plain.fit.kind != "mass-spring":
         return plain
-    if any(in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
+    if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
         why = "it is fitted to spectra, which a controller or an imposed motion bends"
         return _tried(plain, Tried("two-mode", None, why))
     try:

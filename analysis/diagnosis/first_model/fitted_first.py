@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import NoMotionError
-from analysis.diagnosis.data.carried_weight import weighted
+from analysis.diagnosis.data.carried_weight import has_carried_weight
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.first_model.model_of_balance import plain_model
@@ -100,7 +100,7 @@ def fitted_model(
 
 
 def _require_no_weight(recordings: Sequence[Recording]) -> None:
-    if weighted(recordings):
+    if has_carried_weight(recordings):
         raise NothingToDiagnose(
             ("a recording was made with a weight on, and a model that is fitted to it would hold the weight",)
         )

@@ -16,7 +16,7 @@ import numpy as np
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import regression_of
 from analysis.diagnosis.balance.structures import Structure, is_better
-from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.wording import listed
 from equalizer.effects.turned_commands import with_turned_commands
@@ -32,7 +32,7 @@ CLEARLY = 0.1
 
 def turned_round(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
     """recordings: alike in channels, units and rate. And a sentence, where a force was turned round."""
-    driven = all_force_driven(recordings)
+    driven = all_as_force_driven(recordings)
     count = len(driven[0].command.channels)
     try:
         motions = motions_of(observed_parts(driven, len(driven[0].response.channels)))

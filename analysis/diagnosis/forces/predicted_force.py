@@ -6,7 +6,7 @@ from typing import Self, TypeVar, cast
 
 import numpy as np
 
-from analysis.diagnosis.data.carried_weight import carrying
+from analysis.diagnosis.data.carried_weight import add_carried_weight
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.forces.needed_force import BandMotion, NeededForce, band_motion, needed_force
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
@@ -50,7 +50,7 @@ class PredictedForce:
     def with_floor(self, rms: FloatArray) -> Self:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
-    def shortened(self) -> "PredictedForce":
+    def shorten(self) -> "PredictedForce":
         kept = [
             (self._cut(record), motion)
             for record, motion in zip(self.records, self.motions, strict=True)
@@ -66,7 +66,7 @@ class PredictedForce:
 
     def _cut(self, record: Observed) -> Observed:
         """At the last sample that decisions may see; what lies just before feels that nothing follows."""
-        cut, edge = record.shortened(), edge_samples(record.recording.sample_rate_hz, self.band_hz)
+        cut, edge = record.shorten(), edge_samples(record.recording.sample_rate_hz, self.band_hz)
         inside = np.arange(len(cut.command)) < len(cut.command) - edge
         return replace(cut, fit=cut.fit & inside, choose=cut.choose & inside)
 
@@ -88,7 +88,7 @@ class PredictedForce:
     def _balance(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_Balance":
         record, motion = self.records[number], self.motions[number]
         rate_hz = record.recording.sample_rate_hz
-        model = carrying(model, record.recording)
+        model = add_carried_weight(model, record.recording)
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure
@@ -130,7 +130,7 @@ class PredictedForce:
     def _evidence(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> Evidence:
         record, found = self.records[number], self._balance(model, effects, number)
         return Evidence(
-            model=carrying(model, record.recording),
+            model=add_carried_weight(model, record.recording),
             sample_rate_hz=record.recording.sample_rate_hz,
             command=record.command,
             axis_position=found.needed.axis_position,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.closed_loop import in_closed_loop
+from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.forces.force_views import force_views
@@ -24,7 +24,7 @@ _ROUNDS = 2
 def wants_rigid_model(recordings: Sequence[Recording]) -> bool:
     """Whether a controller made the commands, or a motion was imposed."""
     return can_be_rigid(recordings) and any(
-        in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings
+        is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings
     )
 
 

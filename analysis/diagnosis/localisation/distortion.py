@@ -7,12 +7,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import DetectionLines, detection_lines, held_samples
-from analysis.diagnosis.data.frequency_cells import Band, octaves_between, within
+from analysis.diagnosis.data.detection_lines import DetectionLines, detection_lines, hold_length
+from analysis.diagnosis.data.frequency_cells import Band, lines_in_band, octaves_between
 from analysis.diagnosis.data.line_statistics import excess
 from analysis.diagnosis.localisation.driven_looks import DrivenLook, driven_looks
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.noise.periods import Periods, look_spectra, settled_periods
+from analysis.diagnosis.noise.periods import Periods, period_spectra, settled_periods
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.recording import Recording
@@ -69,8 +69,8 @@ def distortion(recording: Recording, floor: NoiseFloor) -> Distortions:
         return Distortions((), ("The noise is not known, so no distortion can be told from it.",))
     found = settled_periods(recording)
     excitation = instrument_of(recording)
-    held = held_samples(excitation)
-    lines = [detection_lines(look_spectra(excitation, period).mean(axis=0), held) for period in found]
+    held = hold_length(excitation)
+    lines = [detection_lines(period_spectra(excitation, period).mean(axis=0), held) for period in found]
     periods = [(period, its) for period, its in zip(found, lines, strict=True) if its is not None]
     if not periods:
         return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be told apart.",))
@@ -86,7 +86,7 @@ def distortion(recording: Recording, floor: NoiseFloor) -> Distortions:
 
 def _what_is_missing(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:
     remarks = []
-    if all(period.looks < 2 for period, _ in periods):
+    if all(period.count < 2 for period, _ in periods):
         remarks.append("No period was repeated: what varies from period to period cannot be seen.")
     if not all(period.settled for period, _ in periods):
         remarks.append("Some segments have one period only: its transient counts as distortion.")
@@ -106,7 +106,7 @@ def _cells(look: DrivenLook, signal: Signal) -> list[Distortion]:
     cells = []
     octaves = octaves_between(lowest, highest)
     for band in dict.fromkeys(((octaves[0][0], octaves[-1][1]), *octaves)):
-        inside = within(look.frequency_hz, band)
+        inside = lines_in_band(look.frequency_hz, band)
         if (inside & look.lines.driven).any():
             for number, name in enumerate(signal.channels):
                 where = _Where(name, signal.quantities[number], look.input, look.amplitude, band)

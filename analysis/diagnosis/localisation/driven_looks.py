@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.data.detection_lines import DetectionLines
-from analysis.diagnosis.data.frequency_cells import driving_inputs
+from analysis.diagnosis.data.frequency_cells import find_driven_inputs
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
-from analysis.diagnosis.noise.periods import Periods, look_spectra
+from analysis.diagnosis.noise.periods import Periods, period_spectra
 from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.identification.frequency_response.noise_floor import over_neighbours, spread_over_looks
 from equalizer.signals.lockin import ComplexArray
@@ -56,8 +56,8 @@ def driven_looks(
     found = []
     for length in dict.fromkeys(period.length for period, _ in periods):
         alike = [(period, lines) for period, lines in periods if period.length == length]
-        commands = [look_spectra(recording.command.samples, period).mean(axis=0) for period, _ in alike]
-        answers = [look_spectra(signal.samples, period) for period, _ in alike]
+        commands = [period_spectra(recording.command.samples, period).mean(axis=0) for period, _ in alike]
+        answers = [period_spectra(signal.samples, period) for period, _ in alike]
         driven = [np.where(lines.driven[:, None], u, 0) for (_, lines), u in zip(alike, commands, strict=True)]
         linear = _needed(driven, commands, answers)
         lines_hz = alike[0][0].frequency_hz(recording.sample_rate_hz)
@@ -67,14 +67,14 @@ def driven_looks(
             if linear is not None:
                 brought, doubt = commanded(linear, np.where(lines.driven[:, None], 0, command))
                 mean, error = mean - brought, error + doubt
-            look = (lines, lines_hz, mean, error, spread, floor, period.looks, noise.freedom)
+            look = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
             found.append(DrivenLook(inputs_of(recording, period), period.segment.amplitude, *look))
     return found
 
 
 def inputs_of(recording: Recording, periods: Periods) -> str:
     there = slice(periods.starts[0], periods.starts[0] + periods.length)
-    return "+".join(driving_inputs(instrument_of(recording)[there].var(axis=0), recording.command.channels))
+    return "+".join(find_driven_inputs(instrument_of(recording)[there].var(axis=0), recording.command.channels))
 
 
 def _on_lines(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatArray) -> FloatArray:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import detection_lines, held_samples
-from analysis.diagnosis.data.frequency_cells import Band, driving_inputs, octaves_between, within
+from analysis.diagnosis.data.detection_lines import detection_lines, hold_length
+from analysis.diagnosis.data.frequency_cells import Band, find_driven_inputs, lines_in_band, octaves_between
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, mean_spectrum, settled_periods, spectra
 from analysis.diagnosis.types import Mask
@@ -86,20 +86,20 @@ def residual_lines(recording: Recording, seen: Observation, used: Mask) -> list[
 
 def _of_periods(recording: Recording, seen: Observation, left: FloatArray, periods: Periods) -> list[ResidualLines]:
     excitation = mean_spectrum(instrument_of(recording), periods)
-    driven = detection_lines(excitation, held_samples(instrument_of(recording)))
+    driven = detection_lines(excitation, hold_length(instrument_of(recording)))
     if driven is None:
         return []
     lines_hz = periods.frequency_hz(recording.sample_rate_hz)
     response = np.abs(mean_spectrum(seen.measured, periods)) ** 2
     residual = np.abs(mean_spectrum(left, periods)) ** 2
-    noise = _noise_power(seen, lines_hz, periods.looks) / periods.length
-    inputs = "+".join(driving_inputs(np.sum(np.abs(excitation) ** 2, axis=0), recording.command.channels))
+    noise = _noise_power(seen, lines_hz, periods.count) / periods.length
+    inputs = "+".join(find_driven_inputs(np.sum(np.abs(excitation) ** 2, axis=0), recording.command.channels))
     lowest, highest = (float(line) for line in lines_hz[driven.driven][[0, -1]])
     inside = (lines_hz >= lowest) & (lines_hz <= highest)
-    seconds = periods.looks * periods.length / recording.sample_rate_hz
+    seconds = periods.count * periods.length / recording.sample_rate_hz
     found = []
     for band in octaves_between(lowest, highest):
-        chosen = inside & within(lines_hz, band)
+        chosen = inside & lines_in_band(lines_hz, band)
         if (chosen & driven.driven).any():
             where = (inputs, periods.segment.amplitude, band, seconds, float(chosen.sum()))
             found.append(_summed(where, residual[chosen], noise[chosen], response[chosen], seen.quantities))
@@ -122,8 +122,10 @@ def _of_windows(
     response = _window_power(seen.measured, starts, length)
     residual = _window_power(left, starts, length)
     noise = np.broadcast_to(_noise_power(seen, lines_hz, 1) / length, response.shape)
-    inputs = "+".join(driving_inputs(command.var(axis=0), recording.command.channels))
-    by_band = [(band, within(lines_hz, band)) for band in octaves_between(2 * float(lines_hz[0]), float(lines_hz[-1]))]
+    inputs = "+".join(find_driven_inputs(command.var(axis=0), recording.command.channels))
+    by_band = [
+        (band, lines_in_band(lines_hz, band)) for band in octaves_between(2 * float(lines_hz[0]), float(lines_hz[-1]))
+    ]
     strongest = max(float(excitation[:, lines].sum(axis=1).max(initial=0.0)) for _, lines in by_band)
     found = []
     for band, lines in by_band:

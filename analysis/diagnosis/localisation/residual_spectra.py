@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import detection_lines, held_samples
+from analysis.diagnosis.data.detection_lines import detection_lines, hold_length
 from analysis.diagnosis.localisation.mismatch_cells import Prediction
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.noise.periods import Periods, look_spectra, settled_periods
+from analysis.diagnosis.noise.periods import Periods, period_spectra, settled_periods
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.lockin import ComplexArray
@@ -58,14 +58,14 @@ def residual_spectra(
     if not looks or not floor.known:
         return None
     lines_hz = looks[0].frequency_hz(recording.sample_rate_hz)
-    excitation = np.stack([look_spectra(instrument_of(recording), look).mean(axis=0) for look in looks])
+    excitation = np.stack([period_spectra(instrument_of(recording), look).mean(axis=0) for look in looks])
     together = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
-    driven = detection_lines(together, held_samples(instrument_of(recording)))
+    driven = detection_lines(together, hold_length(instrument_of(recording)))
     if driven is None:
         return None
     first, last = np.flatnonzero(driven.driven)[[0, -1]]
     inside = slice(int(first), int(last) + 1)
-    spectra = np.stack([look_spectra(residual, look).mean(axis=0)[inside] for look in looks])
+    spectra = np.stack([period_spectra(residual, look).mean(axis=0)[inside] for look in looks])
     noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], look) for look in looks])
     noise += model_error**2 * np.stack([_answered(recording, look, len(noises) > 1)[inside] for look in looks])
     return ResidualSpectra(lines_hz[inside], spectra, noise, left[0].shape[1])
@@ -93,7 +93,7 @@ def _answered(recording: Recording, periods: Periods, position: bool) -> FloatAr
     signals = [recording.response, *([recording.position] if position and recording.position is not None else [])]
     parts = []
     for signal in signals:
-        power = np.abs(look_spectra(signal.samples, periods).mean(axis=0)) ** 2
+        power = np.abs(period_spectra(signal.samples, periods).mean(axis=0)) ** 2
         parts.append(np.maximum(power, _HEARD**2 * power.max(axis=1, keepdims=True)))
     return np.hstack(parts)
 
@@ -102,5 +102,5 @@ def _noise(noises: Sequence[ChannelNoise], floor_hz: FloatArray, lines_hz: Float
     parts = []
     for noise in noises:
         density = np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1)
-        parts.append(((density - noise.rounding) / periods.looks + noise.rounding) / periods.length)
+        parts.append(((density - noise.rounding) / periods.count + noise.rounding) / periods.length)
     return np.hstack(parts)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.carried_weight import heavier
+from analysis.diagnosis.data.carried_weight import add_mass
 from analysis.diagnosis.document import NextExperiment
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import MOVED, Fitted
@@ -114,7 +114,7 @@ def _predicted(
     bench: Bench, deviations: FloatArray, hypothesis: Hypothesis, point: FloatArray, experiment: Experiment
 ) -> FloatArray:
     model: MechanicalModel = bench.tuning.tuned(deviations)
-    model = heavier(model, experiment.added) if experiment.added else model
+    model = add_mass(model, experiment.added) if experiment.added else model
     with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
         played = simulate_mechanism(
             model, experiment.commands, bench.sample_rate_hz, hypothesis.placed(point), bench.hold

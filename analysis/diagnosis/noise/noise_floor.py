@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, settled_periods
-from analysis.diagnosis.noise.quiet_noise import quiet_band_noise, resting_noise
+from analysis.diagnosis.noise.quiet_noise import quiet_band_noise, rest_noise
 from analysis.diagnosis.noise.repeat_noise import repeat_noise, with_rounding
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -46,29 +46,29 @@ class NoiseFloor:
 def noise_floor(recording: Recording) -> NoiseFloor:
     """From periods that should be alike; else from rest; else from the lines above all that was driven, the noise
     below taken to be as strong; else `how` is "unknown" and every rms NaN."""
-    periods = tuple(period for period in settled_periods(recording) if period.looks > 1)
+    periods = tuple(period for period in settled_periods(recording) if period.count > 1)
     if periods:
         return _from_repeats(recording, periods)
     rate = recording.sample_rate_hz
     lines_hz: FloatArray = np.arange(1.0, _LINES + 1) * (rate / 2 / (_LINES + 1))
     signals = [recording.response] + ([] if recording.position is None else [recording.position])
-    rests = [resting_noise(recording, signal.samples, lines_hz) for signal in signals]
+    rests = [rest_noise(recording, signal.samples, lines_hz) for signal in signals]
     if all(rest is not None for rest in rests):
         remark = "Nothing repeats in this recording: its noise is what it shows at rest."
-        return _assembled("rest", lines_hz, [rest for rest in rests if rest is not None], signals, remark)
+        return _build_floor("rest", lines_hz, [rest for rest in rests if rest is not None], signals, remark)
     quiet = [quiet_band_noise(recording, signal.samples, lines_hz) for signal in signals]
     if all(hiss is not None for hiss in quiet):
         remark = (
             "Nothing repeats in this recording and it never rests: its noise is what lies above the driven band, "
             "and was taken to be as strong below."
         )
-        return _assembled("quiet band", lines_hz, [hiss for hiss in quiet if hiss is not None], signals, remark)
+        return _build_floor("quiet band", lines_hz, [hiss for hiss in quiet if hiss is not None], signals, remark)
     remark = "Nothing repeats in this recording, it never rests and all its band is driven: its noise is not known."
     unknown = [(np.full((len(lines_hz), signal.samples.shape[1]), np.nan), 0.0) for signal in signals]
-    return _assembled("unknown", lines_hz, unknown, signals, remark)
+    return _build_floor("unknown", lines_hz, unknown, signals, remark)
 
 
-def _assembled(
+def _build_floor(
     how: How,
     lines_hz: FloatArray,
     found: Sequence[tuple[FloatArray, float]],
@@ -85,15 +85,15 @@ def _assembled(
 def _from_repeats(recording: Recording, periods: Sequence[Periods]) -> NoiseFloor:
     lines_hz = max(periods, key=lambda period: period.length).frequency_hz(recording.sample_rate_hz)
     response = repeat_noise(recording, recording.response.samples, periods, lines_hz)
-    remarks = _what_varies(recording.response, response)
+    remarks = _varying_remarks(recording.response, response)
     position = None
     if recording.position is not None:
         position = repeat_noise(recording, recording.position.samples, periods, lines_hz)
-        remarks += _what_varies(recording.position, position)
+        remarks += _varying_remarks(recording.position, position)
     return NoiseFloor("repeats", lines_hz, response, position, tuple(remarks))
 
 
-def _what_varies(signal: Signal, noise: ChannelNoise) -> list[str]:
+def _varying_remarks(signal: Signal, noise: ChannelNoise) -> list[str]:
     remarks = []
     for number, name in enumerate(signal.channels):
         left = sum(segment.varies[number] for segment in noise.segments)

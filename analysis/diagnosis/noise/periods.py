@@ -1,4 +1,4 @@
-"""The whole periods of a recording's periodic segments that are settled, and their spectra.
+"""Whole settled periods of a recording's periodic segments, and their spectra.
 
 Spectra are rfft / length without the mean and without half the rate, so that white noise of variance s² has s² / length
 per line.
@@ -19,7 +19,7 @@ _SHORTEST = 8
 
 @dataclass(frozen=True, slots=True)
 class Periods:
-    """Looks at one periodic segment."""
+    """The usable periods of one periodic segment."""
 
     index: int
     """Of the segment in the recording."""
@@ -34,7 +34,7 @@ class Periods:
         return self.segment.period
 
     @property
-    def looks(self) -> int:
+    def count(self) -> int:
         return len(self.starts)
 
     def frequency_hz(self, sample_rate_hz: float) -> FloatArray:
@@ -58,23 +58,23 @@ def settled_periods(recording: Recording) -> tuple[Periods, ...]:
     return tuple(found)
 
 
-def look_samples(samples: FloatArray, periods: Periods) -> FloatArray:
-    """(looks, length, channels)"""
+def period_samples(samples: FloatArray, periods: Periods) -> FloatArray:
+    """(periods, length, channels)"""
     return np.stack([samples[start : start + periods.length] for start in periods.starts])
 
 
-def look_spectra(samples: FloatArray, periods: Periods) -> ComplexArray:
-    """(looks, lines, channels); lines as in `Periods.frequency_hz`."""
-    return spectra(look_samples(samples, periods))
+def period_spectra(samples: FloatArray, periods: Periods) -> ComplexArray:
+    """(periods, lines, channels); lines as in `Periods.frequency_hz`."""
+    return spectra(period_samples(samples, periods))
 
 
 def mean_spectrum(samples: FloatArray, periods: Periods) -> ComplexArray:
     """(lines, channels): that of the mean period."""
-    return np.asarray(spectra(look_samples(samples, periods).mean(axis=0, keepdims=True))[0])
+    return np.asarray(spectra(period_samples(samples, periods).mean(axis=0, keepdims=True))[0])
 
 
 def spectra(looks: FloatArray) -> ComplexArray:
-    """(looks, length, channels) to (looks, lines, channels)."""
+    """Spectra (periods, lines, channels) of samples (periods, length, channels)."""
     length = looks.shape[1]
     return np.asarray(np.fft.rfft(looks, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
 

@@ -22,8 +22,8 @@ _DIFFERENCE_GAIN, _DIFFERENCE_LOSS = 20.0, 2.31
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Hiss:
-    """Variance of the fast part of what is heard at rest, scaled as if it were white."""
+class FastNoise:
+    """Variance of the fast part of the noise at rest, scaled as if it were white."""
 
     variance: FloatArray
     """(windows, channels)"""
@@ -31,9 +31,9 @@ class Hiss:
     """(windows, channels)"""
 
 
-def hiss_at_rest(recording: Recording, samples: FloatArray) -> Hiss | None:
-    """From windows of a quarter of a second, a quarter of a second after the excitation: slow ringing is no hindrance,
-    for only third differences count. None where there is no such window."""
+def fast_noise_at_rest(recording: Recording, samples: FloatArray) -> FastNoise | None:
+    """Noise from third differences in windows of 0.25 s, beginning 0.25 s after the excitation: third differences
+    remove slow ringing. None where there is no such window."""
     length = round(_WINDOW_S * recording.sample_rate_hz)
     if length < _LEAST_SAMPLES:
         return None
@@ -46,12 +46,10 @@ def hiss_at_rest(recording: Recording, samples: FloatArray) -> Hiss | None:
     if not variances:
         return None
     variance: FloatArray = np.array(variances)
-    return Hiss(variance, np.full(variance.shape, (length - 3) / _DIFFERENCE_LOSS))
+    return FastNoise(variance, np.full(variance.shape, (length - 3) / _DIFFERENCE_LOSS))
 
 
-def resting_noise(
-    recording: Recording, samples: FloatArray, frequency_hz: FloatArray
-) -> tuple[FloatArray, float] | None:
+def rest_noise(recording: Recording, samples: FloatArray, frequency_hz: FloatArray) -> tuple[FloatArray, float] | None:
     """(lines, channels) density and its degrees of freedom; None where nothing rests for a quarter of a second, or a
     reading stands still at rest: an encoder's steps then hide its noise."""
     length = round(_WINDOW_S * recording.sample_rate_hz)
@@ -105,8 +103,7 @@ def quiet_band_noise(
 
 
 def _longest_whole(samples: FloatArray) -> tuple[int, int]:
-    """First sample, and the one after the last, of the longest stretch without a gap: across one, the edge of what is
-    filled in is heard at all frequencies."""
+    """Start and stop of the longest stretch without a gap: edges of a filled gap would add power at all frequencies."""
     known = np.isfinite(samples).all(axis=1).astype(np.int8)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], known, [0]]))).reshape(-1, 2)
     if not len(edges):

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.special import fdtri
 
 from analysis.diagnosis.noise.channel_noise import ChannelNoise, SegmentNoise
-from analysis.diagnosis.noise.periods import Periods, look_samples, look_spectra
-from analysis.diagnosis.noise.quiet_noise import hiss_at_rest
-from analysis.diagnosis.noise.rounding import rounded_noise, rounding_step
+from analysis.diagnosis.noise.periods import Periods, period_samples, period_spectra
+from analysis.diagnosis.noise.quiet_noise import fast_noise_at_rest
+from analysis.diagnosis.noise.rounding import rounding_step, undo_rounding
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.noise_floor import over_neighbours, spread_over_looks
 from equalizer.signals.recording import Recording
@@ -29,11 +29,12 @@ _TINY = np.finfo(np.float64).tiny
 def repeat_noise(
     recording: Recording, samples: FloatArray, periods: Sequence[Periods], lines_hz: FloatArray
 ) -> ChannelNoise:
-    """periods: each with two looks or more. lines_hz: where the density is wanted."""
+    """Noise of each channel from the differences between periods. periods: at least two of each segment. lines_hz:
+    where the density is wanted."""
     spreads = [_spread(recording, samples, period, lines_hz) for period in periods]
     density, freedom = np.stack([spread for spread, _ in spreads]), np.stack([free for _, free in spreads])
     variance = density.mean(axis=1)
-    moved = _moved(samples, periods)
+    moved = _moves_over_steps(samples, periods)
     counted = moved & quietest(np.where(moved, variance, np.inf), freedom)
     weights = np.where(counted, freedom, 0.0)
     pooled = np.einsum("sc,slc->lc", weights, density) / weights.sum(axis=0)
@@ -60,7 +61,7 @@ def repeat_noise(
 def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The density with what repeats of the rounding, and that part alone: (lines, channels), (channels,)."""
     parts = [
-        rounded_noise(float(variance), rounding_step(channel)).repeating if np.isfinite(variance) else 0.0
+        undo_rounding(float(variance), rounding_step(channel)).repeating if np.isfinite(variance) else 0.0
         for variance, channel in zip(density.mean(axis=0), samples.T, strict=True)
     ]
     rounding: FloatArray = np.array(parts)
@@ -76,7 +77,7 @@ def quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
 
 
 def equal_lines(density: FloatArray) -> FloatArray:
-    """As many lines of equal power vary as much in total. density: (lines, channels)."""
+    """(channels,): equivalent number of independent lines of equal power. density: (lines, channels)."""
     equal: FloatArray = density.sum(axis=0) ** 2 / np.maximum(np.sum(density**2, axis=0), _TINY)
     return np.maximum(equal, 1.0)
 
@@ -84,27 +85,27 @@ def equal_lines(density: FloatArray) -> FloatArray:
 def _spread(
     recording: Recording, samples: FloatArray, periods: Periods, lines_hz: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    density = spread_over_looks(look_spectra(samples, periods)) * periods.length
-    freedom = 2 * (periods.looks - 1) * equal_lines(over_neighbours(density, _SMOOTHED_LINES))
+    density = spread_over_looks(period_spectra(samples, periods)) * periods.length
+    freedom = 2 * (periods.count - 1) * equal_lines(over_neighbours(density, _SMOOTHED_LINES))
     own_hz = periods.frequency_hz(recording.sample_rate_hz)
     if len(own_hz) != len(lines_hz):
         density = np.stack([np.interp(lines_hz, own_hz, channel) for channel in density.T], axis=1)
     return density, freedom
 
 
-def _moved(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
+def _moves_over_steps(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
     """(segments, channels): where a channel moves over its steps of rounding; all where it never does."""
     steps = np.array([rounding_step(channel) for channel in samples.T])
-    moved = np.array([look_samples(samples, period).std(axis=(0, 1)) >= _STEPS_MOVED * steps for period in periods])
+    moved = np.array([period_samples(samples, period).std(axis=(0, 1)) >= _STEPS_MOVED * steps for period in periods])
     return np.asarray(moved | ~moved.any(axis=0), dtype=np.bool_)
 
 
 def _no_more_than_rest(
     recording: Recording, samples: FloatArray, density: FloatArray, freedom: FloatArray, varied: Mask
 ) -> tuple[FloatArray, Mask]:
-    """The density, capped by the hiss at rest in channels whose segments varied and where all are louder than it."""
+    """The density, capped by the noise at rest in channels whose segments varied and all exceed it."""
     none = np.zeros(len(varied), dtype=np.bool_)
-    hiss = hiss_at_rest(recording, samples)
+    hiss = fast_noise_at_rest(recording, samples)
     if hiss is None or not varied.any():
         return density, none
     quiet = quietest(hiss.variance, hiss.freedom)

@@ -41,27 +41,29 @@ def rounding_step(samples: FloatArray) -> float:
     return step if regular and len(values) < 0.5 * min(len(samples), _EXAMINED) else 0.0
 
 
-def rounded_noise(between_repeats: float, step: float) -> RoundedNoise:
-    """From the variance that is seen between repeats of a movement over many steps. step: 0 = not rounded."""
+def undo_rounding(between_repeats: float, step: float) -> RoundedNoise:
+    """Total noise, rounding included, from the variance between repeats of a movement over many steps. step: 0 = not
+    rounded."""
     if step == 0:
         return RoundedNoise(between_repeats, 0.0)
     seen = between_repeats / step**2
     if seen > 1.0:
         return RoundedNoise(between_repeats, 0.0)
-    repeating = _repeating(_before_rounding(seen)) * step**2
+    repeating = _repeating_variance(_variance_before_rounding(seen)) * step**2
     return RoundedNoise(between_repeats + repeating, repeating)
 
 
-def _before_rounding(seen: float) -> float:
-    """The noise's variance, by halves: what is seen between repeats grows with it. Both for steps of 1."""
+def _variance_before_rounding(seen: float) -> float:
+    """The noise's variance before rounding, by bisection: the variance between repeats grows with it. For steps of
+    1."""
     low, high = 0.0, 1.0 if seen > 0 else 0.0
     for _ in range(_HALVES):
         middle = (low + high) / 2
-        low, high = (middle, high) if middle + 1 / 12 - _repeating(middle) < seen else (low, middle)
+        low, high = (middle, high) if middle + 1 / 12 - _repeating_variance(middle) < seen else (low, middle)
     return high
 
 
-def _repeating(variance: float) -> float:
+def _repeating_variance(variance: float) -> float:
     """Variance of the repeating part for steps of 1. variance: of the noise before rounding."""
     blurred = np.exp(-4 * np.pi**2 * _TERMS**2 * variance) / _TERMS**2
     left_out = 0.0 if variance > 0 else np.pi**2 / 6 - float(np.sum(1 / _TERMS**2))

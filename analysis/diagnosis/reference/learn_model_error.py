@@ -140,7 +140,7 @@ def _rms(courses: Sequence[FloatArray]) -> FloatArray:
 
 def _lesson(chosen: Chosen, model: MechanicalModel, recording: Recording, map_: Mapper) -> _Lesson:
     whole, tuning = chosen.measure, tuning_of(model, recording.command.channels)
-    context = SearchContext(whole.shortened(), whole, tuning, map_)
+    context = SearchContext(whole.shorten(), whole, tuning, map_)
     retuned = context.confirmed(context.candidate(retuned_alone(context)))
     cells = cells_of(whole, retuned.fitted, chosen.floors)
     return _Lesson(whole, tuning, retuned, cells, _channel_shares(whole, retuned))

@@ -46,9 +46,9 @@ def _by_size(
 ) -> Searched:
     wide = replace(learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels))
     plain = floored(context.whole, wide)
-    seen = searched(replace(context, measure=plain.shortened(), whole=plain), catalogue, progress, time_left)
+    seen = searched(replace(context, measure=plain.shorten(), whole=plain), catalogue, progress, time_left)
     back = floored(context.whole, learned.floor).with_records(seen.context.whole.records)
-    own = replace(context, measure=back.shortened(), whole=back)
+    own = replace(context, measure=back.shorten(), whole=back)
     return replace(seen, context=own, found=_by(own, seen.found))
 
 
@@ -57,10 +57,10 @@ def _by_contrast(
 ) -> Searched:
     plain = floored(context.whole, learned.floor)
     whole = learned.beside(plain, context.tuning.model)
-    beside = replace(context, measure=whole.shortened(), whole=whole, references=learned.references)
+    beside = replace(context, measure=whole.shorten(), whole=whole, references=learned.references)
     seen = searched(beside, catalogue, progress, time_left)
     plain = plain.with_records(seen.context.whole.records)
-    back = replace(context, measure=plain.shortened(), whole=plain)
+    back = replace(context, measure=plain.shorten(), whole=plain)
     found = _by(back, seen.found)
     if context.certain:
         return replace(seen, context=back, found=found, judged=_judged(found, True, learned.floor.beyond), remarks=())

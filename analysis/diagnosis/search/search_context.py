@@ -66,8 +66,8 @@ class SearchContext:
 
     def half_opened(self) -> "SearchContext":
         """With the first half of every sealed stretch to fit and to choose by."""
-        whole = self.whole.with_records(tuple(record.unsealed() for record in self.whole.records))
-        return replace(self, measure=whole.shortened(), whole=whole)
+        whole = self.whole.with_records(tuple(record.unseal_half() for record in self.whole.records))
+        return replace(self, measure=whole.shorten(), whole=whole)
 
     def candidate(self, fitted: Fitted) -> FittedCandidate:
         """On the samples to fit and to choose by; its `test` is NaN."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.played_errors import PlayedError, played_error
@@ -103,7 +103,7 @@ def _not_whole(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
 def imported(found: FoundMap) -> Recording:
     """One recording of force-driven kind. Raises StudyError."""
     recording = build_recording(found.source.map, found.files, lambda share: None).recording
-    return all_force_driven([recording])[0]
+    return all_as_force_driven([recording])[0]
 
 
 def _read(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: Progress) -> _Read:
@@ -181,7 +181,7 @@ def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherT
     try:
         recording = imported(test)
         if _is_plain(wanted):
-            (recording,) = all_force_driven(plain_form((recording,), turns=False)[0])
+            (recording,) = all_as_force_driven(plain_form((recording,), turns=False)[0])
         retuned, after = (played_error(recording, model, "all") for model in (_retuned(found), found.improved))
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         said = problem.happened if isinstance(problem, StudyError) else f"{problem}."

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.data.carried_weight import weighted
+from analysis.diagnosis.data.carried_weight import has_carried_weight
 from analysis.diagnosis.first_model.choose_structure import Choice, first_structure
 from analysis.diagnosis.first_model.model_structures import KINDS, Kind, Number, StructureRefused
 from analysis.diagnosis.first_model.turned_round import as_recorded
@@ -47,7 +47,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
             saved="Nothing was written.",
         )  # fmt: skip
     found = read_input(plan.recordings, 1, True, plan.force_constants)
-    if weighted(found.recordings):
+    if has_carried_weight(found.recordings):
         raise _refused("A recording was made with a weight on, and the model would hold the weight.")
     try:
         choice = first_structure(found.recordings, wanted, on_progress)

@@ -101,7 +101,7 @@ def arena_of(diagnosed) -> Callable[..., Any]:
         recording = diagnosed.recorded(axes, effects, seed)
         model = diagnosed.device(axes) if given is None else given
         measure = measure_of([recording], model).measure
-        return SearchContext(measure.shortened(), measure, tuning_of(model, recording.command.channels), map)
+        return SearchContext(measure.shorten(), measure, tuning_of(model, recording.command.channels), map)
 
     return context
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.diagnosis.data.force_driven import force_driven
+from analysis.diagnosis.data.force_driven import as_force_driven
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.forces.rigid_model import rigid_model
@@ -45,7 +45,7 @@ def test_a_positioning_axis_is_compared_by_forces(shared: Path) -> None:
 
 
 def test_a_rack_that_was_driven_by_its_speed_is_compared_by_forces(shared: Path) -> None:
-    recording = force_driven(read_foreign((folder(shared, "rack_drive"),), "rack_drive").recording)
+    recording = as_force_driven(read_foreign((folder(shared, "rack_drive"),), "rack_drive").recording)
     model = rigid_model([recording], "fitted")
     assert model.mass[0, 0] == pytest.approx(24.7, rel=0.15)
     assert measure_of([recording], model).measure.name == "predicted force"

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.found_segments import found_period
+from analysis.diagnosis.data.found_segments import find_period
 from analysis.look.repeats import repeat_checks, repeats
 from equalizer.signals.recording import Segment
 
@@ -14,12 +14,12 @@ def tiled(period, times, seed=1):
 @pytest.mark.parametrize("times", [2.2, 5.5])
 def test_the_period_of_a_noise_that_is_played_again_is_found(period, times):
     command = tiled(period, 6)[: int(period * times)]
-    assert found_period(command[:, None]) == period
+    assert find_period(command[:, None]) == period
 
 
 def test_the_period_of_three_channels_of_which_one_rests():
     command = np.column_stack([tiled(300, 4), np.zeros(1200), tiled(300, 4, seed=2)])
-    assert found_period(command) == 300
+    assert find_period(command) == 300
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def test_the_period_of_three_channels_of_which_one_rests():
     ids=["noise", "random walk", "step", "sweep", "ramp", "constant"],
 )
 def test_what_does_not_repeat_has_no_period(command):
-    assert found_period(command[:, None]) == 0
+    assert find_period(command[:, None]) == 0
 
 
 def test_an_undeclared_period_is_said_with_the_noise_between_repeats(recording):

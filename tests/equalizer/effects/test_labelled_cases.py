@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import observed
+from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated, fit, gather_evidence, sensitivity
@@ -36,7 +36,7 @@ def test_with_the_effect_that_it_names_a_case_is_explained_to_the_noise(shared, 
     model = read_mechanical_model(shared / "cases" / f"{case}.toml")
     (truth,) = json.loads((shared / "cases" / f"{case}.truth.json").read_text())
     effect = EFFECTS[truth["effect"]]
-    record = observed(recording, model.outputs)
+    record = observe(recording, model.outputs)
     measure = FreeSimulation((record,), NOISE, NOISE)
     tuning = tuning_of(model, recording.command.channels)
     nominal = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)

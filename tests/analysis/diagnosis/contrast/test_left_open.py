@@ -15,8 +15,8 @@ from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 def test_a_fault_that_the_comparison_cannot_undo_is_left_open(rig):
     found = rig.contrast("coulomb_friction", 0.6, rig.UNDONE)
     assert found.left_open
-    assert not set(rig.UNDONE) & set(found.faults)
-    assert "added_mass" in found.faults
+    assert not set(rig.UNDONE) & set(found.tested_effects)
+    assert "added_mass" in found.tested_effects
 
 
 def test_nothing_is_left_open_where_a_fault_is_named(rig):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.carried_weight import carrying, heavier, weighted
+from analysis.diagnosis.data.carried_weight import add_carried_weight, add_mass, has_carried_weight
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
 from analysis.diagnosis.errors.choose_measure import measure_of
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -17,7 +17,7 @@ ADDED_KG = 0.03
 def recordings(diagnosed):
     """Of the same device without friction, bare and with a weight; the second is told, not the file."""
     bare = diagnosed.recorded(1, (), 4)
-    played = simulate_mechanism(heavier(diagnosed.device(1), ADDED_KG), bare.command.samples, diagnosed.RATE_HZ)
+    played = simulate_mechanism(add_mass(diagnosed.device(1), ADDED_KG), bare.command.samples, diagnosed.RATE_HZ)
     noise = np.random.default_rng(5).standard_normal(played.response.shape)
     response = replace(bare.response, samples=played.response + diagnosed.NOISE[0] * noise)
     position = replace(bare.position, samples=played.position + diagnosed.NOISE[1] * noise)
@@ -43,12 +43,12 @@ def test_the_weight_of_one_recording_is_not_that_of_another(recordings, diagnose
     model, told = diagnosed.device(1), replace(heavy, meta={"added_mass_kg": ADDED_KG})
     measure = measure_of([bare, told], model).measure
     assert all(np.sqrt(np.mean(left**2)) < 1.2 for left in measure.residuals(model, ()))
-    assert (weighted([bare]), weighted([bare, told])) == (False, True)
+    assert (has_carried_weight([bare]), has_carried_weight([bare, told])) == (False, True)
 
 
 def test_a_recording_that_says_nothing_leaves_the_model_as_it_is(recordings, diagnosed):
     model = diagnosed.device(1)
-    assert carrying(model, recordings[0]) is model
+    assert add_carried_weight(model, recordings[0]) is model
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.found_segments import exact_period, with_found_segments
+from analysis.diagnosis.data.found_segments import exact_period, find_segments
 from analysis.diagnosis.noise.noise_floor import noise_floor
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -35,7 +35,7 @@ def parted(levels, period=500, times=5.0):
 
 def test_each_part_becomes_a_segment_with_its_period_and_level():
     command, parts = parted((0.5, 1.0, 2.0))
-    found, said = with_found_segments(recording(command, parts=parts))
+    found, said = find_segments(recording(command, parts=parts))
     top = np.abs(tiled(500, 1)).max()
     assert [(s.start, s.stop, s.kind, s.period, s.role) for s in found.segments] == [
         (0, 2500, "multisine", 500, ""), (2500, 5000, "multisine", 500, ""), (5000, 7500, "multisine", 500, "")
@@ -47,7 +47,7 @@ def test_each_part_becomes_a_segment_with_its_period_and_level():
 def test_noise_is_then_taken_from_the_repeats():
     command = tiled(500, 8)
     noisy = 3 * command + 0.2 * np.random.default_rng(5).standard_normal(len(command))
-    found, _ = with_found_segments(recording(command, noisy))
+    found, _ = find_segments(recording(command, noisy))
     floor = noise_floor(found)
     assert floor.how == "repeats"
     assert floor.response_rms[0] == pytest.approx(0.2, rel=0.1)
@@ -65,7 +65,7 @@ def test_numbers_that_were_rounded_repeat_as_well(digits):
 
 def test_of_a_short_period_an_odd_multiple_is_stated():
     command = np.sin(2 * np.pi * np.arange(8000) / 100)
-    found, _ = with_found_segments(recording(command))
+    found, _ = find_segments(recording(command))
     assert [(s.kind, s.period) for s in found.segments] == [("sine", 1500)]
 
 
@@ -92,17 +92,17 @@ def _slower():
 )  # fmt: skip
 def test_no_period_is_invented(command):
     before = recording(command)
-    assert with_found_segments(before) == (before, "")
+    assert find_segments(before) == (before, "")
 
 
 def test_segments_of_its_own_stay():
     before = replace(recording(tiled(500, 8)), segments=(Segment(0, 4000, "noise", role="fit"),))
-    assert with_found_segments(before) == (before, "")
+    assert find_segments(before) == (before, "")
 
 
 def test_a_part_that_does_not_repeat_beside_one_that_does_is_no_rest():
     command = np.concatenate([tiled(500, 5), np.random.default_rng(9).standard_normal(2000)])
     parts = [{"start": 0, "stop": 2500}, {"start": 2500, "stop": 4500}]
-    found, said = with_found_segments(recording(command, parts=parts))
+    found, said = find_segments(recording(command, parts=parts))
     assert [(s.kind, s.period) for s in found.segments] == [("multisine", 500), ("noise", 0)]
     assert said.startswith("In 1 of 2 parts the command repeats exactly")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.growth import growth_rate, runs_away
+from analysis.diagnosis.data.growth import growth_rate, is_unstable_within
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated, fit, sensitivity
@@ -57,9 +57,9 @@ def test_friction_is_named_in_spite_of_a_gap(made, gapped):
 def test_growth_is_told_from_motion_that_dies_out(made):
     model = made.device(1)
     assert growth_rate(model) == pytest.approx(-8.0)
-    assert not runs_away(model, 1000.0)
+    assert not is_unstable_within(model, 1000.0)
     pushed = replace(model, damping=-model.damping)
-    assert runs_away(pushed, 1.0) and not runs_away(pushed, 0.1)
+    assert is_unstable_within(pushed, 1.0) and not is_unstable_within(pushed, 0.1)
 
 
 def test_a_fit_with_wide_tolerances_stays_with_models_that_hold_themselves(made):
@@ -76,7 +76,7 @@ def test_a_fit_with_wide_tolerances_stays_with_models_that_hold_themselves(made)
     for _ in range(4):
         found = fit(measure, tuning, found, sensitivity(measure, tuning, found.deviations, NOTHING), 4)
     assert found.cost < start.cost / 10
-    assert not runs_away(tuning.tuned(found.deviations), 12.0)
+    assert not is_unstable_within(tuning.tuned(found.deviations), 12.0)
     # Where a number is moved to see what it does, it may run away: that way is not looked.
     at = np.array([0.0, -0.02 - given.damping[0, 0] / 4.0, 0.0])
     assert np.isfinite(sensitivity(measure, tuning, at, NOTHING).columns).all()

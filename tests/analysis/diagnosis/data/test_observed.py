@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import measured_of, noise_in_units, observed, roles
+from analysis.diagnosis.data.observed import error_units, measured_signals, observe, roles
 from analysis.diagnosis.settings import MODEL_FLOOR
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -103,21 +103,21 @@ def test_a_recording_that_is_all_test_is_not_fitted():
 def test_lost_samples_count_for_nothing():
     samples = np.ones((1000, 2))
     samples[100:200, 1] = np.nan
-    seen = observed(recording(samples), 2)
+    seen = observe(recording(samples), 2)
     assert not (seen.fit | seen.choose | seen.test)[100:200].any()
     assert (seen.fit | seen.choose | seen.test).sum() == 900
 
 
 def test_positions_are_compared_where_they_belong_to_the_outputs():
     samples = np.ones((50, 2))
-    assert measured_of(recording(samples, 2 * samples), 2)[0].shape == (50, 4)
-    assert measured_of(recording(samples, np.ones((50, 3))), 2)[0].shape == (50, 2)
-    assert measured_of(recording(samples), 2)[0].shape == (50, 2)
+    assert measured_signals(recording(samples, 2 * samples), 2)[0].shape == (50, 4)
+    assert measured_signals(recording(samples, np.ones((50, 3))), 2)[0].shape == (50, 2)
+    assert measured_signals(recording(samples), 2)[0].shape == (50, 2)
 
 
 def test_decisions_do_not_reach_the_sealed_samples():
-    seen = observed(recording(np.ones((1000, 2))), 2)
-    short = seen.shortened()
+    seen = observe(recording(np.ones((1000, 2))), 2)
+    short = seen.shorten()
     assert len(short.command) == len(short.measured) == 750
     assert not short.test.any()
     assert (short.fit.sum(), short.choose.sum()) == (seen.fit.sum(), seen.choose.sum())
@@ -125,5 +125,5 @@ def test_decisions_do_not_reach_the_sealed_samples():
 
 def test_errors_are_counted_in_noise_and_in_a_share_of_the_signal():
     loud = np.full((100, 1), 10.0)
-    assert noise_in_units(loud, np.array([1.0])) == pytest.approx(np.hypot(1.0, 10 * MODEL_FLOOR))
-    assert noise_in_units(loud, np.array([0.0])) == pytest.approx(10 * MODEL_FLOOR)
+    assert error_units(loud, np.array([1.0])) == pytest.approx(np.hypot(1.0, 10 * MODEL_FLOOR))
+    assert error_units(loud, np.array([0.0])) == pytest.approx(10 * MODEL_FLOOR)

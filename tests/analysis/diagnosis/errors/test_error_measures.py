@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.closed_loop import in_closed_loop
-from analysis.diagnosis.data.force_driven import force_driven
+from analysis.diagnosis.data.closed_loop import is_in_closed_loop
+from analysis.diagnosis.data.force_driven import as_force_driven
 from analysis.diagnosis.data.observed_parts import names_of_parts, observed_parts
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.choose_measure import measure_of
@@ -163,8 +163,8 @@ def test_what_decisions_see_does_not_hang_on_sealed_samples(held: Recording, dri
             second = replace(second, band_hz=first.band_hz)
         else:
             second = replace(second, states=first.states)
-        seen = first.shortened().records[0].fit
-        (one_left,), (other_left,) = (each.shortened().residuals(model(), ()) for each in (first, second))
+        seen = first.shorten().records[0].fit
+        (one_left,), (other_left,) = (each.shorten().residuals(model(), ()) for each in (first, second))
         assert np.allclose(one_left[seen], other_left[seen])
 
 
@@ -221,8 +221,8 @@ def test_what_holds_itself_comes_to_rest_within_a_third_of_the_recording() -> No
 
 
 def test_feedback_is_seen_by_the_excitation_beside_the_command(held: Recording) -> None:
-    assert in_closed_loop(held)
-    assert not in_closed_loop(replace(held, excitation=held.command))
+    assert is_in_closed_loop(held)
+    assert not is_in_closed_loop(replace(held, excitation=held.command))
 
 
 def test_feedback_is_seen_without_an_excitation_where_responses_make_the_command() -> None:
@@ -235,16 +235,16 @@ def test_feedback_is_seen_without_an_excitation_where_responses_make_the_command
         if k + 1 < n:
             x[k + 1] = 0.9 * x[k] + 0.1 * u[k] + 0.2 * rng.standard_normal()
     looped = _plain(u, x)
-    assert in_closed_loop(looped)
-    assert not in_closed_loop(replace(looped, hold=Hold.BAND_LIMITED))
+    assert is_in_closed_loop(looped)
+    assert not is_in_closed_loop(replace(looped, hold=Hold.BAND_LIMITED))
 
 
 def test_a_free_command_is_not_taken_for_feedback(drifting: Recording) -> None:
     rng = np.random.default_rng(3)
     u = rng.standard_normal(4000)
     x = np.convolve(u, 0.9 ** np.arange(60))[: len(u)]
-    assert not in_closed_loop(_plain(u, np.append(0.0, x[:-1])))
-    assert not in_closed_loop(drifting)
+    assert not is_in_closed_loop(_plain(u, np.append(0.0, x[:-1])))
+    assert not is_in_closed_loop(drifting)
 
 
 def _plain(u: np.ndarray, x: np.ndarray) -> Recording:
@@ -274,9 +274,9 @@ def test_a_recording_for_the_test_spares_the_others(held: Recording) -> None:
 def test_an_imposed_motion_is_turned_round(held: Recording) -> None:
     x, force = held.response, held.command
     speed = Signal(np.gradient(x.samples, 1 / RATE_HZ, axis=0), RATE_HZ, "velocity", "m/s", ("x",))
-    turned = force_driven(Recording("rack", speed, force, x, segments=held.segments))
+    turned = as_force_driven(Recording("rack", speed, force, x, segments=held.segments))
     assert turned.command is force and turned.response is speed
-    assert force_driven(held) is held
+    assert as_force_driven(held) is held
     chosen = measure_of([turned], model(quantity="velocity"))
     assert chosen.measure.name == "predicted force"
     assert "imposed" in chosen.remarks[0]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.growth import growth_rate, runs_away
+from analysis.diagnosis.data.growth import growth_rate, is_unstable_within
 from analysis.diagnosis.errors.fit_score import FitScore, fit_score, rms_over
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -57,7 +57,7 @@ def test_the_worst_channel_and_the_mean_of_all():
     ("damping", "stiffness", "grows"), [(2.0, 100.0, False), (0.0, 0.0, False), (-2.0, 100.0, True)]
 )
 def test_a_model_that_gains_energy_runs_away(damping, stiffness, grows):
-    assert runs_away(model(damping, stiffness), 10.0) == grows
+    assert is_unstable_within(model(damping, stiffness), 10.0) == grows
 
 
 def test_the_rate_is_that_of_the_slowest_motion():

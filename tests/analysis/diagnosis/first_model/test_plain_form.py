@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.motion import motion_signal
-from analysis.diagnosis.data.closed_loop import in_closed_loop
-from analysis.diagnosis.data.driven_response import answer
-from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.data.closed_loop import is_in_closed_loop
+from analysis.diagnosis.data.driven_response import response_significance
+from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.first_model.plain_form import plain_form
 from analysis.diagnosis.settings import ANSWER_DEVIATIONS
 from equalizer.signals.recording import Hold, Recording
@@ -138,7 +138,7 @@ def test_of_several_forces_along_one_motion_the_strongest_is_balanced():
     recording = of([("q", "displacement", "m", way)], [("a", "force", "N", 2 * way), ("b", "force", "N", 5 * way)])
 
     formed, (said,) = plain_form((recording,))
-    (driven,) = all_force_driven(formed)
+    (driven,) = all_as_force_driven(formed)
 
     assert (driven.command.channels, driven.response.channels) == (("b",), ("q",))
     assert "for a, import the recording" in said
@@ -158,7 +158,7 @@ def test_one_force_along_two_imposed_motions_keeps_both():
     way, far = smooth(2000, 1), smooth(2000, 2)
     recording = of([("q", "displacement", "m", way), ("r", "displacement", "m", far)], [("f", "force", "N", way - far)])
 
-    (driven,) = all_force_driven(plain_form((recording,))[0])
+    (driven,) = all_as_force_driven(plain_form((recording,))[0])
 
     assert (driven.command.channels, driven.response.channels) == (("f",), ("q", "r"))
 
@@ -189,7 +189,7 @@ def test_a_device_whose_memory_is_longer_than_a_stretch_answers_its_command():
     moved = of([("u", "voltage", "V", push)], [("w", "speed", "m/s", speed_of(push, mass=0.3))])
     other = replace(moved, response=replace(moved.response, samples=rng.standard_normal((len(push), 1))))
 
-    sure, unsure = answer([moved]), answer([other])
+    sure, unsure = response_significance([moved]), response_significance([other])
 
     assert sure is None or sure >= ANSWER_DEVIATIONS
     assert unsure is not None
@@ -263,8 +263,8 @@ def test_what_was_decided_beforehand_is_turned_with_the_command(hold):
     (found,), _ = plain_form((recording,))
 
     np.testing.assert_array_equal(found.excitation.samples, beside.samples)
-    assert in_closed_loop(found)
-    assert not in_closed_loop(replace(found, excitation=found.command))
+    assert is_in_closed_loop(found)
+    assert not is_in_closed_loop(replace(found, excitation=found.command))
 
 
 def test_what_was_decided_beforehand_is_summed_with_the_commands():

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.motion_smoother import smoothed_motion
-from analysis.diagnosis.data.observed import observed
+from analysis.diagnosis.data.motion_smoother import smooth_motion
+from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.forces.needed_force import band_motion, needed_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -89,7 +89,7 @@ def test_the_smoother_finds_motion_and_missing_force_of_a_drifting_plant(quantit
     noise = 1e-4 * played.response.std()
     seen = Signal(played.response + noise * rng.standard_normal(played.response.shape), RATE_HZ, quantity, "1", ("x",))
     recording = Recording("body", Signal(force, RATE_HZ, "force", "N", ("x",)), seen)
-    found = smoothed_motion(plant, observed(recording, 1), force, np.array([noise]))
+    found = smooth_motion(plant, observe(recording, 1), force, np.array([noise]))
     inside = slice(500, -100)
     assert np.std((found.missing_force - missing)[inside]) < 0.2 * np.std(missing)
     assert np.std((found.axis_velocity - played.axis_velocity)[inside]) < 0.02 * np.std(played.axis_velocity)

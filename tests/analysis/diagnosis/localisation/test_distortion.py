@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.detection_lines import detection_lines, held_samples
+from analysis.diagnosis.data.detection_lines import detection_lines, hold_length
 from analysis.diagnosis.localisation.distortion import distortion
 from analysis.diagnosis.localisation.level_trends import level_trends
 from analysis.diagnosis.noise.noise_floor import noise_floor
@@ -110,9 +110,9 @@ def test_distortion_that_a_feedback_brings_back_is_not_counted_twice(device):
 def test_images_of_a_held_command_are_no_driven_lines():
     random = np.random.default_rng(5)
     held = np.repeat(random.standard_normal((500, 1)), 2, axis=0)
-    assert held_samples(held) == 2
-    assert held_samples(random.standard_normal((500, 1))) == 1
-    driven = detection_lines(np.fft.rfft(held, axis=0)[1:500] / 1000, held_samples(held)).driven
+    assert hold_length(held) == 2
+    assert hold_length(random.standard_normal((500, 1))) == 1
+    driven = detection_lines(np.fft.rfft(held, axis=0)[1:500] / 1000, hold_length(held)).driven
     assert driven[:240].mean() > 0.9
     assert not driven[250:].any()
 

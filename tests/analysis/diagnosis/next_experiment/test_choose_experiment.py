@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.carried_weight import heavier
+from analysis.diagnosis.data.carried_weight import add_mass
 from analysis.diagnosis.errors.hypothesis import Claim, claimed
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.errors.tuning import tuning_of
@@ -148,7 +148,7 @@ def test_a_weight_is_the_same_along_every_driven_axis():
     eye = np.eye(3)
     model = MechanicalModel("three", "acceleration", eye, eye, eye, turn, turn.T)
     axes = driven_axes(model)
-    assert axes.T @ (heavier(model, 0.03).mass - model.mass) @ axes == pytest.approx(0.03 * eye)
+    assert axes.T @ (add_mass(model, 0.03).mass - model.mass) @ axes == pytest.approx(0.03 * eye)
 
 
 def test_a_cheap_recording_that_tells_too_little_stands_behind_a_dear_one_that_tells():

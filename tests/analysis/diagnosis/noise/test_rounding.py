@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.diagnosis.noise.rounding import rounded_noise, rounding_step
+from analysis.diagnosis.noise.rounding import rounding_step, undo_rounding
 
 
 @pytest.mark.parametrize("step", [1e-5, 0.25])
@@ -27,15 +27,15 @@ def test_what_rounding_hides_between_repeats_is_put_back(before, seed):
     movement = random.uniform(-20, 20, 4000)
     looks = np.round(movement + before * random.standard_normal((8, 4000)))
     between = float(np.mean(looks.var(axis=0, ddof=1)))
-    assert rounded_noise(between, 1.0).total == pytest.approx(before**2 + 1 / 12, rel=0.08)
+    assert undo_rounding(between, 1.0).total == pytest.approx(before**2 + 1 / 12, rel=0.08)
 
 
 def test_without_noise_all_of_the_rounding_repeats():
-    noise = rounded_noise(0.0, 2.0)
+    noise = undo_rounding(0.0, 2.0)
     assert noise.total == pytest.approx(4 / 12, rel=1e-6)
     assert noise.repeating == pytest.approx(noise.total)
 
 
 def test_without_rounding_nothing_is_put_back():
-    assert rounded_noise(0.3, 0.0).total == 0.3
-    assert rounded_noise(0.3, 0.0).repeating == 0
+    assert undo_rounding(0.3, 0.0).total == 0.3
+    assert undo_rounding(0.3, 0.0).repeating == 0

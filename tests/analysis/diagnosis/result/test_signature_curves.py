@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import observed
+from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
@@ -21,7 +21,7 @@ def signature(diagnosed):
         placed = PlacedEffect(BY_NAME[name], tuple(range(axes)), values)
         recording = diagnosed.recorded(axes, (placed,) if there else ())
         model = diagnosed.device(axes)
-        seen = observed(recording, axes)
+        seen = observe(recording, axes)
         noise = np.repeat(diagnosed.NOISE, axes)
         measure, tuning = FreeSimulation((seen,), noise, noise), tuning_of(model, recording.command.channels)
         without = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)

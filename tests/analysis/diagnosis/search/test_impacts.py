@@ -39,7 +39,7 @@ def searched(real, effects, repeats=True):
     if not repeats:
         recording = replace(recording, segments=tuple(replace(segment, period=0) for segment in recording.segments))
     chosen = measure_of([recording], real.device(2))
-    context = SearchContext(chosen.measure.shortened(), chosen.measure, tuning_of(real.device(2), ("fx", "fy")), map)
+    context = SearchContext(chosen.measure.shorten(), chosen.measure, tuning_of(real.device(2), ("fx", "fy")), map)
     given = context.candidate(evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
     whole = context.confirmed(given)  # as a search hands it over: with the sealed samples
     return context, Explanation(whole, whole, whole, (), ()), chosen.floors

@@ -91,7 +91,7 @@ def test_the_sensitivities_of_one_period_stand_for_those_of_all(lagging):
 def by_force(lagging):
     recordings = [record.recording for record in lagging.whole.records]
     measure = measure_by_force(recordings, lagging.tuning.model, None).measure
-    return replace(lagging, measure=measure.shortened(), whole=measure)
+    return replace(lagging, measure=measure.shorten(), whole=measure)
 
 
 def apart_by_force(context):
