@@ -86,6 +86,11 @@ class Trial:
     """Why this presentation is void. None where it counts, is open, or comes from a log that says no cause."""
     repeat_cause: VoidCause | None = None
     """Why this trial is presented again: the cause of the attempt before. None for a first attempt."""
+    late_ticks: int | None = None
+    """Run, but their work ended after the next was due; missed ones come on top. 0 where the device is simulated: its
+    world waits. None in a log of before they were written down."""
+    latest_s: float | None = None
+    """The longest from when a tick was due until its work, or that of the tick that came in its place, was done."""
 
     @property
     def counts(self) -> bool:

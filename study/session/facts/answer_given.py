@@ -25,6 +25,9 @@ class AnswerHealth:
     slew_limited: Count
     sensor_clipped: Count
     peak_command_n: Magnitude
+    late_ticks: Count | None = None
+    latest_s: Seconds | None = None
+    """Null, both, in logs of older versions."""
 
 
 @dataclass(frozen=True, config=FACT)

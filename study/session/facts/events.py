@@ -77,6 +77,8 @@ FIELDS_SINCE: dict[str, object] = {
     "rules": 1,
     "cause": None,
     "health": None,
+    "late_ticks": None,
+    "latest_s": None,
 }
 """Fields that came after the first logs, as they are where a line does not say them: then they are not written."""
 
@@ -156,6 +158,8 @@ class TrialMeasured:
     off_axis_mps2: Measured | None = None
     displacement_mm: Measured | None = None
     missed_ticks: Count | None = None
+    late_ticks: Count | None = None
+    latest_s: Seconds | None = None
     vibrated_s: Seconds | None = None
     """How long the hand was shaken, fades included: for the vibration dose."""
     offset_mm: Magnitude | None = None
@@ -174,6 +178,8 @@ class TrialSpoiled:
     attempt: Index
     reason: str
     missed_ticks: Count | None = None
+    late_ticks: Count | None = None
+    latest_s: Seconds | None = None
     vibrated_s: Seconds | None = None
     monotonic_s: Seconds | None = None
     cause: VoidCause | None = None

@@ -177,6 +177,8 @@ def _measure(state: SessionState, event: TrialMeasured) -> SessionState:
         off_axis_mps2=event.off_axis_mps2,
         displacement_mm=event.displacement_mm,
         missed_ticks=event.missed_ticks,
+        late_ticks=event.late_ticks,
+        latest_s=event.latest_s,
         status=TrialStatus(event.status),
     )
     amplitude_mps2 = None
@@ -247,7 +249,14 @@ def _spoil(state: SessionState, event: TrialSpoiled) -> SessionState:
     presented = _open_trial(state, event)
     if event.cause is VoidCause.ASKED and repeats_left(state) == 0:
         raise LogContradiction(f"{place_of(event)} was asked for again, where no repeat of this run was left")
-    row = replace(state.trials[-1], missed_ticks=event.missed_ticks, status=TrialStatus.SPOILED, void_cause=event.cause)
+    row = replace(
+        state.trials[-1],
+        missed_ticks=event.missed_ticks,
+        late_ticks=event.late_ticks,
+        latest_s=event.latest_s,
+        status=TrialStatus.SPOILED,
+        void_cause=event.cause,
+    )
     busy_voids = state.sitting.busy_voids + computer_too_busy(event.reason)
     counted = replace(state, sitting=replace(state.sitting, busy_voids=busy_voids))
     return replace(

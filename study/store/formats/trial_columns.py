@@ -24,4 +24,6 @@ TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "wanted_mps2": ("Acceleration that the level stands for, where stimuli are equalized", "m/s^2"),
     "void_cause": ("Why this presentation is void; empty where it counts", ""),
     "repeat_cause": ("Why this trial is presented again; empty for a first attempt", ""),
+    "late_ticks": ("Ticks of the control loop whose work ended after the next was due; missed ones not counted", ""),
+    "latest_s": ("Longest from when a tick of the control loop was due until its work was done", "s"),
 }

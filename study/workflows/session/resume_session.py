@@ -153,6 +153,7 @@ def _without_recording(state: SessionState, presented: TrialPresented, clock: Cl
     if health is not None and logged is not None:
         verdict = judge(health, state.protocol.measurement, logged.felt_whole)
     missed_ticks = health.missed_ticks if health is not None else None
+    late_ticks, latest_s = (logged.late_ticks, logged.latest_s) if logged is not None else (None, None)
     vibrated_s = health.ticks / state.opened.device.sample_rate_hz if health is not None else None
     if verdict.spoiled:
         return TrialSpoiled(
@@ -162,6 +163,8 @@ def _without_recording(state: SessionState, presented: TrialPresented, clock: Cl
             attempt=presented.attempt,
             reason=verdict.spoiled,
             missed_ticks=missed_ticks,
+            late_ticks=late_ticks,
+            latest_s=latest_s,
             vibrated_s=vibrated_s,
             monotonic_s=clock.now_s(),
             cause=verdict.cause,
@@ -174,6 +177,8 @@ def _without_recording(state: SessionState, presented: TrialPresented, clock: Cl
         status="unmeasured",
         flags=("its recording was lost when the program ended", *verdict.flags),
         missed_ticks=missed_ticks,
+        late_ticks=late_ticks,
+        latest_s=latest_s,
         vibrated_s=vibrated_s,
         monotonic_s=clock.now_s(),
     )
@@ -204,6 +209,8 @@ def _from_recording(
         off_axis_mps2=values.off_axis_mps2 if values else None,
         displacement_mm=values.displacement_mm if values else None,
         missed_ticks=recording.meta.get("missed_ticks"),
+        late_ticks=recording.meta.get("late_ticks"),
+        latest_s=recording.meta.get("latest_s"),
         vibrated_s=logged.ticks / state.opened.device.sample_rate_hz if logged is not None else None,
         monotonic_s=clock.now_s(),
     )

@@ -58,6 +58,8 @@ def known_then(health: Health, felt_whole: bool) -> AnswerHealth:
         slew_limited=health.slew_limited,
         sensor_clipped=health.sensor_clipped,
         peak_command_n=health.peak_command_n,
+        late_ticks=health.late_ticks,
+        latest_s=health.latest_s,
     )
 
 
@@ -72,6 +74,8 @@ def known_again(logged: AnswerHealth) -> Health:
         slew_limited=logged.slew_limited,
         sensor_clipped=logged.sensor_clipped,
         peak_command_n=logged.peak_command_n,
+        late_ticks=logged.late_ticks or 0,
+        latest_s=logged.latest_s or 0.0,
     )
 
 
@@ -85,6 +89,8 @@ def spoiled(present: Present, why: tuple[str, VoidCause], health: Health | None,
         attempt=present.attempt,
         reason=reason,
         missed_ticks=health.missed_ticks if health else None,
+        late_ticks=health.late_ticks if health else None,
+        latest_s=health.latest_s if health else None,
         vibrated_s=_seconds(health, sitting) if health else 0.0,
         cause=cause,
     )
@@ -112,6 +118,8 @@ def measured(present: Present, outcome: Outcome, state: SessionState, sitting: S
         off_axis_mps2=values.off_axis_mps2 if values else None,
         displacement_mm=values.displacement_mm if values else None,
         missed_ticks=outcome.played.health.missed_ticks,
+        late_ticks=outcome.played.health.late_ticks,
+        latest_s=outcome.played.health.latest_s,
         vibrated_s=_seconds(outcome.played.health, sitting),
         offset_mm=_farthest_mm(outcome.played, sitting),
     )
@@ -141,6 +149,8 @@ def _conditions(present: Present, outcome: Outcome, state: SessionState, sitting
         "unit_vector": [float(v) for v in outcome.vector],
         "hand": "held",
         "missed_ticks": outcome.played.health.missed_ticks,
+        "late_ticks": outcome.played.health.late_ticks,
+        "latest_s": outcome.played.health.latest_s,
         "flags": list(outcome.flags),
         "equalizer": sitting.equalizer.name,
         "provenance": {

@@ -29,7 +29,8 @@ LONGEST_FIRST_BYTES = 2**20
 
 TOLD = (
     "event", "run", "trial", "attempt", "phase", "frequency_hz", "level_n", "direction", "angle_deg", "polarity",
-    "answer", "response_time_s", "status", "cause", "missed_ticks", "delivered_mps2", "outcome",
+    "answer", "response_time_s", "status", "cause", "missed_ticks", "late_ticks", "latest_s", "delivered_mps2",
+    "outcome",
 )  # fmt: skip
 """Of each fact: nothing about the person, no notes, no forms."""
 

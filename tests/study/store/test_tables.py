@@ -20,6 +20,9 @@ TRIAL = Trial(
     TrialStatus.OK, 135.0,
 )  # fmt: skip
 
+LATER = ",wanted_mps2,void_cause,repeat_cause,late_ticks,latest_s"
+"""Columns that earlier versions did not write, the newest last."""
+
 floats = st.floats(allow_nan=False)
 trials = st.builds(
     Trial,
@@ -54,9 +57,10 @@ def test_a_row_is_plain_text():
     first, second, third = rows_to_csv([TRIAL, unanswered], Trial).splitlines()
     assert first == ",".join(TRIALS_HEADER)
     assert (
-        second == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,1,true,false,1.5,2.5,0.01,0.3,0,false,ok,135.0,,,"
+        second
+        == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,1,true,false,1.5,2.5,0.01,0.3,0,false,ok,135.0,,,,,"
     )
-    assert third == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,,,false,1.5,2.5,0.01,0.3,0,,ok,135.0,,,"
+    assert third == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,,,false,1.5,2.5,0.01,0.3,0,,ok,135.0,,,,,"
 
 
 def test_tables_are_rewritten_at_will(tmp_path):
@@ -79,10 +83,21 @@ def test_thresholds_go_to_disk_and_back(tmp_path):
 
 def test_a_table_of_before_a_column_was_is_still_read():
     lines = rows_to_csv([TRIAL], Trial).splitlines()
-    older = "\n".join(line.removesuffix(",wanted_mps2,void_cause,repeat_cause").removesuffix(",,,") for line in lines)
+    older = "\n".join(line.removesuffix(LATER).removesuffix(",,,,,") for line in lines)
     assert rows_from_csv(older, Trial) == (TRIAL,)
     foreign = older.replace("angle_deg", "remark").replace("135.0", "late")
     assert rows_from_csv(foreign, Trial) == (replace(TRIAL, angle_deg=None),)
+
+
+@pytest.mark.parametrize("absent", [",late_ticks,latest_s", ",latest_s"])
+def test_a_table_of_before_late_ticks_were_written_down_says_nothing_of_them(absent):
+    late = replace(TRIAL, late_ticks=3, latest_s=0.0042)
+    assert rows_from_csv(rows_to_csv([late], Trial), Trial) == (late,)
+    header, row = rows_to_csv([late], Trial).splitlines()
+    columns_absent = absent.count(",")
+    older = f"{header.removesuffix(absent)}\n{row.rsplit(',', columns_absent)[0]}\n"
+    (read,) = rows_from_csv(older, Trial)
+    assert (read.late_ticks, read.latest_s) == (3 if columns_absent == 1 else None, None)
 
 
 def test_columns_after_the_known_ones_do_no_harm():
@@ -106,16 +121,16 @@ def test_a_text_that_is_no_table_is_refused():
     [
         ("frequency_hz", "freq", "column 7 of the header is 'freq'; it must be 'frequency_hz' (of subject, session"),
         (
-            ",status,angle_deg,wanted_mps2,void_cause,repeat_cause\n",
+            f",status,angle_deg{LATER}\n",
             "\n",
             "column 19 of the header is missing; it must be 'status'",
         ),
-        (",135.0,,,\n", "\n", "line 2 has 19 fields, but the header names 23"),
+        (",135.0,,,,,\n", "\n", "line 2 has 19 fields, but the header names 25"),
         (",3,1,test", ",three,1,test", "line 2, column trial: 'three' is not a whole number"),
         ("25.0", "high", "line 2, column frequency_hz: 'high' is not a number"),
         ("25.0", "", "line 2, column frequency_hz: it is empty, but a value is needed"),
         ("true", "yes", "line 2, column correct: 'yes' is neither true nor false"),
-        ("test", "pause", "line 2, column phase: 'pause' is none of training, detection, test, catch"),
+        (",test,", ",pause,", "line 2, column phase: 'pause' is none of training, detection, test, catch"),
         ("25.0,0.3", "25.0,-0.3", "line 2: level_n and frequency_hz must be above 0"),
         ("4,1,1,true", "4,3,1,true", "line 2: direction_shown is 3; directions are 1 and 2"),
         ("4,1,1,true", "4,1,7,false", "line 2: answer is 7; answers are 1, 2, or empty"),

@@ -30,6 +30,8 @@ BAD = {
     "rested_s": (-1,),
     "vibrated_s": (-1,),
     "missed_ticks": (-1, 0.5),
+    "late_ticks": (-1, 0.5),
+    "latest_s": (-1,),
     "delivered_mps2": (1e300,),
     "off_axis_mps2": (1e300,),
     "displacement_mm": (-1e300,),

@@ -130,11 +130,15 @@ def test_the_answer_counts_even_when_its_recording_was_lost(sitter, session_logs
     lines = done.folder.log.read_bytes().splitlines(keepends=True)
     cut = max(i for i, line in enumerate(lines) if b'"answer_given"' in line)
     session_logs.cut(done.folder.path, cut + 1)
+    late = b'"late_ticks":5,"latest_s":0.0042'
+    forge = lambda events: [*events[:-1], events[-1].replace(b'"late_ticks":0,"latest_s":0.0', late)]  # noqa: E731
+    session_logs.forged(done.folder.path, forge)
     trial = done.state.trials[-1]
     (done.folder.recordings / f"run-{trial.run:02d}_trial-{trial.trial:03d}_attempt-0.h5").unlink()
     resumed = sitter.resumed(done.folder)
     assert decisions(resumed.state) == decisions(done.state)
-    assert resumed.state.trials[-1].status is TrialStatus.UNMEASURED
+    last = resumed.state.trials[-1]
+    assert (last.status, last.late_ticks, last.latest_s) == (TrialStatus.UNMEASURED, 5, 0.0042)
 
 
 @pytest.mark.parametrize(

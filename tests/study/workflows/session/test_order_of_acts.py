@@ -8,6 +8,7 @@ import pytest
 from study.devices.device import Fault, Health, Played
 from study.errors import LeftError, StudyError
 from study.session.views.views import Unanswered
+from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import EventLog, read_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session import conduct_session
@@ -36,7 +37,9 @@ class Watched:
             def release(self) -> Played:
                 watched.calls.append("release")
                 played = device.release()
-                health: Health = replace(played.health, fault=watched.fault, missed_ticks=watched.missed)
+                health: Health = replace(
+                    played.health, fault=watched.fault, missed_ticks=watched.missed, late_ticks=7, latest_s=0.0042
+                )
                 return replace(played, health=health)
 
             def stop(self):
@@ -115,6 +118,15 @@ def test_a_trial_with_too_many_missed_ticks_is_void(sitter, watched):
     watched.missed = 10_000
     done = sitter.whole()
     assert "ticks were missed" in done.left
+    assert {(row.missed_ticks, row.late_ticks, row.latest_s) for row in done.state.trials} == {(10_000, 7, 0.0042)}
+
+
+def test_how_late_the_loop_was_stands_beside_each_trial_and_in_its_recording(sitter, watched):
+    done = sitter.whole()
+    assert {(row.late_ticks, row.latest_s) for row in done.state.trials} == {(7, 0.0042)}
+    names = [event.recording for event in read_log(done.folder.log).events if event.event == "trial_measured"]
+    meta = read_recording(done.folder.path / next(filter(None, names))).meta
+    assert (meta["late_ticks"], meta["latest_s"]) == (7, 0.0042)
 
 
 def test_a_stall_after_the_answer_is_flagged_and_the_answer_counts(sitter, watched):
