@@ -25,17 +25,23 @@ from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
-from analysis.diagnosis.reference.compare_with_reference import HUM, contrast_of, foresees, hums_low, known_to_repeat
-from analysis.diagnosis.reference.learn_model_error import NothingLearned, floor_of, learned_from
-from analysis.diagnosis.reference.model_free_faults import seen_directly
-from analysis.diagnosis.reference.search_beside_reference import searched_beside_reference
-from analysis.diagnosis.result.assemble_findings import assembled
-from analysis.diagnosis.result.candidates import beside_given, linear_remarks, reached_of, with_balances
-from analysis.diagnosis.result.contrast_findings import with_contrast
+from analysis.diagnosis.reference.compare_with_reference import (
+    HUM,
+    contrast_of,
+    foresees,
+    hums_low,
+    noise_is_from_repeats,
+)
+from analysis.diagnosis.reference.learn_model_error import NothingLearned, learn_model_error, learn_model_floor
+from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
+from analysis.diagnosis.reference.search_beside_reference import search_beside_reference
+from analysis.diagnosis.result.assemble_findings import assemble_findings
+from analysis.diagnosis.result.candidates import balance_errors, beside_given, linear_remarks, with_balances
+from analysis.diagnosis.result.contrast_findings import add_contrast
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.result.state_maps import StateMaps, state_maps
-from analysis.diagnosis.result.unconfirmed import unconfirmed_of
+from analysis.diagnosis.result.unconfirmed import unconfirmed_candidates
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.identifiability import identified
@@ -130,7 +136,7 @@ def _beside_clean(
     that noise is small. What no fault of the comparison explains is looked for with the given model, among effects that
     the comparison cannot undo."""
     look = Look(model, measure_of(recordings, model))
-    if not settings.fitted and (known_to_repeat(look.chosen) or foresees(model, settings.clean)):
+    if not settings.fitted and (noise_is_from_repeats(look.chosen) or foresees(model, settings.clean)):
         return None
     progress("comparing with the clean recordings", 0.1)
     contrast = contrast_of(recordings, settings.clean, frozenset(settings.without), settings.time_left)
@@ -143,9 +149,9 @@ def _beside_clean(
     stands = context.confirmed(context.candidate(given))
     found = Searched(context, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
     progress("writing down what was found", 0.95)
-    floor = CleanFloor() if settings.fitted else floor_of(settings.clean, model, recordings, map_, progress)
+    floor = CleanFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
     whole = _assembled(recordings, settings, look, _Seen(found, floor), ())
-    return with_contrast(whole, contrast, recordings[0], BEYOND)
+    return add_contrast(whole, contrast, recordings[0], BEYOND)
 
 
 def _by_given_model(
@@ -218,10 +224,10 @@ def _by_search(
         catalogue = [] if named else [e for e in catalogue if _beside_motion(e.name, place_of_effect(e), imposed)]
         may_be_named = []
     if settings.clean:
-        learned = learned_from(settings.clean, look.model, recordings, map_, progress)
+        learned = learn_model_error(settings.clean, look.model, recordings, map_, progress)
         told = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
-        context = replace(context, certain=seen_directly(recordings, settings.clean, told))
-        beside = searched_beside_reference(context, learned, catalogue, progress, settings.time_left)
+        context = replace(context, certain=find_sensor_faults(recordings, settings.clean, told))
+        beside = search_beside_reference(context, learned, catalogue, progress, settings.time_left)
         found = _Seen(beside, learned.floor)
     else:
         found = _searched(context, catalogue, settings, progress)
@@ -275,9 +281,9 @@ def _assembled(
 ) -> Findings:
     searched, names = seen.searched, names_of_parts(recordings, settings.names)
     found = searched.found if searched.judged.named else replace(searched.found, after=searched.found.retuned)
-    whole = assembled(replace(searched, found=found), look.chosen.floors, names, seen.floor)
+    whole = assemble_findings(replace(searched, found=found), look.chosen.floors, names, seen.floor)
     channels = recordings[0].command.channels
-    found_too = unconfirmed_of(searched.unconfirmed, whole.black_box, recordings[0], look.model)
+    found_too = unconfirmed_candidates(searched.unconfirmed, whole.black_box, recordings[0], look.model)
     if settings.fitted:
         diagnosis = with_balances(whole.diagnosis, balances, channels, found_too)
     else:
@@ -287,6 +293,6 @@ def _assembled(
     early = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
     linear = linear_remarks(balances, channels) if settings.fitted else ()
     remarks = tuple(dict.fromkeys((*early, *look.chosen.remarks, *searched.remarks, *linear, *whole.remarks)))
-    reached = reached_of(diagnosis, balances, channels)
+    reached = balance_errors(diagnosis, balances, channels)
     found_here = replace(whole, diagnosis=diagnosis, remarks=remarks, fitted=settings.fitted)
     return replace(found_here, reached=reached, state_maps=maps)

@@ -18,8 +18,8 @@ from analysis.diagnosis.result.wording import (
     device_of,
     effect_sentence,
     effect_title,
+    final_moved_numbers,
     inseparable_sentence,
-    moved_of,
     next_experiment_sentence,
     remainder_sentence,
     rival_sentences,
@@ -175,7 +175,7 @@ _UNMOVED = {
 
 
 def _own_numbers(found: Findings) -> Section:
-    moved = moved_of(found)
+    moved = final_moved_numbers(found)
     said = retuned_sentence(moved, found.fitted) or _UNMOVED[found.fitted]
     table = retuned_table(found)
     return Section(

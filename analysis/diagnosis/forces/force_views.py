@@ -1,4 +1,4 @@
-"""Recordings as forces along the measured motion: choice of the band, and the noise in it."""
+"""Converts recordings to forces along the measured motion, with the choice of the band and the noise in it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,15 +18,15 @@ from equalizer.signals.band_limited import filter_low_pass, low_pass_gain
 from equalizer.signals.signal import FloatArray, Signal
 
 KNOWN = 0.01
-"""Share of its rms to which an actuator's force is known at best: counted as noise, for nothing else tells it."""
+"""Relative uncertainty of an actuator's force at best, counted as noise."""
 NOISE_SHARE = 0.02
-"""Of the force's rms: what the motion's noise may make of it. Differentiation makes more the wider the band is."""
+"""Noise that the motion's noise may cause in the force, over the force's rms; differentiation amplifies it."""
 WIDEST, NARROWEST = 0.2, 0.002
 """Bands, over the sample rate."""
 REACH = 10.0
-"""The band ends at so many times the frequency below which half of the force's power lies, or earlier."""
+"""End of the band at most, over the frequency below which half of the force's power lies."""
 UNKNOWN = 1e-4
-"""Share of the motion's rms taken for its noise where nothing tells it."""
+"""Noise of the motion over its rms, assumed where it is not known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,10 +67,10 @@ def _band(
     floors: Sequence[NoiseFloor],
     model: MechanicalModel,
 ) -> float:
-    """The widest in which the noise stays a small share of the force, in the quietest record."""
+    """End in Hz of the widest band in which noise stays below `NOISE_SHARE` of the force in the quietest record."""
     rate_hz = records[0].recording.sample_rate_hz
     power = max(float(np.mean((force - force.mean(axis=0)) ** 2)) for force in entered)
-    widest = REACH * float(np.median([_middle_hz(force, rate_hz) for force in entered])) / rate_hz
+    widest = REACH * float(np.median([_median_frequency_hz(force, rate_hz) for force in entered])) / rate_hz
     for band_hz in np.geomspace(min(max(widest, NARROWEST), WIDEST), NARROWEST, 24) * rate_hz:
         noise = min(
             float(np.max(_floor(model, motion, floor, float(band_hz)).response_rms))
@@ -81,8 +81,8 @@ def _band(
     return float(band_hz)
 
 
-def _middle_hz(force: FloatArray, rate_hz: float) -> float:
-    """Below which half of the power lies."""
+def _median_frequency_hz(force: FloatArray, rate_hz: float) -> float:
+    """The frequency in Hz below which half of the power lies."""
     power = (np.abs(np.fft.rfft(force - force.mean(axis=0), axis=0)) ** 2).sum(axis=1)
     return float(np.searchsorted(np.cumsum(power), power.sum() / 2)) * rate_hz / len(force)
 

@@ -1,4 +1,4 @@
-"""Lines of a model's inverse: from where its outputs are to what pushed them there.
+"""Inverse frequency response of a model: from the positions of its outputs to the forces along its axes.
 
 A rational function of frequency. Its poles are the model's zeros, generalised eigenvalues of its equations
 (Emami-Naeini and Van Dooren 1982, Automatica 18:415); with them all follows from a few lines.
@@ -17,13 +17,13 @@ from equalizer.signals.signal import FloatArray
 FEW = 2000
 """Lines up to which each is solved for by itself."""
 LEARNED_ON, NEAR = 60, np.array([-1.0, 0.0, 1.0])
-"""Lines over the whole range, and about each pole in its half widths, of which the other numbers are learned."""
+"""Lines over the whole range, and about each pole in its half widths, to which the coefficients are fitted."""
 HIGHEST_POWER = 4
 """Of frequency: an inertia behind a massless coupling."""
 FAR = 1e3
 """Times the highest line: a pole beyond it is a power."""
 RIGHT_TO = 1e-8
-"""Of the largest entry at each line that was not learned of; else all lines are solved for."""
+"""Relative error at lines that were not fitted, at most; else all lines are solved for."""
 
 
 def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexArray:
@@ -42,24 +42,26 @@ def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexAr
 
 def inverse_of(model: MechanicalModel, lines: int, highest_hz: float) -> Callable[[FloatArray], ComplexArray]:
     """As `inverse_lines`, to be asked for so many lines, piece by piece."""
-    if lines > FEW and (learned := _learned(model, highest_hz)) is not None:
+    if lines > FEW and (learned := _fit_partial_fractions(model, highest_hz)) is not None:
         return learned
     return lambda frequency_hz: inverse_lines(model, frequency_hz)
 
 
-def _learned(model: MechanicalModel, highest_hz: float) -> Callable[[FloatArray], ComplexArray] | None:
-    """None where a few lines do not foretell the others."""
+def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callable[[FloatArray], ComplexArray] | None:
+    """The inverse as a partial fraction expansion fitted to a few lines; None where it misses the lines between."""
     poles = zeros_of(model, 2 * np.pi * FAR * highest_hz)
-    tried, unit, m = _told_by(poles, highest_hz), 2 * np.pi * highest_hz, model.inputs
-    right, shapes = inverse_lines(model, tried), _shapes(tried, poles, unit)
+    tried, unit, m = _lines_to_fit(poles, highest_hz), 2 * np.pi * highest_hz, model.inputs
+    right, shapes = inverse_lines(model, tried), _basis_functions(tried, poles, unit)
     # Forces and positions apart, and each line alike: their entries differ by many orders of magnitude.
-    forces, positions = (_numbers(shapes, part.reshape(len(tried), -1)) for part in (right[:, :m], right[:, m:]))
+    forces, positions = (
+        _fit_coefficients(shapes, part.reshape(len(tried), -1)) for part in (right[:, :m], right[:, m:])
+    )
     if forces is None or positions is None:
         return None
     numbers = np.hstack([forces, positions])
 
     def lines(frequency_hz: FloatArray) -> ComplexArray:
-        found: ComplexArray = (_shapes(frequency_hz, poles, unit) @ numbers).reshape(-1, 2 * m, m)
+        found: ComplexArray = (_basis_functions(frequency_hz, poles, unit) @ numbers).reshape(-1, 2 * m, m)
         slow = frequency_hz < tried[0]
         if slow.any():
             found[slow] = inverse_lines(model, frequency_hz[slow])
@@ -68,8 +70,8 @@ def _learned(model: MechanicalModel, highest_hz: float) -> Callable[[FloatArray]
     return lines
 
 
-def _numbers(shapes: ComplexArray, right: ComplexArray) -> ComplexArray | None:
-    """(shapes, entries), learned of every other line; None where the lines between are not what they say."""
+def _fit_coefficients(shapes: ComplexArray, right: ComplexArray) -> ComplexArray | None:
+    """(shapes, entries): least-squares coefficients from every other line; None where they miss the lines between."""
     size = np.abs(right).max(axis=1)[:, None]
     shapes, right = shapes / size, right / size
     # So that no direction counts for less because of its unit.
@@ -79,7 +81,7 @@ def _numbers(shapes: ComplexArray, right: ComplexArray) -> ComplexArray | None:
 
 
 def zeros_of(model: MechanicalModel, largest: float) -> ComplexArray:
-    """(k,), rad/s: of those above the real axis or on it."""
+    """(k,), rad/s: transmission zeros with an imaginary part from 0 on."""
     n, m = model.coordinates, model.inputs
     left, right = np.zeros((2 * n + m, 2 * n + m)), np.zeros((2 * n + m, 2 * n + m))
     left[:n, n : 2 * n] = np.eye(n)
@@ -92,7 +94,7 @@ def zeros_of(model: MechanicalModel, largest: float) -> ComplexArray:
     return np.asarray(found[found.imag >= 0])
 
 
-def _told_by(poles: ComplexArray, highest_hz: float) -> FloatArray:
+def _lines_to_fit(poles: ComplexArray, highest_hz: float) -> FloatArray:
     """(lines,), Hz, rising: over the whole range and about each resonance."""
     width = np.maximum(np.abs(poles.real), 1e-6 * np.abs(poles))
     about = (np.abs(poles.imag)[:, None] + width[:, None] * NEAR).ravel() / (2 * np.pi)
@@ -102,7 +104,7 @@ def _told_by(poles: ComplexArray, highest_hz: float) -> FloatArray:
     return np.unique(np.clip(np.concatenate([about, 1.01 * about, whole, even]), 1e-6 * highest_hz, highest_hz))
 
 
-def _shapes(frequency_hz: FloatArray, poles: ComplexArray, unit: float) -> ComplexArray:
+def _basis_functions(frequency_hz: FloatArray, poles: ComplexArray, unit: float) -> ComplexArray:
     """(lines, shapes): powers of frequency, and a resonance for each pole and its mirror image."""
     s = 2j * np.pi * frequency_hz[:, None] / unit
     powers = s ** np.arange(HIGHEST_POWER + 1)

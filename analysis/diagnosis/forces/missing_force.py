@@ -22,9 +22,9 @@ class MissingForce:
     force: FloatArray
     """(n, m), N"""
     position: FloatArray
-    """(n, m): what that force adds to the motion of the driven axes,"""
+    """(n, m): what that force adds to the positions of the driven axes."""
     velocity: FloatArray
-    """and to their velocity."""
+    """(n, m): what it adds to their velocities."""
 
 
 def missing_force(

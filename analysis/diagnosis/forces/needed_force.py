@@ -1,4 +1,4 @@
-"""Inverse dynamics: the force that a model needs for a measured motion, line by line."""
+"""Inverse dynamics: the force that a model needs for a measured motion, computed in the frequency domain."""
 
 from dataclasses import dataclass
 
@@ -26,16 +26,16 @@ class NeededForce:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandMotion:
-    """A measured motion within a band: what every model's force is drawn from."""
+    """A measured motion and its derivatives within a band, from which every model's force is computed."""
 
     position: FloatArray
     """(n, m): as measured, finite, of the model's first m outputs' rows."""
     sample_rate_hz: float
     band_hz: float
     at: tuple[FloatArray, FloatArray, FloatArray]
-    """(n, m) each: position, velocity and acceleration at each instant,"""
+    """(n, m) each: position, velocity and acceleration at each instant."""
     around: tuple[FloatArray, FloatArray, FloatArray]
-    """and their means over a sample's time around it."""
+    """(n, m) each: their means over one sample period around each instant."""
 
 
 def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> BandMotion:
@@ -57,10 +57,10 @@ def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> 
 
 
 def needed_force(model: MechanicalModel, motion: BandMotion) -> NeededForce:
-    """Actuator, sensor and effects apart; the mean force over a sample's time around each instant. Raises
-    numpy.linalg.LinAlgError where these rows do not say how the model moves."""
+    """Mean force over one sample period around each instant, without actuator, sensor and effects. Raises
+    numpy.linalg.LinAlgError where the first m outputs do not determine the model's motion."""
     if model.coordinates == model.inputs:
-        return _of_seen_bodies(model, motion)
+        return _force_of_square_model(model, motion)
     position, sample_rate_hz = motion.position, motion.sample_rate_hz
     m, learned = model.inputs, inverse_of(model, len(position), sample_rate_hz / 2)
 
@@ -72,12 +72,12 @@ def needed_force(model: MechanicalModel, motion: BandMotion) -> NeededForce:
         axes = inverse[:, m:]
         return np.asarray(within * np.concatenate([inverse[:, :m], axes, wave * axes, wave**2 * axes], axis=1))
 
-    found = filter_by_gain(position, sample_rate_hz, gain) + _along_line(model, position, sample_rate_hz)
+    found = filter_by_gain(position, sample_rate_hz, gain) + _force_along_line(model, position, sample_rate_hz)
     return NeededForce(*(found[:, part * m : (part + 1) * m] for part in range(4)))
 
 
-def _of_seen_bodies(model: MechanicalModel, motion: BandMotion) -> NeededForce:
-    """Where every coordinate is seen: no spectrum has to be taken again."""
+def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> NeededForce:
+    """For a model whose every coordinate is measured: no spectrum has to be computed again."""
     moved = np.linalg.inv(model.output[: model.inputs])
     pushed = np.linalg.inv(model.input)
     matrices = model.stiffness, model.damping, model.mass
@@ -89,7 +89,7 @@ def _of_seen_bodies(model: MechanicalModel, motion: BandMotion) -> NeededForce:
     return NeededForce(force, *(course @ along for course in motion.at))
 
 
-def _along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
+def _force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
     """(n, 4 m): of the straight line between the first and the last position, after which all has settled."""
     m = model.inputs
     line = end_to_end_line(position)

@@ -1,4 +1,4 @@
-"""The force that entered against the force that the model needs along the measured motion, within a band."""
+"""Error measure by force: the actuator's force against the force that the model needs along the measured motion."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,12 +21,12 @@ EDGE = 0.5
 """Periods of the band's end."""
 _Found = TypeVar("_Found")
 WEAKEST = 1e-3
-"""Of what is commanded: an actuator that gives no more gives nothing, and is none."""
+"""Force of an actuator over its command at least, in rms."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedForce:
-    """For a plant in closed loop, where the command hangs on the response, and for one that drifts freely."""
+    """For a plant in closed loop, whose command depends on the response, and for one that drifts freely."""
 
     records: tuple[Observed, ...]
     """Views: their `measured` is the force that entered, as far as it lies within the band."""
@@ -41,8 +41,7 @@ class PredictedForce:
     """What the model's own file names: it is part of every simulation."""
     least: float = 0.0
     remembered: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
-    """By what and record: what it was found of last, and what was found. Laws are compared on one model, and models on
-    one command."""
+    """Cache by kind and record of the last inputs and result: laws are compared on one model, models on one command."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
@@ -57,21 +56,21 @@ class PredictedForce:
             if (record.fit | record.choose).any()
         ]
         records = tuple(record for record, _ in kept)
-        motions = tuple(self._beginning(motion, len(record.command)) for record, motion in kept)
+        motions = tuple(self._cut_motion(motion, len(record.command)) for record, motion in kept)
         return replace(self, records=records, motions=motions)
 
-    def _beginning(self, motion: BandMotion, count: int) -> BandMotion:
+    def _cut_motion(self, motion: BandMotion, count: int) -> BandMotion:
         whole = motion.position
         return motion if count == len(whole) else band_motion(whole[:count], motion.sample_rate_hz, self.band_hz)
 
     def _cut(self, record: Observed) -> Observed:
-        """At the last sample that decisions may see; what lies just before feels that nothing follows."""
+        """The record cut after the last sample to fit or to choose by, less the edge that the filter distorts."""
         cut, edge = record.shorten(), edge_samples(record.recording.sample_rate_hz, self.band_hz)
         inside = np.arange(len(cut.command)) < len(cut.command) - edge
         return replace(cut, fit=cut.fit & inside, choose=cut.choose & inside)
 
     def can_observe(self, effect: Effect) -> bool:
-        """Not of sensors: their reading is taken for the motion."""
+        """Whether the effect changes forces; effects of sensors do not, for the reading is taken for the motion."""
         return isinstance(effect.acts, (Structure, AxisForce, OnCommand))
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
@@ -92,8 +91,8 @@ class PredictedForce:
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure
-        needed = self._same("needed", number, (structure, motion), lambda: needed_force(structure, motion))
-        entered = self._entered(model, effects, number)
+        needed = self._remember("needed", number, (structure, motion), lambda: needed_force(structure, motion))
+        entered = self._actuator_force(model, effects, number)
         ahead = np.concatenate([needed.force[1:], needed.force[-1:]])
         course = needed.axis_position, needed.axis_velocity, needed.axis_acceleration
         pushing = entered.within - (needed.force + ahead) / 2
@@ -107,20 +106,20 @@ class PredictedForce:
         weaker = strength / np.maximum(_rms(entered.force), WEAKEST * strength + np.finfo(float).tiny)
         return _Balance(needed, (total - needed.force) * weaker, total)
 
-    def _entered(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_Entered":
+    def _actuator_force(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_ActuatorForce":
         record = self.records[number]
         rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
         changed = [effect for effect in effects if isinstance(effect.effect.acts, OnCommand)]
 
-        def found() -> _Entered:
+        def found() -> _ActuatorForce:
             force = actuator_force(model, record.command, rate_hz, changed, hold)
             late = filter_low_pass(force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
-            return _Entered(force, filter_low_pass(force, rate_hz, self.band_hz), late)
+            return _ActuatorForce(force, filter_low_pass(force, rate_hz, self.band_hz), late)
 
-        return found() if changed else self._same("entered", number, (model.actuator, record.command), found)
+        return found() if changed else self._remember("entered", number, (model.actuator, record.command), found)
 
-    def _same(self, what: str, number: int, of: tuple[object, ...], find: Callable[[], _Found]) -> _Found:
-        """As it was found last where it was of the very same."""
+    def _remember(self, what: str, number: int, of: tuple[object, ...], find: Callable[[], _Found]) -> _Found:
+        """The cached result where the inputs are the very same objects, else a new one."""
         known = self.remembered.get((what, number))
         if known is None or any(each is not other for each, other in zip(known[0], of, strict=True)):
             known = of, find()
@@ -144,12 +143,12 @@ class PredictedForce:
 
 
 def edge_samples(sample_rate_hz: float, band_hz: float) -> int:
-    """At a record's end, where the filter has nothing to look at."""
+    """Number of samples at either end of a record that the band's filter distorts."""
     return int(EDGE * sample_rate_hz / band_hz)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Entered:
+class _ActuatorForce:
     """(n, m) each: the force that entered, mean over the step that begins at a sample; within the band; and there, as
     the mean around the sample."""
 

@@ -84,7 +84,7 @@ def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalMod
 
 
 def _least_mass(acceleration: FloatArray, force: FloatArray) -> FloatArray:
-    """(m,): of bodies whose inertia shows in no force: no simulation goes without one."""
+    """(m,): least masses, for bodies whose inertia shows in no force: a simulation needs some."""
     return np.asarray(MASSLESS_SHARE * force.std(axis=0) / np.maximum(acceleration.std(axis=0), 1e-300))
 
 

@@ -32,7 +32,7 @@ def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: F
     rows = np.vstack([steps.motion[: 2 * m], steps.response, steps.position])
     direct = np.vstack([np.zeros((2 * m, m)), steps.response_by_axis_force, np.zeros((p, m))])
     # A force counts from the next sample on; what it does at once is seen one sample late.
-    seen = _through(steps.advance, steps.by_axis_force, rows, z) + direct / z[:, None, None]
+    seen = _frequency_response(steps.advance, steps.by_axis_force, rows, z) + direct / z[:, None, None]
     response = seen[:, 2 * m : 2 * m + p]
     if model.sensor.bandwidth_hz > 0:
         decay = np.exp(-2 * np.pi * model.sensor.bandwidth_hz / sample_rate_hz)
@@ -40,7 +40,7 @@ def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: F
     return AxisTransfer(response, seen[:, 2 * m + p :], seen[:, :m], seen[:, m : 2 * m])
 
 
-def _through(A: FloatArray, B: FloatArray, C: FloatArray, z: ComplexArray) -> ComplexArray:
+def _frequency_response(A: FloatArray, B: FloatArray, C: FloatArray, z: ComplexArray) -> ComplexArray:
     """C (zI - A)^-1 B, (lines, rows, inputs)."""
     poles, shapes = np.linalg.eig(A)
     if np.linalg.cond(shapes) < _WELL_CONDITIONED:

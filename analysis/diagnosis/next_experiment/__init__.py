@@ -1,5 +1,5 @@
-"""Which recording would tell more.
+"""Optimal design of the next experiment: which recording would tell rivals apart.
 
-`experiment_menu` lists what could be driven, `choose_experiment` foresees what each would part, `proposed_experiment`
+`experiment_menu` lists what could be driven, `choose_experiment` foresees what each would part, `propose_experiment`
 says it.
 """

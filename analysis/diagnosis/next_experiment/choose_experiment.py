@@ -27,7 +27,7 @@ RETUNED = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bench:
-    """Where an experiment is played on paper."""
+    """The device on which experiments are simulated."""
 
     tuning: Tuning
     sample_rate_hz: float
@@ -37,25 +37,25 @@ class Bench:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Foreseen:
+class PredictedGain:
     experiment: Experiment
     gain: float
-    """Log likelihood by which the true one would win."""
+    """Expected log likelihood ratio in favour of the true effect."""
 
 
-def foresee(
+def predict_gains(
     bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, menu: Sequence[Experiment]
-) -> tuple[Foreseen, ...]:
-    """The most telling for its cost first, those that tell too little last. known: (t + numbers, twice), the
-    information on the rival's numbers that has been recorded so far, calibration included."""
-    found = [Foreseen(experiment, _gain(bench, named, rival, known, experiment)) for experiment in menu]
+) -> tuple[PredictedGain, ...]:
+    """The experiments with their gains, the largest gain per cost first, insufficient ones last. known: (t + numbers,
+    t + numbers), information matrix of the rival's numbers from what has been recorded, calibration included."""
+    found = [PredictedGain(experiment, _gain(bench, named, rival, known, experiment)) for experiment in menu]
     return tuple(
         sorted(found, key=lambda foreseen: (foreseen.gain < TELLING_GAIN, -foreseen.gain / foreseen.experiment.minutes))
     )
 
 
-def as_document(best: Foreseen, names: tuple[str, str]) -> NextExperiment | None:
-    """None where even the most telling recording would leave the rivals as good as each other."""
+def as_document(best: PredictedGain, names: tuple[str, str]) -> NextExperiment | None:
+    """The proposed experiment for the document; None where even the best recording would not tell the rivals apart."""
     if best.gain < TELLING_GAIN:
         return None
     said = "; the recording's meta must say the weight (added_mass_kg, or added_inertia_kg_m2)"
@@ -68,26 +68,28 @@ def as_document(best: Foreseen, names: tuple[str, str]) -> NextExperiment | None
 
 
 def _gain(bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, experiment: Experiment) -> float:
-    base = _predicted(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment)
-    differs = _predicted(bench, named.deviations, named.hypothesis, named.hypothesis.point, experiment) - base
+    base = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment)
+    differs = _simulate(bench, named.deviations, named.hypothesis, named.hypothesis.point, experiment) - base
     columns = []
     for number in range(len(rival.deviations)):
         there = rival.deviations.copy()
         there[number] += MOVED
-        columns.append((_predicted(bench, there, rival.hypothesis, rival.hypothesis.point, experiment) - base) / MOVED)
+        columns.append((_simulate(bench, there, rival.hypothesis, rival.hypothesis.point, experiment) - base) / MOVED)
     for number, of in enumerate(rival.hypothesis.numbers):
         point = rival.hypothesis.point.copy()
         point[number] += of.move
-        columns.append((_predicted(bench, rival.deviations, rival.hypothesis, point, experiment) - base) / of.move)
-    return _left(bench, rival, known, (experiment, differs, np.array(columns))) / 2
+        columns.append((_simulate(bench, rival.deviations, rival.hypothesis, point, experiment) - base) / of.move)
+    return _squares_after_retuning(bench, rival, known, (experiment, differs, np.array(columns))) / 2
 
 
-def _left(bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment, FloatArray, FloatArray]) -> float:
-    """Squares that stay when the rival re-tunes, by steps that are tried out: what numbers do is no straight line.
-    seen: the experiment, the difference to be tuned away, and what each of the rival's numbers does to it."""
+def _squares_after_retuning(
+    bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment, FloatArray, FloatArray]
+) -> float:
+    """Sum of squares that remains after the rival is re-tuned, by Gauss-Newton steps. seen: the experiment, the
+    difference to be tuned away, and the sensitivities to the rival's numbers."""
     experiment, differs, moves = seen
     tuned, t = np.zeros(len(known)), len(rival.deviations)
-    wanted = _predicted(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + differs
+    wanted = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + differs
     whole, least, rest = float(differs @ differs), np.inf, differs
     pull = moves @ differs
     straight = whole - float(pull @ np.linalg.lstsq(moves @ moves.T + known, pull, rcond=None)[0])
@@ -95,7 +97,7 @@ def _left(bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment
         step = np.linalg.lstsq(moves @ moves.T + known, moves @ rest - known @ tuned, rcond=None)[0]
         tuned = tuned + step
         try:
-            there = _predicted(
+            there = _simulate(
                 bench, rival.deviations + tuned[:t], rival.hypothesis, rival.hypothesis.point + tuned[t:], experiment
             )
         except (MechanicalModelError, np.linalg.LinAlgError):
@@ -110,7 +112,7 @@ def _left(bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment
     return least if least < whole else max(straight, 0.0)
 
 
-def _predicted(
+def _simulate(
     bench: Bench, deviations: FloatArray, hypothesis: Hypothesis, point: FloatArray, experiment: Experiment
 ) -> FloatArray:
     model: MechanicalModel = bench.tuning.tuned(deviations)

@@ -12,7 +12,7 @@ from analysis.diagnosis.contrast.signal_faults import SignalFault, find_hum, fin
 from analysis.diagnosis.errors.choose_measure import Chosen
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.played_errors import played_error
-from analysis.diagnosis.reference.model_free_faults import seen_directly
+from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.catalogue import CATALOGUE
@@ -57,7 +57,7 @@ def contrast_of(
     recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
 ) -> Contrast:
     effects = [effect for effect in CATALOGUE if effect.name not in without]
-    shown = seen_directly(recordings, clean, effects)
+    shown = find_sensor_faults(recordings, clean, effects)
     if shown:
         return Contrast(shown[0], None, None, None)
     faulty, references = split_into_parts(recordings), split_into_parts(clean)
@@ -76,7 +76,7 @@ def foresees(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
     return all(error is not None and error <= FORESEEN for error in errors)
 
 
-def known_to_repeat(chosen: Chosen) -> bool:
+def noise_is_from_repeats(chosen: Chosen) -> bool:
     """Whether a free simulation is compared, and its noise is known from what repeats."""
     size = np.nanstd(np.vstack([record.measured for record in chosen.measure.records]), axis=0)
     repeats = all(floor.how == "repeats" for floor in chosen.floors)

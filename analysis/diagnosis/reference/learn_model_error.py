@@ -1,4 +1,4 @@
-"""The residual of a device in order from its re-tuned model, learned from clean recordings: it counts as noise."""
+"""Learns a model's error from clean recordings: the residual of the re-tuned model, which then counts as noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -55,21 +55,21 @@ class _Lesson:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Learned:
+class LearnedError:
     floor: CleanFloor
     colour: WhiteningFilter
     share: FloatArray
     """(c,): rms of the whitened residual over the signal's; see `_signal`."""
     references: ReferenceRecordings
 
-    def beside(self, measure: ErrorMeasure, model: MechanicalModel) -> ColouredMeasure:
+    def noise_measure(self, measure: ErrorMeasure, model: MechanicalModel) -> ColouredMeasure:
         """The error measure of the recordings to diagnose, with this residual as coloured noise."""
         return coloured(measure, self.colour, self.share * _signal(measure, measure.residuals(model, ())))
 
 
-def learned_from(
+def learn_model_error(
     clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
-) -> Learned:
+) -> LearnedError:
     """clean: of the same device, alike in channels and units; the model is re-tuned to each by itself, for days differ.
     diagnosed: what is to be diagnosed, measured alike. Raises NothingLearned where that cannot be."""
     error = measure_of(diagnosed, model, clean).measure.name
@@ -78,19 +78,19 @@ def learned_from(
         progress(LEARNING, BEGUN * number / len(clean))
         chosen = measure_of((recording,), model, (*diagnosed, *clean))
         require_alike(chosen.measure.name, error)
-        lessons.append(_lesson(chosen, model, recording, map_))
+        lessons.append(_learn_from_recording(chosen, model, recording, map_))
     floor = learn_floor([lesson.cells for lesson in lessons])
     largest = np.max([lesson.channels for lesson in lessons], axis=0)
     floor = replace(floor, error=error, recordings=len(clean), channels=tuple(largest.tolist()))
     return _with_colour(floor, lessons, map_)
 
 
-def floor_of(
+def learn_model_floor(
     clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
 ) -> CleanFloor:
-    """As `learned_from`: what a given model misses of the clean recordings, too; none where they tell nothing."""
+    """As `learn_model_error`: what a given model misses of the clean recordings, too; none where they tell nothing."""
     try:
-        return learned_from(clean, model, diagnosed, map_, progress).floor
+        return learn_model_error(clean, model, diagnosed, map_, progress).floor
     except (NothingLearned, np.linalg.LinAlgError):
         return CleanFloor()
 
@@ -104,7 +104,7 @@ def require_alike(learned_by: str, error: str) -> None:
         )
 
 
-def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> Learned:
+def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> LearnedError:
     courses = [course for lesson in lessons for course in lesson.courses]
     colour = whitening_filter(courses, np.min([lesson.measure.noise for lesson in lessons], axis=0))
     shares = [
@@ -115,19 +115,19 @@ def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) ->
     share = np.max(shares, axis=0)
     learned = [
         reference_recording(
-            coloured(floored(lesson.measure, floor), colour, share * lesson.signal),
+            coloured(count_as_noise(lesson.measure, floor), colour, share * lesson.signal),
             lesson.tuning,
             lesson.retuned.fitted.deviations,
             map_,
         )
         for lesson in lessons
     ]
-    return Learned(floor, colour, share, ReferenceRecordings(tuple(learned), floor.beyond))
+    return LearnedError(floor, colour, share, ReferenceRecordings(tuple(learned), floor.beyond))
 
 
 def _signal(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
-    """(c,): rms about the mean of what was measured or of what the model foresees of it, the smaller of both: neither a
-    hum or a drift makes it larger, nor a model that is far off."""
+    """(c,): standard deviation of the measured or the predicted signal, the smaller of both, so that neither hum or
+    drift nor a model that is far off makes it larger."""
     measured = [record.measured for record in measure.records]
     foreseen = [course - left * measure.unit for course, left in zip(measured, residuals, strict=True)]
     sizes = [np.nanstd(np.vstack(courses), axis=0) for courses in (measured, foreseen)]
@@ -138,7 +138,7 @@ def _rms(courses: Sequence[FloatArray]) -> FloatArray:
     return np.asarray(np.sqrt(np.nanmean(np.vstack(courses) ** 2, axis=0)))
 
 
-def _lesson(chosen: Chosen, model: MechanicalModel, recording: Recording, map_: Mapper) -> _Lesson:
+def _learn_from_recording(chosen: Chosen, model: MechanicalModel, recording: Recording, map_: Mapper) -> _Lesson:
     whole, tuning = chosen.measure, tuning_of(model, recording.command.channels)
     context = SearchContext(whole.shorten(), whole, tuning, map_)
     retuned = context.confirmed(context.candidate(retuned_alone(context)))
@@ -153,8 +153,8 @@ def _channel_shares(measure: ErrorMeasure, retuned: FittedCandidate) -> FloatArr
     return np.asarray(np.sqrt(times**2 - 1) * measure.noise / np.maximum(_size(measure), np.finfo(float).tiny))
 
 
-def floored(measure: ErrorMeasure, floor: CleanFloor) -> ErrorMeasure:
-    """With the learned residual counted as noise."""
+def count_as_noise(measure: ErrorMeasure, floor: CleanFloor) -> ErrorMeasure:
+    """The measure with the learned residual counted as noise."""
     return measure.with_floor(np.array(floor.channels) * _size(measure)) if floor.channels else measure
 
 

@@ -1,4 +1,4 @@
-"""The search beside clean recordings: for effects that these do not show."""
+"""Searches for effects that explain more than clean recordings of the same device leave unexplained."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,7 +6,7 @@ from dataclasses import replace
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import fit_score
 from analysis.diagnosis.errors.output_error import evaluated
-from analysis.diagnosis.reference.learn_model_error import Learned, floored
+from analysis.diagnosis.reference.learn_model_error import LearnedError, count_as_noise
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.no_prediction import is_without_prediction
@@ -18,8 +18,12 @@ from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 
 
-def searched_beside_reference(
-    context: SearchContext, learned: Learned, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+def search_beside_reference(
+    context: SearchContext,
+    learned: LearnedError,
+    catalogue: Sequence[Effect],
+    progress: Progress,
+    time_left: TimeBudget,
 ) -> Searched:
     """context: as without reference recordings, but for what is certain. What is found has its residuals by its own
     measure, with what a device in order differs by counted as noise.
@@ -31,10 +35,14 @@ def searched_beside_reference(
     if context.certain or fine.found.after.score.worst_channel <= learned.floor.beyond or not time_left():
         return fine
     coarse = _by_size(context, learned, catalogue, progress, time_left)
-    return coarse if coarse.judged.named and _left(fine.context, coarse) < _left(fine.context, fine) else fine
+    return (
+        coarse
+        if coarse.judged.named and _mean_log_error(fine.context, coarse) < _mean_log_error(fine.context, fine)
+        else fine
+    )
 
 
-def _left(context: SearchContext, seen: Searched) -> float:
+def _mean_log_error(context: SearchContext, seen: Searched) -> float:
     """Mean log error power of what is named, on the samples to fit and to choose by."""
     stands = seen.found.after if seen.judged.named else seen.found.retuned
     fitted = evaluated(context.measure, context.tuning, stands.fitted.deviations, stands.fitted.hypothesis)
@@ -42,34 +50,44 @@ def _left(context: SearchContext, seen: Searched) -> float:
 
 
 def _by_size(
-    context: SearchContext, learned: Learned, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+    context: SearchContext,
+    learned: LearnedError,
+    catalogue: Sequence[Effect],
+    progress: Progress,
+    time_left: TimeBudget,
 ) -> Searched:
     wide = replace(learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels))
-    plain = floored(context.whole, wide)
+    plain = count_as_noise(context.whole, wide)
     seen = searched(replace(context, measure=plain.shorten(), whole=plain), catalogue, progress, time_left)
-    back = floored(context.whole, learned.floor).with_records(seen.context.whole.records)
+    back = count_as_noise(context.whole, learned.floor).with_records(seen.context.whole.records)
     own = replace(context, measure=back.shorten(), whole=back)
-    return replace(seen, context=own, found=_by(own, seen.found))
+    return replace(seen, context=own, found=_refit_by(own, seen.found))
 
 
 def _by_contrast(
-    context: SearchContext, learned: Learned, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+    context: SearchContext,
+    learned: LearnedError,
+    catalogue: Sequence[Effect],
+    progress: Progress,
+    time_left: TimeBudget,
 ) -> Searched:
-    plain = floored(context.whole, learned.floor)
-    whole = learned.beside(plain, context.tuning.model)
+    plain = count_as_noise(context.whole, learned.floor)
+    whole = learned.noise_measure(plain, context.tuning.model)
     beside = replace(context, measure=whole.shorten(), whole=whole, references=learned.references)
     seen = searched(beside, catalogue, progress, time_left)
     plain = plain.with_records(seen.context.whole.records)
     back = replace(context, measure=plain.shorten(), whole=plain)
-    found = _by(back, seen.found)
+    found = _refit_by(back, seen.found)
     if context.certain:
-        return replace(seen, context=back, found=found, judged=_judged(found, True, learned.floor.beyond), remarks=())
+        return replace(
+            seen, context=back, found=found, judged=_judge_with_floor(found, True, learned.floor.beyond), remarks=()
+        )
     named = seen.judged.named and not is_without_prediction(plain, found.after)
-    return replace(seen, context=back, found=found, judged=_judged(found, named, learned.floor.beyond))
+    return replace(seen, context=back, found=found, judged=_judge_with_floor(found, named, learned.floor.beyond))
 
 
-def _judged(found: Explanation, named: bool, beyond: float) -> Judgement:
-    """The bars are raised by the factor `beyond`, because a device in order differs from day to day, too."""
+def _judge_with_floor(found: Explanation, named: bool, beyond: float) -> Judgement:
+    """The verdict, with all thresholds raised by the factor `beyond`, for devices differ from day to day, too."""
     if named:
         return Judgement(
             "explained" if found.after.score.worst_channel <= beyond * EXPLAINED_ERROR else "partly_explained", True
@@ -81,9 +99,9 @@ def _judged(found: Explanation, named: bool, beyond: float) -> Judgement:
     )
 
 
-def _by(context: SearchContext, found: Explanation) -> Explanation:
-    """Effects are chosen on the whitened residual, their numbers fitted on the residual itself: where a law is not
-    exact, frequencies with little weight would bias them."""
+def _refit_by(context: SearchContext, found: Explanation) -> Explanation:
+    """The explanation with its numbers refitted on the plain residual: effects are chosen on the whitened one, where a
+    law that is not exact would be biased by frequencies with little weight."""
     after = found.after.fitted
     if after.hypothesis.claims and not context.certain:
         start = evaluated(context.measure, context.tuning, after.deviations, after.hypothesis)
@@ -91,14 +109,14 @@ def _by(context: SearchContext, found: Explanation) -> Explanation:
     steps = [*found.steps[:-1], *(replace(step, fitted=after) for step in found.steps[-1:])]
     return replace(
         found,
-        before=_seen_by(context.whole, context, found.before),
-        retuned=_seen_by(context.whole, context, found.retuned),
-        after=_seen_by(context.whole, context, replace(found.after, fitted=after)),
-        steps=tuple(_seen_by(context.measure, context, step) for step in steps),
+        before=_evaluate_by(context.whole, context, found.before),
+        retuned=_evaluate_by(context.whole, context, found.retuned),
+        after=_evaluate_by(context.whole, context, replace(found.after, fitted=after)),
+        steps=tuple(_evaluate_by(context.measure, context, step) for step in steps),
     )
 
 
-def _seen_by(measure: ErrorMeasure, context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
+def _evaluate_by(measure: ErrorMeasure, context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
     return replace(
         candidate, fitted=evaluated(measure, context.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
     )

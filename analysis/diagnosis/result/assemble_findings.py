@@ -14,13 +14,13 @@ from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, maps_of, whole_mismatch
 from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
-from analysis.diagnosis.next_experiment.proposed_experiment import Proposal, proposed_experiment
+from analysis.diagnosis.next_experiment.propose_experiment import Proposal, propose_experiment
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.reference.learn_model_error import learned_sentence
 from analysis.diagnosis.result.error_table import channel_errors, errors_of
 from analysis.diagnosis.result.findings import Course, Findings
 from analysis.diagnosis.result.looks import looks_of
-from analysis.diagnosis.result.named_effects import Said, named_effects, said_of
+from analysis.diagnosis.result.named_effects import Labels, labels_of, named_effects
 from analysis.diagnosis.result.unconfirmed import with_gains
 from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
 from analysis.diagnosis.search.explain import Explanation
@@ -36,20 +36,20 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 
-def assembled(
+def assemble_findings(
     searched: Searched,
     floors: tuple[NoiseFloor, ...],
     names: Sequence[str],
     learned: CleanFloor,
 ) -> Findings:
-    """searched.found.after is what is named; the same as re-tuned where nothing is. names: of the recordings. learned:
-    what clean recordings differ by."""
+    """The findings of a search. searched.found.after is the model with the named effects, the same as re-tuned where
+    nothing is named. names: of the recordings. learned: the residual of clean recordings, counted as noise."""
     context, found, judged = searched.context, searched.found, searched.judged
     measure, tuning = context.whole, context.tuning
     recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.placed()
-    said, (improved, retuned) = said_of(recording, tuning.model), _models(searched, recording)
-    channels, errors = channel_names(recording, len(measure.noise)), _errors(searched)
-    maps, courses = maps_of(measure, found.stages, floors, learned, context.map_), _courses(measure, found, names)
+    said, (improved, retuned) = labels_of(recording, tuning.model), _models(searched, recording)
+    channels, errors = channel_names(recording, len(measure.noise)), _standard_errors(searched)
+    maps, courses = maps_of(measure, found.stages, floors, learned, context.map_), _time_series(measure, found, names)
     looked = looks_of(searched, floors[0], maps)
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
     document = _document(searched, errors, (maps, looked.local), proposal)
@@ -81,9 +81,9 @@ def assembled(
 
 
 def _models(searched: Searched, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
-    """With the named effects and without, driven by the commands as they were recorded."""
+    """The re-tuned models with the named effects and without, driven by the commands as they were recorded."""
     tuning, found = searched.context.tuning, searched.found
-    fitted, said = found.after.fitted, said_of(recording, tuning.model)
+    fitted, said = found.after.fitted, labels_of(recording, tuning.model)
     effects = (*tuning.model.effects, *model_effects(fitted.hypothesis.placed(), said.inputs, said.outputs))
     with_them = replace(tuning.tuned(fitted.deviations), effects=effects)
     return as_recorded(with_them, recording), as_recorded(tuning.tuned(found.retuned.fitted.deviations), recording)
@@ -106,8 +106,9 @@ def _split_s(measure: ErrorMeasure) -> dict[str, float]:
     }
 
 
-def _errors(searched: Searched) -> FloatArray:
-    """Of the model's own numbers and of the named effects', as far as a reader is shown them; see `final_errors`."""
+def _standard_errors(searched: Searched) -> FloatArray:
+    """Standard errors of the model's own numbers, then of the named effects'; NaN where none is shown. See
+    `final_errors`."""
     context, found = searched.context, searched.found
     own, numbers = len(context.tuning.names), len(found.after.fitted.hypothesis.point)
     if found.statistic is not None:
@@ -125,14 +126,14 @@ def _document(
     found, judged = searched.found, searched.judged
     measure, tuning, fitted = searched.context.whole, searched.context.tuning, found.after.fitted
     maps, local = looked
-    said = said_of(measure.records[0].recording, tuning.model)
+    said = labels_of(measure.records[0].recording, tuning.model)
     return Diagnosis(
         verdict=judged.verdict,
         mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
         or (
             () if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.score, found.before.fitted)
         ),
-        effects=_named(searched, errors[len(tuning.names) :], said) if judged.named else (),
+        effects=_effects_with_gains(searched, errors[len(tuning.names) :], said) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
@@ -145,8 +146,8 @@ def _document(
     )
 
 
-def _named(searched: Searched, errors: FloatArray, said: Said) -> tuple[NamedEffect, ...]:
-    """With their gains on held-out data, where samples were compared."""
+def _effects_with_gains(searched: Searched, errors: FloatArray, said: Labels) -> tuple[NamedEffect, ...]:
+    """The named effects, with their gains on held-out data where samples were compared."""
     context, found = searched.context, searched.found
     effects = named_effects(found, errors, said)
     if found.statistic is not None or len(found.steps) != len(effects):
@@ -157,16 +158,16 @@ def _named(searched: Searched, errors: FloatArray, said: Said) -> tuple[NamedEff
 
 def _proposal(context: SearchContext, found: Explanation, judged: Judgement) -> Proposal | None:
     foretold = judged.named and context.whole.name == "free simulation" and found.statistic is None
-    return proposed_experiment(context, found) if foretold else None
+    return propose_experiment(context, found) if foretold else None
 
 
 def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
-    """The response's, then the position's."""
+    """Names of the response's channels, then of the position's, as many as `count`."""
     position = () if recording.position is None else recording.position.channels
     return (*recording.response.channels, *position)[:count]
 
 
-def _courses(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) -> tuple[Course, ...]:
+def _time_series(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) -> tuple[Course, ...]:
     courses = []
     for number, record in enumerate(measure.records):
         count = record.measured.shape[1]
@@ -204,10 +205,10 @@ def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
     return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
 
 
-# Where play does not explain how strong the response is. Its course does not count: no simulation predicts blows.
+# Rows of the remainder where impacts are compared by band power: no simulation predicts single blows.
 def impact_remainder(measure: ErrorMeasure, found: Explanation) -> tuple[Mismatch, ...]:
-    """One row for each channel that is further off than chance takes it; the share is the rms logarithm of the ratio of
-    amplitudes."""
+    """One row for each channel whose band powers differ by more than chance; the share is the rms logarithm of the
+    ratio of amplitudes. Empty where samples were compared."""
     if found.statistic is None:
         return ()
     record, score = measure.records[0].recording, found.after.score

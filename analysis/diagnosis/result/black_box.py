@@ -1,4 +1,4 @@
-"""A correction without physics, fitted beside the named effects: where it is better, something is still missing.
+"""A black-box correction as a reference for the named effects: where it predicts better, something is still missing.
 
 A polynomial of the re-tuned model's own signals is added to each channel of its prediction, term by term as each takes
 most of what is left (orthogonal least squares; Chen, Billings and Luo 1989), as many terms per channel as the physics
@@ -17,15 +17,16 @@ from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
-SEEN = 20_000
-"""Samples that terms are chosen by, evenly taken from those to fit; all that are fitted to weigh in the end."""
-_SEEN_AT_ALL = 1e-6
-"""Rms of a term on the samples that terms are chosen by; over all samples it is about 1."""
+SELECTION_SAMPLES = 20_000
+"""Samples that terms are selected by, evenly spaced among the fit samples; the final fit uses all of these."""
+_LEAST_RMS = 1e-6
+"""Rms of a term at least, on the samples that terms are selected by; over all samples it is about 1."""
 _TINY = np.finfo(np.float64).tiny
 
 
 def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, physics: float | None) -> BlackBox | None:
-    """physics: the named effects' error on the test samples, as `document.Errors`. None where nothing is sealed."""
+    """The black box with `numbers` terms per channel and its error on the test samples. physics: the named effects'
+    error there, as in `document.Errors`. None where nothing is held out."""
     if physics is None or not any(record.test.any() for record in measure.records):
         return None
     fitted = [record.fit for record in measure.records]
@@ -34,13 +35,13 @@ def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, phy
         _courses(record.command, np.nan_to_num(record.measured - left * measure.unit))
         for record, left in zip(measure.records, retuned.fitted.residuals, strict=True)
     ]
-    courses = _within_what_was_fitted(courses, fitted)
+    courses = _clip_to_fitted_range(courses, fitted)
     rows = np.vstack([course[mask] for course, mask in zip(courses, fitted, strict=True)])
     left = np.vstack([residual[mask] for residual, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
-    every = max(len(rows) // SEEN, 1)
-    seen = _terms(rows[::every], range(_count(rows)))
+    every = max(len(rows) // SELECTION_SAMPLES, 1)
+    seen = _terms(rows[::every], range(_term_count(rows)))
     scale = _scale(seen)
-    chosen = [_chosen(seen / scale, wanted, numbers) for wanted in left[::every].T]
+    chosen = [_select_terms(seen / scale, wanted, numbers) for wanted in left[::every].T]
     picked = sorted({number for each in chosen for number in each})
     whole, weights = _terms(rows, picked) / scale[picked], np.zeros((len(picked), left.shape[1]))
     for channel, each in enumerate(chosen):
@@ -53,26 +54,26 @@ def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, phy
     return BlackBox(
         "polynomial of the model's signals",
         numbers * left.shape[1],
-        _normalised(measure, np.vstack(corrected)),
+        _normalised_error(measure, np.vstack(corrected)),
         physics,
     )
 
 
 def _scale(rows: FloatArray) -> FloatArray:
-    """(terms,): rms; infinite for terms that are next to nothing where they are fitted, such as products of commands
-    that are never played together: elsewhere they would be anything."""
+    """(terms,): rms; infinite for terms that vanish where they are fitted, such as products of commands that are never
+    played together, so that they are not used elsewhere."""
     rms = np.sqrt(np.mean(rows**2, axis=0))
-    return np.where(rms > _SEEN_AT_ALL, rms, np.inf)
+    return np.where(rms > _LEAST_RMS, rms, np.inf)
 
 
-def _within_what_was_fitted(courses: list[FloatArray], fitted: list[Mask]) -> list[FloatArray]:
-    """Held at the ends of the range that was fitted to: beyond it, powers would be anything, and easy to beat."""
+def _clip_to_fitted_range(courses: list[FloatArray], fitted: list[Mask]) -> list[FloatArray]:
+    """The signals clipped to the range that was fitted to: beyond it, a polynomial extrapolates badly."""
     seen = np.vstack([course[mask] for course, mask in zip(courses, fitted, strict=True)])
     return [np.clip(course, seen.min(axis=0), seen.max(axis=0)) for course in courses]
 
 
 def _courses(command: FloatArray, predicted: FloatArray) -> FloatArray:
-    """(n, 2 signals): commands and predictions, and their changes."""
+    """(n, 2 signals): commands and predictions, one sample before, and their changes; each with an rms of 1."""
     signals = np.hstack([command, predicted])
     signals = signals / np.maximum(np.sqrt(np.mean(signals**2, axis=0)), _TINY)
     before = np.vstack([signals[:1], signals[:-1]])
@@ -80,8 +81,8 @@ def _courses(command: FloatArray, predicted: FloatArray) -> FloatArray:
     return np.asarray(base / np.maximum(np.sqrt(np.mean(base**2, axis=0)), _TINY))
 
 
-def _count(base: FloatArray) -> int:
-    """Of the terms: powers, and products of two courses."""
+def _term_count(base: FloatArray) -> int:
+    """Number of terms: powers, and products of two signals."""
     width: int = base.shape[1]
     return 4 * width + len(list(combinations(range(width // 2), 2)))
 
@@ -102,8 +103,8 @@ def _terms(base: FloatArray, numbers: Sequence[int]) -> FloatArray:
     return found
 
 
-def _chosen(seen: FloatArray, wanted: FloatArray, count: int) -> list[int]:
-    """Numbers of the terms that take most, one after the other."""
+def _select_terms(seen: FloatArray, wanted: FloatArray, count: int) -> list[int]:
+    """Numbers of the terms selected by orthogonal least squares, one after the other."""
     picked: list[int] = []
     rest = wanted
     power = np.sum(seen**2, axis=0)
@@ -115,8 +116,9 @@ def _chosen(seen: FloatArray, wanted: FloatArray, count: int) -> list[int]:
     return picked
 
 
-def _normalised(measure: ErrorMeasure, left: FloatArray) -> float:
-    """left: (samples to test, c), in units of the measure."""
+def _normalised_error(measure: ErrorMeasure, left: FloatArray) -> float:
+    """Rms error over the rms signal, root mean square over channels. left: (test samples, c), in units of the
+    measure."""
     signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
     size = np.maximum(rms_over(measure.records, signals, [record.test for record in measure.records]), _TINY)
     rms = np.sqrt(np.mean(left**2, axis=0)) * measure.unit / size

@@ -1,4 +1,4 @@
-"""What is said of laws that the data cannot part, and of candidates that were not confirmed."""
+"""Sentences about laws that the data cannot tell apart, and about unconfirmed candidates."""
 
 from dataclasses import dataclass
 
@@ -36,7 +36,7 @@ _FAMILIES = (
         {"amplifier_lag", "transport_delay", "sensor_lag", "logger_offset"},
     ),
 )  # fmt: skip
-"""What laws that act alike are called together: short, in a sentence of its own, and which they are."""
+"""Families of laws that act alike: short name, title of a sentence, and members."""
 
 REFINED = "it holds the named law as a special case, and what it allows beyond that brings nothing on held-out data"
 """Why a law that refines the named one is passed over."""
@@ -46,7 +46,7 @@ SENTENCES = 3
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """What sentences must know of it."""
+    """What sentences need to know about the device."""
 
     single: bool
     """It has one axis, which then needs no name."""
@@ -68,7 +68,7 @@ def class_noun(effect: NamedEffect) -> str:
 
 
 def class_sentence(effect: NamedEffect) -> str:
-    """Empty where the data part it from all others."""
+    """Which laws would explain the data as well; empty where the data tell it from all others."""
     inseparable = [rival.effect for rival in effect.rivals if rival.inseparable]
     names = tuple(dict.fromkeys((*effect.class_, *inseparable)))
     if len(names) < 2:
@@ -115,7 +115,7 @@ def candidate_numbers(candidate: Candidate, device: Device | None = None) -> str
 
 
 def candidate_sentences(diagnosis: Diagnosis, device: Device | None = None) -> tuple[str, ...]:
-    """Of the best few; without the first, where the verdict says it."""
+    """A sentence for each of the best few candidates; without the first where the verdict's sentence says it."""
     said = 1 if best_candidate_sentence(diagnosis, device) else 0
     return tuple(
         f"Not confirmed: {_with_gain(candidate, device)}" for candidate in diagnosis.candidates[said:SENTENCES]

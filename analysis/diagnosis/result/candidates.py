@@ -12,7 +12,7 @@ from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
 from analysis.diagnosis.effect_words import noun_of, place_of
 from analysis.diagnosis.first_model.reduced_recordings import linear_laws
 from analysis.diagnosis.result.candidate_wording import REFINED
-from analysis.diagnosis.result.findings import Reached
+from analysis.diagnosis.result.findings import BalanceErrors
 from analysis.wording import listed
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
@@ -84,7 +84,7 @@ def with_balances(
     if not balances:
         return diagnosis
     weighed = {
-        (law.law.effect, axis_letter(channels[axis], channels)): (law, _taken(balance, law))
+        (law.law.effect, axis_letter(channels[axis], channels)): (law, _explained_share(balance, law))
         for axis, balance in enumerate(balances)
         for law in balance.laws
     }
@@ -98,7 +98,7 @@ def with_balances(
         for effect in diagnosis.effects
         if f"{effect.effect.replace('_', ' ')} {effect.axis}" not in constants
     )
-    named = {(name, effect.axis) for effect in effects for name in _told_with(effect)}
+    named = {(name, effect.axis) for effect in effects for name in _names_covered_by(effect)}
     found = [
         (_rank(law), _candidate(law, axis_letter(channels[axis], channels)))
         for axis, balance in enumerate(balances)
@@ -113,7 +113,7 @@ def with_balances(
     return replace(diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_once(left)[:MOST])
 
 
-def _told_with(effect: NamedEffect) -> tuple[str, ...]:
+def _names_covered_by(effect: NamedEffect) -> tuple[str, ...]:
     """Names that are no candidates beside it: its own, its class, and what only refines it."""
     refined = (rival.effect for rival in effect.rivals if rival.why_not == REFINED)
     return (effect.effect, *effect.class_, *refined)
@@ -149,7 +149,9 @@ def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...]) -> tu
     return tuple(said)
 
 
-def reached_of(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tuple[str, ...]) -> tuple[Reached, ...]:
+def balance_errors(
+    diagnosis: Diagnosis, balances: Sequence[Balance], channels: tuple[str, ...]
+) -> tuple[BalanceErrors, ...]:
     """Of the laws that the document names; see `with_balances`."""
     found = []
     for axis, balance in enumerate(balances):
@@ -158,7 +160,7 @@ def reached_of(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tupl
         laws = [law.place for law in balance.laws if law.law.effect in names]
         rms = balance.error_of(laws) if laws else balance.linear
         given = balance.search.regression.prior is not None
-        found.append(Reached(letter, balance.linear, rms, balance.ceiling, bool(laws), balance.tested, given))
+        found.append(BalanceErrors(letter, balance.linear, rms, balance.ceiling, bool(laws), balance.tested, given))
     return tuple(found)
 
 
@@ -170,7 +172,7 @@ def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     return tuple(first.values())
 
 
-def _taken(balance: Balance, law: JudgedLaw) -> float:
+def _explained_share(balance: Balance, law: JudgedLaw) -> float:
     """Share of the linear model's held-out error power that goes with a law; its own is of what all laws take."""
     whole = 1.0 if law.place == NO_COLUMN else 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2
     return min(max(whole * law.share, 0.0), 1.0)

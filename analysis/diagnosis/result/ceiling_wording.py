@@ -1,10 +1,9 @@
-"""Errors on held-out data in plain sentences: beside what noise alone would leave, and beside what could be predicted
-at all, by all laws together and by a model without physics."""
+"""Sentences about held-out errors, compared with noise alone, with all laws together, and with a black box."""
 
 from collections.abc import Sequence
 
 from analysis.diagnosis.document import Errors
-from analysis.diagnosis.result.findings import BlackBox, Reached
+from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
 from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
 from analysis.diagnosis.unit_wording import error_text, share_text
 from analysis.wording import capital
@@ -30,12 +29,12 @@ def black_box_beats(box: BlackBox) -> bool:
     return box.test * SAME_TO_READERS < box.physics
 
 
-def ceiling_sentences(reached: Sequence[Reached]) -> tuple[str, ...]:
-    """One per axis whose force balance was weighed."""
-    return tuple(_ceiling(each, len(reached) == 1) for each in reached)
+def ceiling_sentences(reached: Sequence[BalanceErrors]) -> tuple[str, ...]:
+    """One sentence per axis whose force balance was tested."""
+    return tuple(_ceiling_sentence(each, len(reached) == 1) for each in reached)
 
 
-def _ceiling(reached: Reached, single: bool) -> str:
+def _ceiling_sentence(reached: BalanceErrors, single: bool) -> str:
     along = "" if single else f" along {reached.axis}"
     if not reached.tested:
         return (
@@ -54,8 +53,8 @@ def _ceiling(reached: Reached, single: bool) -> str:
     )
 
 
-_HEARD = {"rest": "as it is heard at rest", "quiet band": "as it is above the driven band"}
-"""Noise that no repeats show: how strong it is under a drive is not known, so no error is counted in it."""
+_NOISE_SOURCES = {"rest": "as it is heard at rest", "quiet band": "as it is above the driven band"}
+"""Noise that was not measured from repeats: its level under a drive is not known, so errors are not counted in it."""
 
 
 def times_text(ratio: float) -> str:
@@ -84,13 +83,13 @@ def one_error(said: str, error: float | None, errors: Errors, how: str = "") -> 
 def _noise(errors: Errors, error: float, how: str) -> str:
     if not errors.noise or how == "unknown":
         return "; what noise alone would leave is not known"
-    if how in _HEARD:
-        return f"; noise {_HEARD[how]} would leave {error_text(errors.noise)}"
+    if how in _NOISE_SOURCES:
+        return f"; noise {_NOISE_SOURCES[how]} would leave {error_text(errors.noise)}"
     return f", {times_text(error / errors.noise)} what noise alone would leave ({error_text(errors.noise)})"
 
 
 def confirmation_sentence(fit: Errors, test: Errors) -> str:
-    """Where the held-out data do not bear out the fit; else empty. Both records' errors are counted in their noise."""
+    """A sentence where held-out data do not confirm the fit; else empty. Errors are compared in units of the noise."""
     if None in (test.after, test.retuned, test.noise, fit.after, fit.noise):
         return ""
     assert test.after is not None and test.retuned is not None and test.noise and fit.after is not None and fit.noise

@@ -1,4 +1,4 @@
-"""What a comparison with clean recordings adds to the findings: the fault that came since, and candidates."""
+"""Adds the result of a comparison with clean recordings to the findings: the named fault, and candidates."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -34,23 +34,23 @@ NOT_COMPARED = (
 BY_ITSELF = "This is seen in the readings themselves, and not in those of the clean recordings; no model was asked."
 
 
-def with_contrast(whole: Findings, found: Contrast, recording: Recording, beyond: float) -> Findings:
+def add_contrast(whole: Findings, found: Contrast, recording: Recording, beyond: float) -> Findings:
     if found.comparison is None or found.decision is None:
-        named = _shown(found, recording)
+        named = _directly_shown_fault(found, recording)
         if named is None:
             return replace(whole, remarks=(NOT_COMPARED, *whole.remarks))
-        diagnosis = _with(whole.diagnosis, "partly_explained", (named,), ())
+        diagnosis = _with_effects(whole.diagnosis, "partly_explained", (named,), ())
         remarks: tuple[str, ...] = (BY_ITSELF,)
     else:
-        diagnosis = _compared(whole.diagnosis, found.comparison, found.decision, recording, whole.given.system)
+        diagnosis = _with_comparison(whole.diagnosis, found.comparison, found.decision, recording, whole.given.system)
         remarks = (BESIDE.format(beyond), *(() if found.comparison.complete else (OUT_OF_TIME,)))
-    improved = _improved(whole.given, diagnosis.effects)
+    improved = _improved_model(whole.given, diagnosis.effects)
     return replace(
         whole, diagnosis=diagnosis, improved=improved, remarks=(*remarks, *whole.remarks), proposal=None, black_box=None
     )
 
 
-def _with(
+def _with_effects(
     diagnosis: Diagnosis, verdict: Verdict, effects: tuple[NamedEffect, ...], candidates: tuple[Candidate, ...]
 ) -> Diagnosis:
     left = diagnosis.remainder or diagnosis.mismatch
@@ -65,11 +65,11 @@ def _with(
     )
 
 
-def _compared(
+def _with_comparison(
     diagnosis: Diagnosis, found: Comparison, decided: Decision, recording: Recording, system: UnitSystem
 ) -> Diagnosis:
     best = decided.named
-    named = () if best is None else (_named(best, decided, recording, system),)
+    named = () if best is None else (_named_fault(best, decided, recording, system),)
     candidates = tuple(_candidate(law, why, recording) for law, why in decided.others)
     verdict: Verdict = "partly_explained" if named else "no_mismatch" if found.excess <= AS_ONE else "unexplained"
     fit = Fit(
@@ -77,17 +77,17 @@ def _compared(
         _errors(found, found.held_out, found.held_out if best is None else best.held_out),
     )
     error = "predicted force" if found.by_force else f"windows of {found.step_s:.6f} s"
-    changed = _with(diagnosis, verdict, named, candidates[:MOST])
+    changed = _with_effects(diagnosis, verdict, named, candidates[:MOST])
     return replace(changed, fit=fit, error=error)
 
 
 def _errors(found: Comparison, before: float, after: float) -> Errors:
-    """Of the faulty set, as shares of its signal."""
+    """Errors of the faulty set before and after, over its signal's rms."""
     sizes = [float(np.sqrt(left / found.faulty_samples)) * found.faulty_share for left in (before, after)]
     return Errors(sizes[0], sizes[0], sizes[1], None)
 
 
-def _named(best: JudgedFault, decided: Decision, recording: Recording, system: UnitSystem) -> NamedEffect:
+def _named_fault(best: JudgedFault, decided: Decision, recording: Recording, system: UnitSystem) -> NamedEffect:
     effect = best.fault.effect
     rivals = tuple(Rival(name, 0.0, True, "as good in its place on what was compared") for name in decided.alike)
     return NamedEffect(
@@ -118,7 +118,7 @@ def _estimates(weighed: JudgedFault, recording: Recording, system: UnitSystem) -
 
 
 def _units(fault: Fault, recording: Recording, system: UnitSystem) -> Mapping[str, str]:
-    """By number. A fault of the sensor counts in what it reads, an offset of the command in what was commanded."""
+    """Unit of each parameter of a fault: that of the reading for a sensor's, of the command for an actuator's."""
     if fault.effect in EFFECTS_BY_NAME:
         read = recording.response.units[max(fault.site, 0)] if fault.place == "sensor" else "1"
         return {each.name: each.unit_in(system, read) for each in EFFECTS_BY_NAME[fault.effect].parameters}
@@ -140,7 +140,7 @@ def _candidate(weighed: JudgedFault, why: str, recording: Recording) -> Candidat
     )
 
 
-def _shown(found: Contrast, recording: Recording) -> NamedEffect | None:
+def _directly_shown_fault(found: Contrast, recording: Recording) -> NamedEffect | None:
     place: Place = "sensor"
     if found.line is not None:
         name, sites, values, place = found.line.effect, found.line.channels, found.line.values, found.line.place
@@ -162,8 +162,8 @@ def _shown(found: Contrast, recording: Recording) -> NamedEffect | None:
     return NamedEffect(name, place, axis, 1.0, 1.0, known)
 
 
-def _improved(given: MechanicalModel, effects: tuple[NamedEffect, ...]) -> MechanicalModel:
-    """The device in order, with the fault where a simulation plays it."""
+def _improved_model(given: MechanicalModel, effects: tuple[NamedEffect, ...]) -> MechanicalModel:
+    """The given model with the faults that have a simulation."""
     played = tuple(
         ModelEffect(effect.effect, effect.axis, {name: estimate.value for name, estimate in effect.parameters.items()})
         for effect in effects

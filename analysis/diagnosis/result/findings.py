@@ -7,7 +7,7 @@ from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.diagnosis.next_experiment.proposed_experiment import Proposal
+from analysis.diagnosis.next_experiment.propose_experiment import Proposal
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.state_maps import StateMaps
 from analysis.diagnosis.search.explain import Explanation
@@ -37,7 +37,7 @@ class Course:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signature:
-    """What shows a named effect: the missing force or error against what it depends on, with the fitted law on it."""
+    """A curve that shows a named effect: the missing force or error against its variable, with the fitted law."""
 
     effect: str
     axis: str | None
@@ -48,9 +48,9 @@ class Signature:
     measured_at: FloatArray
     """(k,)"""
     measured: FloatArray
-    """(k,): mean of what is missing there,"""
+    """(k,): mean of what is missing there."""
     spread: FloatArray
-    """and its standard error, (k,)."""
+    """(k,): its standard error."""
     law_at: FloatArray
     """(q,)"""
     law: FloatArray
@@ -64,30 +64,31 @@ class BlackBox:
     kind: str
     numbers: int
     test: float
-    """Its error, as `document.Errors`; beside it, the physics' own:"""
+    """Its error on the test samples, as in `document.Errors`."""
     physics: float
+    """The same of the named effects."""
 
 
 @dataclass(frozen=True, slots=True)
-class Reached:
-    """What is left of one axis's force on held-out data, rms as a share of the signal."""
+class BalanceErrors:
+    """Errors of one axis's force balance on held-out data, rms over the signal's rms."""
 
     axis: str
     linear: float
-    """By mass, damping and stiffness alone,"""
+    """With mass, damping and stiffness alone."""
     named: float
-    """with the named laws,"""
+    """With the named laws."""
     ceiling: float
-    """and with all laws together."""
+    """With all laws together."""
     any_named: bool
     tested: bool = True
-    """What was held back moves enough to test laws by."""
+    """Whether the held-out samples move enough to test laws by."""
     given: bool = False
     """The model was given: `linear` is what it leaves, re-tuned."""
 
     @property
     def share(self) -> float:
-        """Of the error power that all laws together take, how much the named ones do."""
+        """Share of the error power that all laws together take which the named laws take."""
         room = self.linear**2 - self.ceiling**2
         return min(max((self.linear**2 - self.named**2) / room, 0.0), 1.0) if room > 0 else 0.0
 
@@ -119,7 +120,7 @@ class Findings(Summarised):
     maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
     """By "before", "retuned", "after": every cell of the map, in units of the noise."""
     local: Localisation = field(default_factory=Localisation)
-    """In which states it sits, through what it enters, of which kind it is."""
+    """Localisation of the mismatch: in which states, through which input, and of which kind."""
     fitted: bool = False
     """`given` was fitted to these recordings by the program: no calibration says how far its numbers may be off."""
     floor: NoiseFloor | None = None
@@ -132,7 +133,7 @@ class Findings(Summarised):
     """The driven axes, as a reader calls them; empty = x, y, z."""
     proposal: Proposal | None = None
     """Of what to record next, where rivals are as good as what is named."""
-    reached: tuple[Reached, ...] = ()
+    reached: tuple[BalanceErrors, ...] = ()
     """Per axis; empty where no force balance was weighed."""
     state_maps: tuple[StateMaps, ...] = ()
     """Per axis, the one to be drawn first."""

@@ -12,7 +12,7 @@ from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.black_box import black_box
 from analysis.diagnosis.result.error_table import errors_of
 from analysis.diagnosis.result.findings import BlackBox, Signature
-from analysis.diagnosis.result.named_effects import said_of
+from analysis.diagnosis.result.named_effects import labels_of
 from analysis.diagnosis.result.signature_curves import Names, signature_of
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Part
@@ -71,7 +71,7 @@ def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, 
     """Each named effect's, against the final model without it alone."""
     measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
     recording = measure.records[0].recording
-    said, drawn = said_of(recording, tuning.model), []
+    said, drawn = labels_of(recording, tuning.model), []
     names = Names(
         tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.system
     )

@@ -33,13 +33,13 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
-_TELLING = 0.005
-"""Errors that differ by less are the same to a reader."""
+_SAME_ERROR = 0.005
+"""Relative difference below which two errors count as the same."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Said:
-    """Words that the numbers need."""
+class Labels:
+    """Channel names and units that the numbers are reported with."""
 
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
@@ -49,9 +49,9 @@ class Said:
     """Of the response."""
 
 
-def said_of(recording: Recording, model: MechanicalModel) -> Said:
+def labels_of(recording: Recording, model: MechanicalModel) -> Labels:
     unit = recording.response.unit
-    return Said(
+    return Labels(
         recording.command.channels,
         recording.response.channels,
         unit if isinstance(unit, str) else unit[0],
@@ -60,8 +60,9 @@ def said_of(recording: Recording, model: MechanicalModel) -> Said:
     )
 
 
-def named_effects(found: Explanation, errors: FloatArray, said: Said) -> tuple[NamedEffect, ...]:
-    """errors: (numbers,), standard errors of the final hypothesis's point."""
+def named_effects(found: Explanation, errors: FloatArray, said: Labels) -> tuple[NamedEffect, ...]:
+    """The effects of the final hypothesis with parameters, rivals and probabilities. errors: (numbers,), standard
+    errors of the hypothesis's point."""
     whole, named, first = found.after.fitted.hypothesis, [], 0
     shares = shares_taken(found.retuned, found.steps)
     for number, claim in enumerate(whole.claims):
@@ -83,8 +84,8 @@ def named_effects(found: Explanation, errors: FloatArray, said: Said) -> tuple[N
     return tuple(named)
 
 
-def axis_of(claim: Claim, said: Said) -> str | None:
-    """None where all share it."""
+def axis_of(claim: Claim, said: Labels) -> str | None:
+    """The axis letter of an effect's site; None where all axes share the effect."""
     if claim.spread != "one" or (claim.effect.sites and "one" not in claim.effect.sites):
         return None
     sensed = place_of_effect(claim.effect) == "sensor"
@@ -92,7 +93,7 @@ def axis_of(claim: Claim, said: Said) -> str | None:
     return axis_letter(channels[claim.sites[0]], channels)
 
 
-def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, ...], float]:
+def _rivals(found: Explanation, number: int, said: Labels) -> tuple[tuple[Rival, ...], float]:
     fitted_candidates = found.rounds[number]
     left = (
         found.after.score.worst_channel
@@ -117,7 +118,7 @@ def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, .
 
 
 def _chances_of_names(fitted_candidates: Sequence[FittedCandidate], chances: Sequence[float]) -> dict[str, float]:
-    """An effect may contend several times, at other axes or from another start: the name is one."""
+    """Probability of each effect name, summed over its candidates at other axes or from other starts."""
     found: dict[str, float] = {}
     for candidate, chance in zip(fitted_candidates, chances, strict=True):
         name = candidate.newest
@@ -125,15 +126,15 @@ def _chances_of_names(fitted_candidates: Sequence[FittedCandidate], chances: Seq
     return found
 
 
-def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: tuple[Said, str]) -> str:
-    """words: of the device, and what errors are counted in."""
+def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: tuple[Labels, str]) -> str:
+    """Why a rival was not chosen. words: labels of the device, and the unit of errors."""
     said, unit = words
     worst, least = other.score.worst_channel, best.score.worst_channel
     claim = other.fitted.hypothesis.claims[-1]
     axis = axis_of(claim, said)
     where = f" ({axis})" if axis else ""
     if only_refines(other, best):
-        gain = "too little" if worst < (1 - _TELLING) * least else "nothing"
+        gain = "too little" if worst < (1 - _SAME_ERROR) * least else "nothing"
         return (
             f"it holds the named law as a special case{where}, and what it allows beyond that brings {gain}: "
             f"{worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"
@@ -143,7 +144,7 @@ def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: t
     return f"at its best{where} it leaves {worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"
 
 
-def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, said: Said) -> dict[str, Estimate]:
+def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, said: Labels) -> dict[str, Estimate]:
     claim = whole.claims[number]
     at = reported_numbers(whole, number, whole.point)
     spread = {name: 0.0 for name in at}
@@ -162,7 +163,7 @@ def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, s
     }
 
 
-def _units(effect: Effect, values: Values, said: Said) -> dict[str, str]:
+def _units(effect: Effect, values: Values, said: Labels) -> dict[str, str]:
     if effect.law is not None:
         law = law_with_values(effect.law, values)
         units = law_units(law, Channels(said.inputs, said.outputs, said.quantity), said.system)
@@ -186,7 +187,7 @@ def _interval(value: float, standard_error: float) -> tuple[float, float] | None
 
 
 def reported_numbers(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
-    """The vocabulary's numbers: of the only axis, of the first, or where the effect's size is asked of the largest."""
+    """Parameters as the vocabulary defines them: of the first site, or of the largest for effects in `LARGEST`."""
     groups = _groups(whole, number, point)
     claim = whole.claims[number]
     reported = [dict(claim.effect.report(values)) for values in groups]
@@ -197,7 +198,7 @@ def reported_numbers(whole: Hypothesis, number: int, point: FloatArray) -> dict[
 
 
 LARGEST = ("mains_hum", "sensor_drift", "sensor_offset")
-"""Whose numbers are those of the largest channel."""
+"""Effects that report the parameters of their largest channel."""
 
 
 def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[str, float]]:
@@ -218,10 +219,10 @@ def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> 
     )
     refines = np.array([candidate is not best and only_refines(candidate, best) for candidate in fitted_candidates])
     weights = np.where(refines, 0.0, np.exp(-behind / PROBABILITY_SCALE))
-    return tuple((1 - elsewhere(left)) * float(weight) for weight in weights / weights.sum())
+    return tuple((1 - probability_of_none(left)) * float(weight) for weight in weights / weights.sum())
 
 
-def elsewhere(left: float) -> float:
+def probability_of_none(left: float) -> float:
     """The probability that no candidate is right, though none in the catalogue is better."""
     odds = (max(left - 1.0, 0.0) / ELSEWHERE_HALFWAY) ** ELSEWHERE_STEEPNESS
     return float(ELSEWHERE_LEAST + (ELSEWHERE_MOST - ELSEWHERE_LEAST) * odds / (1 + odds))

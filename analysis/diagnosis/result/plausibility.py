@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 
 _AT_THE_EDGE = 1e-3
 _LOSSES = 1e-6
-"""Of the largest damping: what a matrix may be negative by from rounding."""
+"""Negative eigenvalue of a matrix that rounding may cause, over the largest."""
 
 
 def implausible_sentences(found: Findings) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Which of the model's own numbers a fit moved, how far, and whether that is still believable, in words."""
+"""Lists the model's own numbers that a fit moved beyond their calibration, with sentences about doubtful ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from analysis.diagnosis.unit_wording import error_text, value_text
 from analysis.wording import listed, typeset
 from equalizer.signals.signal import FloatArray
 
-_NAMED = 4
+_LISTED = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +57,8 @@ def retuned_sentence(moved: Sequence[MovedNumber], fitted: bool = False) -> str:
     calibration holds its numbers."""
     if not moved:
         return ""
-    texts = [f"{number.name} {number.size}" if fitted else number.text for number in moved[:_NAMED]]
-    more = len(moved) - _NAMED
+    texts = [f"{number.name} {number.size}" if fitted else number.text for number in moved[:_LISTED]]
+    more = len(moved) - _LISTED
     said = listed([*texts, f"{more} more"] if more > 0 else texts)
     if fitted:
         return f"Fitted once more, these numbers of the first model moved by more than was left open at first: {said}."
@@ -73,7 +73,7 @@ def doubtful_sentences(moved: Sequence[MovedNumber], fitted: bool = False) -> tu
     if fitted:
         names = listed([number.name for number in at_end])
         return (f"As far as they may, these numbers of the first model moved: {names}.{_OPEN}",) if at_end else ()
-    if len(far) > _NAMED:
+    if len(far) > _LISTED:
         return (
             f"{len(far)} numbers were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration or more"
             f"{f', {len(at_end)} of them as far as they may' if at_end else ''}: "
@@ -91,23 +91,23 @@ _OPEN = " The fit has found no best value for them, or they stand for physics th
 _AS_FAR = ", as far as it may"
 
 
-def _raised(errors: Errors) -> bool:
+def _retuning_raises_error(errors: Errors) -> bool:
     """Re-tuning raises the error on held-out data."""
     return errors.before is not None and errors.retuned is not None and errors.retuned > SAME_TO_READERS * errors.before
 
 
 def better_model(errors: Errors) -> tuple[str, str]:
-    """The better of the given and the re-tuned model: no name may shine beside a model that re-tuning made worse."""
-    return ("before", "as given") if _raised(errors) else ("retuned", "re-tuned without it")
+    """Field and words of the better of the given and the re-tuned model, with which named effects are compared."""
+    return ("before", "as given") if _retuning_raises_error(errors) else ("retuned", "re-tuned without it")
 
 
 def better_alone(errors: Errors) -> tuple[str, float | None]:
-    return ("as given", errors.before) if _raised(errors) else ("re-tuned", errors.retuned)
+    return ("as given", errors.before) if _retuning_raises_error(errors) else ("re-tuned", errors.retuned)
 
 
 def raised_sentence(errors: Errors) -> str:
     """errors: on held-out data. Empty where re-tuning does not raise them."""
-    if not _raised(errors) or errors.before is None or errors.retuned is None:
+    if not _retuning_raises_error(errors) or errors.before is None or errors.retuned is None:
         return ""
     return (
         f"Re-tuning raises the error on held-out data from {error_text(errors.before)} to {error_text(errors.retuned)} "

@@ -1,4 +1,4 @@
-"""Means over bins, with standard errors that allow for correlated samples."""
+"""Bin means with standard errors that allow for correlated samples."""
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +11,12 @@ _BLOCK_S = 0.5
 """Samples so far apart count as independent."""
 _FEWEST = 20
 _RESTING = 0.01
-"""Of the range, to either side of where a channel is most."""
+"""Share of the range about the median that counts as rest when bins are chosen."""
 
 
-def binned(at: FloatArray, values: FloatArray, used: Mask, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def bin_means(
+    at: FloatArray, values: FloatArray, used: Mask, rate_hz: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Abscissa, mean and its standard error per bin; half the bins hold as many samples each, half are as wide, so that
     both the middle and the ends are seen. at, values, used: (n,)"""
     blocks = (np.flatnonzero(used) / (_BLOCK_S * rate_hz)).astype(int)
@@ -29,8 +31,8 @@ def binned(at: FloatArray, values: FloatArray, used: Mask, rate_hz: float) -> tu
     return table[:, 0], table[:, 1], table[:, 2]
 
 
-def binned_law(at: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Means in finer bins, without error."""
+def bin_law_means(at: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Bin means of a law over finer bins, without standard errors. at, values: (n,)"""
     bin_of = np.digitize(at, _edges(at, _LAW_BINS)[1:-1])
     count = np.bincount(bin_of)
     full = count >= 3
@@ -39,7 +41,7 @@ def binned_law(at: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def running_rms(seconds: FloatArray, values: FloatArray, used: Mask) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Time, rms and its standard error in equal stretches of the time that counts."""
+    """Time, rms and its standard error, in stretches with equal numbers of used samples. All inputs: (n,)"""
     parts = [part for part in np.array_split(np.flatnonzero(used), _BINS) if len(part)]
     rms = np.array([float(np.sqrt(np.mean(values[part] ** 2))) for part in parts])
     error = np.array([float(np.std(values[part] ** 2) / np.sqrt(len(part))) for part in parts])

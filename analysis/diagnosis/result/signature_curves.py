@@ -1,5 +1,5 @@
-"""What shows a named effect: what is missing where the effect alone is left out of the fit, against what it depends on,
-and the fitted law, played by the simulator and averaged alike."""
+"""Signature curve of a named effect: what is missing without it against the variable that it depends on, and the fitted
+law, simulated and averaged over the same kind of bins."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import numpy as np
 from analysis.diagnosis.errors.unexplained_motion import EXPECTED
 from analysis.diagnosis.forces.missing_force import missing_force
 from analysis.diagnosis.result.findings import Signature
-from analysis.diagnosis.result.signature_bins import binned, binned_law, running_rms
+from analysis.diagnosis.result.signature_bins import bin_law_means, bin_means, running_rms
 from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
 from equalizer.effects.simulation.simulator import SimulationResult, simulate_mechanism
 from equalizer.effects.starts.evidence import Evidence
@@ -49,13 +49,13 @@ ALONG: Mapping[str, Along] = {
     "sensor_drift": "time",
     "clock_drift": "growth",
 }
-"""Of all others the spectrum of what is missing is shown."""
+"""Variable of each effect's curve; for all other effects the spectrum of what is missing is shown."""
 _FREQUENCY_LINES = 1024
 
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """How a reader calls what is drawn."""
+    """Names and units on the axes of a curve."""
 
     axes: tuple[str, ...]
     channels: tuple[str, ...]
@@ -68,7 +68,7 @@ class Names:
 def signature_of(
     evidence: Evidence, placed: PlacedEffect, others: Sequence[PlacedEffect], names: Names, hold: Hold
 ) -> Signature:
-    """evidence: of the final model with all its effects but this one; others: those."""
+    """The curve of one effect. evidence: of the final model with all its effects but this one; others: those."""
     acts, along = placed.effect.acts, ALONG.get(placed.effect.name, "frequency")
     if along in ("velocity", "position", "acceleration") and not isinstance(acts, (OnCommand, OnResponse)):
         return _of_motion(evidence, placed, along, names, hold)
@@ -91,28 +91,28 @@ def _of_motion(evidence: Evidence, placed: PlacedEffect, along: Along, names: Na
     used, unit = evidence.used > 0, names.system.length
     unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[along]
     seen, law_seen = (
-        _course(position[:, axis], velocity[:, axis], along, evidence.sample_rate_hz)
+        _abscissa(position[:, axis], velocity[:, axis], along, evidence.sample_rate_hz)
         for position, velocity in (
             (evidence.axis_position, evidence.axis_velocity),
             (played.axis_position, played.axis_velocity),
         )
     )
-    at, mean, spread = binned(seen, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_at, law = binned_law(law_seen[used], force[used, axis])
+    at, mean, spread = bin_means(seen, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
+    law_at, law = bin_law_means(law_seen[used], force[used, axis])
     return Signature(
         placed.effect.name, names.axes[axis], f"{along} of {names.axes[axis]} ({unit})",
         f"missing force ({names.system.force})", at, mean, spread, law_at, law,
     )  # fmt: skip
 
 
-def _course(position: FloatArray, velocity: FloatArray, along: Along, rate_hz: float) -> FloatArray:
+def _abscissa(position: FloatArray, velocity: FloatArray, along: Along, rate_hz: float) -> FloatArray:
     if along == "acceleration":
         return np.asarray(np.gradient(velocity) * rate_hz)
     return velocity if along == "velocity" else position
 
 
 def _equivalent_force(evidence: Evidence, played: SimulationResult, hold: Hold) -> FloatArray:
-    """The force on the model without it that would do what another structure does: found as the missing one is."""
+    """(n, m), N: the force on the model without the effect that would cause the same responses, by deconvolution."""
     without = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (), hold)
     change, unit = [played.response - without.response], [evidence.noise]
     if evidence.position_noise is not None:
@@ -128,8 +128,8 @@ def _of_command(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signa
     axis = _strongest(placed.sites, evidence.axis_force)
     command, used = evidence.command[:, axis], evidence.used > 0
     changed = placed.effect.acts.change(command, 1 / evidence.sample_rate_hz, placed.values)
-    at, mean, spread = binned(command, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_at, law = binned_law(command[used], (changed - command)[used])
+    at, mean, spread = bin_means(command, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
+    law_at, law = bin_law_means(command[used], (changed - command)[used])
     unit = names.system.force
     return Signature(
         placed.effect.name, names.axes[axis], f"command of {names.axes[axis]} ({unit})", f"missing force ({unit})",
@@ -144,8 +144,8 @@ def _of_reading(evidence: Evidence, placed: PlacedEffect, change: FloatArray, na
     together = np.abs(change[used].T @ drives) / np.maximum(np.sqrt(np.sum(drives**2, axis=0)), 1e-300)
     here, there = np.unravel_index(int(np.argmax(together)), together.shape)
     errors = (evidence.response - evidence.predicted)[:, here]
-    at, mean, spread = binned(evidence.predicted[:, there], errors, used, evidence.sample_rate_hz)
-    law_at, law = binned_law(drives[:, there], change[used, here])
+    at, mean, spread = bin_means(evidence.predicted[:, there], errors, used, evidence.sample_rate_hz)
+    law_at, law = bin_law_means(drives[:, there], change[used, here])
     return Signature(
         placed.effect.name, names.channels[here], f"predicted {names.channels[there]} ({names.unit})",
         f"error of {names.channels[here]} ({names.unit})", at, mean, spread, law_at, law,
@@ -162,8 +162,8 @@ def _of_time(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names
         law_at, law, _ = running_rms(seconds, np.hypot(change[:, here], evidence.noise[here]), used)
         what = f"rms {what}"
     else:
-        at, mean, spread = binned(seconds, errors, used, rate_hz)
-        law_at, law = binned_law(seconds[used], change[used, here])
+        at, mean, spread = bin_means(seconds, errors, used, rate_hz)
+        law_at, law = bin_law_means(seconds[used], change[used, here])
     return Signature(placed.effect.name, names.channels[here], "time (s)", what, at, mean, spread, law_at, law)
 
 

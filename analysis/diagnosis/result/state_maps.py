@@ -10,7 +10,7 @@ from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.document import Diagnosis
-from analysis.diagnosis.result.signature_bins import binned
+from analysis.diagnosis.result.signature_bins import bin_means
 from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import axis_letter
 from equalizer.effects.starts.evidence import Evidence
@@ -19,11 +19,11 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import system_of
 
 CLOUD = 600
-"""Samples that are drawn by themselves."""
+"""Single samples that are drawn."""
 LOOP_SAMPLES = 2000
-"""Of a loop at most;"""
+"""Samples of a loop at most."""
 LOOP_PERIODS = 1.1
-"""and of the motion's strongest period, so that a loop closes."""
+"""Length of a loop in periods of the motion's strongest line, so that it closes."""
 NAMED, NOT_CONFIRMED = "with what is named", "with the best candidates, not confirmed"
 
 
@@ -35,14 +35,14 @@ class StateView:
     """Of the abscissa, SI."""
     cloud_at: FloatArray
     cloud: FloatArray
-    """Single samples of the missing force;"""
+    """Single samples of the missing force."""
     at: FloatArray
     mean: FloatArray
-    """its mean per bin,"""
+    """Mean of the missing force per bin."""
     error: FloatArray
-    """the mean's standard error,"""
+    """Standard error of the mean."""
     left: FloatArray
-    """and the mean of what the completed law leaves there; empty where there is none."""
+    """Mean of what the completed model leaves per bin; empty where there is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,22 +54,22 @@ class Loop:
     at: FloatArray
     measured: FloatArray
     before: FloatArray
-    """As the model without new physics needs it for this motion,"""
+    """Force that the model without new physics needs for this motion."""
     after: FloatArray
-    """and with the completed law; empty where there is none."""
+    """The same with the completed model; empty where there is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StateMaps:
-    """One axis's."""
+    """The missing force of one axis, as curves and loops."""
 
     axis: str
     unit: str
     """Of the force, SI."""
     model: str
-    """Whose missing force it is, in words;"""
+    """The model that lacks the force, in words."""
     completed: str
-    """and by what it was completed: NAMED, NOT_CONFIRMED; empty = by nothing."""
+    """What the model was completed by: NAMED, NOT_CONFIRMED; empty = nothing."""
     share: float
     """Missing force over force, rms."""
     views: tuple[StateView, ...]
@@ -94,8 +94,8 @@ class _Course:
 def state_maps(
     diagnosis: Diagnosis, balances: Sequence[Balance], evidence: Sequence[Evidence], recording: Recording
 ) -> tuple[StateMaps, ...]:
-    """What is to be drawn first comes first: the axis of the first named effect, then those that miss most. From the
-    force balance where there is one; else evidence, of the re-tuned model, tells."""
+    """Maps of all axes, in the order of drawing: the axis of the first named effect, then by missing force. From the
+    force balances where there are any; else from the evidence of the re-tuned model."""
     channels = recording.command.channels
     letters = tuple(axis_letter(channel, channels) for channel in channels)
     units = recording.command.units
@@ -129,15 +129,15 @@ def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_C
         np.concatenate([motion.position[:: motion.step, axis] for motion in motions]),
         np.concatenate([motion.velocity[:: motion.step, axis] for motion in motions]),
         np.concatenate(regression.force),
-        np.concatenate(_less(regression, linear)),
-        np.concatenate(_less(regression, whole)) if laws else None,
+        np.concatenate(_explained_forces(regression, linear)),
+        np.concatenate(_explained_forces(regression, whole)) if laws else None,
         np.concatenate([motion.valid_samples(motion.fit | motion.test) for motion in motions]),
         _slices([len(force) for force in regression.force]),
     )
     return (course if course.used.any() else None), (NAMED if named else NOT_CONFIRMED if laws else "")
 
 
-def _less(regression: Regression, remainder: Sequence[FloatArray]) -> list[FloatArray]:
+def _explained_forces(regression: Regression, remainder: Sequence[FloatArray]) -> list[FloatArray]:
     return [force - left for force, left in zip(regression.force, remainder, strict=True)]
 
 
@@ -152,7 +152,7 @@ def _slices(counts: Sequence[int]) -> tuple[slice, ...]:
 
 
 def _of_evidence(evidence: Sequence[Evidence], axis: int) -> _Course | None:
-    """None where no motion along it is known."""
+    """The samples of one axis from the evidence; None where its motion is not known."""
     if not evidence or any(axis >= each.axis_force.shape[1] for each in evidence):
         return None
     position, velocity, force, missing = (
@@ -195,8 +195,8 @@ def _view(
     before, after = missing
     places = np.flatnonzero(course.used)
     shown = places[:: max(len(places) // CLOUD, 1)]
-    where, mean, error = binned(at, before, course.used, course.rate_hz)
-    left = np.zeros(0) if after is None else binned(at, after, course.used, course.rate_hz)[1]
+    where, mean, error = bin_means(at, before, course.used, course.rate_hz)
+    left = np.zeros(0) if after is None else bin_means(at, after, course.used, course.rate_hz)[1]
     return StateView(*said, at[shown], before[shown], where, mean, error, left)
 
 

@@ -1,4 +1,4 @@
-"""What a search by simulation found and did not name, and what what it named gains on held-out data."""
+"""Candidates that a search by simulation did not confirm, and the held-out gains of the effects that it named."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,7 +7,7 @@ from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.document import Candidate, Estimate, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.result.findings import BlackBox
-from analysis.diagnosis.result.named_effects import axis_of, law_of_claim, reported_numbers, said_of
+from analysis.diagnosis.result.named_effects import axis_of, labels_of, law_of_claim, reported_numbers
 from analysis.diagnosis.search.search import Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.effects.placing import place_of_effect
@@ -15,14 +15,14 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 
-def unconfirmed_of(
+def unconfirmed_candidates(
     found: Sequence[Unconfirmed], box: BlackBox | None, recording: Recording, model: MechanicalModel
 ) -> tuple[Candidate, ...]:
-    """The effect that was added last stands for those before it, where none is meant. Shares are of what a black box
-    takes, or, where physics takes more, of the largest gain."""
+    """The unconfirmed effects as candidates; of several in one hypothesis the last, unless one is meant. Shares are of
+    what a black box takes, or, where physics takes more, of the largest gain."""
     if not found:
         return ()
-    said, most = said_of(recording, model), max(max(each.gain for each in found), _gain_of(box), 1e-300)
+    said, most = labels_of(recording, model), max(max(each.gain for each in found), _gain_of(box), 1e-300)
     candidates = []
     for each in found:
         number = each.claim % len(each.hypothesis.claims)
@@ -50,7 +50,7 @@ def _gain_of(box: BlackBox | None) -> float:
 def with_gains(
     effects: Sequence[NamedEffect], measure: ErrorMeasure, stages: Sequence[FittedCandidate]
 ) -> tuple[NamedEffect, ...]:
-    """stages: with the sealed samples, the model without new physics and what stood after each effect."""
+    """The effects with their held-out gains. stages: the model without new physics, then that after each effect."""
     named = []
     for place, effect in enumerate(effects):
         gain = held_out_gain(measure, stages[place], stages[place + 1])

@@ -11,7 +11,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 
 
 def unit_sentences(courses: Sequence[Course]) -> tuple[str, ...]:
-    """By the model as given."""
+    """A sentence for each channel that differs from the given model's prediction by a constant factor."""
     found: dict[str, float] = {}
     for course in courses:
         for channel, name in enumerate(course.channels):
@@ -26,7 +26,7 @@ def unit_sentences(courses: Sequence[Course]) -> tuple[str, ...]:
 
 
 def _factor(course: Course, channel: int) -> float | None:
-    """Of measured to predicted; None where the courses are not alike."""
+    """Ratio of measured to predicted amplitude, signed; None where the two are not well correlated."""
     measured, predicted = course.measured[:, channel], course.before[:, channel]
     known = np.isfinite(measured) & np.isfinite(predicted)
     if not known.any():
@@ -51,7 +51,7 @@ def _what(factor: float) -> str:
 
 
 def constant_sentence(model: MechanicalModel) -> str:
-    """Where the commands are no forces: what a reader must know of every number; else empty."""
+    """A sentence about the unit of all numbers where the commands are no forces; else empty."""
     system = model.system
     if system.known:
         return ""

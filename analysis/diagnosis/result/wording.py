@@ -1,4 +1,4 @@
-"""What a diagnosis says, in plain sentences: the same in the report, in the terminal and on the screen."""
+"""A diagnosis in plain sentences, the same in the report, in the terminal and on the screen."""
 
 from collections.abc import Mapping, Sequence
 
@@ -52,7 +52,7 @@ def effect_title(effect: NamedEffect, single: bool = False) -> str:
 
 
 def effect_sentence(effect: NamedEffect, signature: str = "", single: bool = False) -> str:
-    """signature: what is seen in the data where it is the cause, as the catalogue has it."""
+    """An effect with its numbers. signature: what it causes in the data, as the catalogue says it."""
     if effect.law is not None:
         signature = "; ".join(filter(None, (law_text(effect.law), signature)))
     said = ", ".join(filter(None, (effect_title(effect, single), numbers_text(effect.effect, effect.parameters))))
@@ -93,7 +93,7 @@ def answer_of(found: Findings) -> str:
     diagnosis, device = found.diagnosis, device_of(found)
     if found.explanation.statistic is not None:
         return impact_sentence(diagnosis, listed([effect_title(effect, device.single) for effect in diagnosis.effects]))
-    return verdict_sentence(diagnosis, moved_of(found) if diagnosis.verdict == "parameters" else (), device)
+    return verdict_sentence(diagnosis, final_moved_numbers(found) if diagnosis.verdict == "parameters" else (), device)
 
 
 def device_of(found: Findings) -> Device:
@@ -101,7 +101,7 @@ def device_of(found: Findings) -> Device:
 
 
 def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
-    """Why each was passed over; those that the data cannot tell from it come in `inseparable_sentence`."""
+    """Why each rival was not chosen; those that the data cannot tell from it are in `inseparable_sentence`."""
     return tuple(
         f"{capital(noun_of(rival.effect))} (probability {probability_text(rival.probability)}): {ended(rival.why_not)}"
         for rival in effect.rivals
@@ -110,7 +110,7 @@ def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
 
 
 def inseparable_sentence(effect: NamedEffect) -> str:
-    """With what only refines it; empty where the data single one out."""
+    """Rivals that the data cannot tell from it, and laws that only refine it; empty where there are none."""
     return " ".join(filter(None, (_inseparable(effect), refinement_sentence(effect))))
 
 
@@ -144,7 +144,7 @@ def remainder_sentence(diagnosis: Diagnosis, device: Device | None = None) -> st
 
 
 def significant(rows: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
-    """Without what may be noise: a verdict that no repeats bear out comes with a remainder, however small."""
+    """The rows that are significant: a verdict without repeats comes with a remainder, however small."""
     return tuple(row for row in rows if row.p_value <= FALSE_DISCOVERY_RATE)
 
 
@@ -187,7 +187,7 @@ def gain_sentence(effect: NamedEffect) -> str:
 def summary_lines(found: Findings) -> tuple[str, ...]:
     """The diagnosis in a few sentences, the verdict first."""
     diagnosis, single = found.diagnosis, found.given.inputs == 1
-    moved = moved_of(found)
+    moved = final_moved_numbers(found)
     lines = [answer_of(found)]
     signatures = signature_texts(found)
     for effect in diagnosis.effects:
@@ -212,7 +212,7 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
     return tuple(line for line in lines if line)
 
 
-def moved_of(found: Findings) -> tuple[MovedNumber, ...]:
+def final_moved_numbers(found: Findings) -> tuple[MovedNumber, ...]:
     """The model's own numbers as they stand in the end, those that moved furthest first."""
     if found.tuning is None:
         return ()

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.document import Candidate, Errors, Estimate, Fit, Mismatch, Rival
-from analysis.diagnosis.result.findings import BlackBox, Reached
+from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.wording import moved_of, summary_lines
+from analysis.diagnosis.result.wording import final_moved_numbers, summary_lines
 from analysis.reports.diagnosis_method import method_paragraphs
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from analysis.reports.diagnosis_tables import channel_table, mismatch_table, parameter_table, retuned_table, rival_table
@@ -107,7 +107,7 @@ def test_candidates_and_classes_are_on_the_page_and_only_where_there_are_some(fr
     (effect,) = friction_found.diagnosis.effects
     alike = replace(effect, class_=("coulomb_friction", "stribeck_friction"), rivals=())
     other = Candidate("gravity_torque", "mechanism", "x", {"torque": 0.5, "angle": 0.1}, 0.12, 0.34, "too little")
-    reached = (Reached("x", 0.5, 0.3, 0.1, True),)
+    reached = (BalanceErrors("x", 0.5, 0.3, 0.1, True),)
     text, headings = rendered(replace(told(friction_found, effects=(alike,), candidates=(other,)), reached=reached))
     assert "What else may be missing" in headings.found
     for piece in ("The weight of a body off its axis (a pendulum)", "500 mN m, hanging", "34 %", "Too little.",
@@ -127,7 +127,7 @@ def test_the_best_candidate_stands_in_the_first_paragraph_where_nothing_is_named
 def test_wrong_parameters_are_said_with_their_numbers(friction_found):
     alone = replace(friction_found.explanation, after=friction_found.explanation.retuned)
     bare = replace(told(friction_found, verdict="parameters", effects=()), explanation=alone, named=(), signatures=())
-    moved = moved_of(bare)
+    moved = final_moved_numbers(bare)
     assert moved
     text, _ = rendered(bare)
     assert f"No physics is missing; numbers of the model are off: {moved[0].text}" in text

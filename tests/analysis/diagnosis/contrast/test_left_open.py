@@ -8,7 +8,7 @@ from analysis.diagnosis.forces.rigid_model import rigid_model
 from analysis.diagnosis.reference import learn_model_error as learn_clean_floor
 from analysis.diagnosis.reference.compare_with_reference import Contrast, contrast_of
 from analysis.diagnosis.reference.learn_model_error import NothingLearned
-from analysis.diagnosis.result.contrast_findings import NOT_COMPARED, with_contrast
+from analysis.diagnosis.result.contrast_findings import NOT_COMPARED, add_contrast
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 
 
@@ -38,7 +38,7 @@ def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_
         raise NothingLearned("they were measured otherwise")
 
     for asks in (engine, learn_clean_floor):
-        monkeypatch.setattr(asks, "learned_from", teaches_nothing)
+        monkeypatch.setattr(asks, "learn_model_error", teaches_nothing)
     clean = rig.recording(1)
     settings = DiagnosisSettings(without=rig.UNDONE, clean=(clean,))
     faulty = rig.recording(2, "coulomb_friction", 0.6)
@@ -48,6 +48,6 @@ def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_
     assert found.diagnosis.candidates
     assert not found.diagnosis.effects
     assert not {NOT_COMPARED, OUT_OF_TIME} & set(found.remarks)
-    assert NOT_COMPARED in with_contrast(found, Contrast(None, None, None, None), faulty, 5.0).remarks
+    assert NOT_COMPARED in add_contrast(found, Contrast(None, None, None, None), faulty, 5.0).remarks
     part = contrast_of([faulty], [clean], frozenset(), lambda: False)
-    assert OUT_OF_TIME in with_contrast(found, part, faulty, 5.0).remarks
+    assert OUT_OF_TIME in add_contrast(found, part, faulty, 5.0).remarks

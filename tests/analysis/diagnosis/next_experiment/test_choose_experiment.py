@@ -9,7 +9,7 @@ from analysis.diagnosis.data.carried_weight import add_mass
 from analysis.diagnosis.errors.hypothesis import Claim, claimed
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.next_experiment.choose_experiment import Bench, as_document, foresee
+from analysis.diagnosis.next_experiment.choose_experiment import Bench, as_document, predict_gains
 from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
 from analysis.diagnosis.settings import TELLING_GAIN
 from equalizer.effects.catalogue import EFFECTS
@@ -46,7 +46,7 @@ def known_of(bench, fitted, numbers=0.0):
 
 def foreseen(bench, named, rival, numbers=0.0):
     menu = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
-    return foresee(bench, named, rival, known_of(bench, rival, numbers), menu)
+    return predict_gains(bench, named, rival, known_of(bench, rival, numbers), menu)
 
 
 @pytest.mark.parametrize("rate_hz", [0.5, 1.74, 20.0, 400.0, 20_000.0])
@@ -124,7 +124,7 @@ def test_a_weight_strapped_on_tells_what_no_louder_sweep_can():
     bench, named, rival = mass_or_gain(LOOSE)
     menu = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
     size = len(bench.tuning.names) + 1
-    first, *others = foresee(bench, named, rival, np.diag([1e9] * size), menu)
+    first, *others = predict_gains(bench, named, rival, np.diag([1e9] * size), menu)
     assert "strapped to the handle" in first.experiment.words
     assert first.gain > TELLING_GAIN
     assert all(other.gain < first.gain / 3 for other in others)
@@ -156,6 +156,6 @@ def test_a_cheap_recording_that_tells_too_little_stands_behind_a_dear_one_that_t
     sweep, *_, weight = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
     known = np.diag([1e9] * (len(bench.tuning.names) + 1))
     dear = replace(weight, minutes=1e6)
-    first, second = foresee(bench, named, rival, known, (replace(sweep, commands=sweep.commands / 50), dear))
+    first, second = predict_gains(bench, named, rival, known, (replace(sweep, commands=sweep.commands / 50), dear))
     assert first.experiment is dear
     assert second.gain < TELLING_GAIN < first.gain

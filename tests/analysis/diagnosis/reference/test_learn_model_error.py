@@ -8,7 +8,12 @@ import pytest
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
-from analysis.diagnosis.reference.learn_model_error import NothingLearned, learned_from, learned_sentence, require_alike
+from analysis.diagnosis.reference.learn_model_error import (
+    NothingLearned,
+    learn_model_error,
+    learned_sentence,
+    require_alike,
+)
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
 
@@ -66,7 +71,7 @@ def test_a_hum_below_what_a_sound_device_differs_by_is_named(diagnosed, clean):
     without = tuple(name for name in BY_NAME if name not in (*AMONG, "mains_hum"))
     for seed in (6, 7):
         sound = diagnosed.recorded(1, (LAG,), seed=seed)
-        left = learned_from(clean, diagnosed.device(1), (sound,), map, quiet).floor.channels[0]
+        left = learn_model_error(clean, diagnosed.device(1), (sound,), map, quiet).floor.channels[0]
         tone = 0.4 * left * sound.response.samples.std() * np.sqrt(2)
         hum = PlacedEffect(BY_NAME["mains_hum"], (0,), {"amplitude": tone, "frequency": 50.02, "phase": 0.3})
         humming = diagnosed.recorded(1, (LAG, hum), seed=seed)
@@ -77,7 +82,7 @@ def test_a_hum_below_what_a_sound_device_differs_by_is_named(diagnosed, clean):
 
 
 def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, clean):
-    learned = learned_from(clean, diagnosed.device(1), (diagnosed.recorded(1, (LAG,), seed=4),), map, quiet)
+    learned = learn_model_error(clean, diagnosed.device(1), (diagnosed.recorded(1, (LAG,), seed=4),), map, quiet)
     lag, rubbing = (claimed(Claim(placed.effect, "one", (0,)), [{**placed.values}]) for placed in (LAG, RUBBING))
     assert learned.references.gained(lag).mean() > 0.2
     assert learned.references.gained(rubbing).mean() < 0.01
@@ -86,7 +91,7 @@ def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, cl
 
 def test_a_device_that_is_its_model_teaches_next_to_nothing(diagnosed):
     sound, other = (diagnosed.recorded(1, (), seed=seed) for seed in (11, 12))
-    floor = learned_from((sound,), diagnosed.device(1), (other,), map, quiet).floor
+    floor = learn_model_error((sound,), diagnosed.device(1), (other,), map, quiet).floor
     assert max(floor.channels) < 0.01
     assert (floor.error, floor.recordings, floor.beyond) == ("free simulation", 1, 2.0)
 
@@ -97,7 +102,7 @@ def test_the_shares_of_a_channel_are_those_of_the_mismatch(diagnosed):
     samples = sound.response.samples.copy()
     samples[::3] *= 1.03
     odd = replace(sound, response=replace(sound.response, samples=samples))
-    learned = learned_from((odd,), diagnosed.device(1), (sound,), map, quiet)
+    learned = learn_model_error((odd,), diagnosed.device(1), (sound,), map, quiet)
     # A third of the samples; the model takes the mean of it, a hundredth, on itself.
     assert learned.floor.channels[0] == pytest.approx(0.03 * np.sqrt(1 / 3 * 2 / 3), rel=0.35)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.reference.model_free_faults import seen_directly
+from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -31,7 +31,7 @@ def spoiled(given: Recording, change) -> Recording:
 
 
 def seen(new: Recording, clean: Recording, known=CATALOGUE):
-    found = seen_directly([new], [clean], known)
+    found = find_sensor_faults([new], [clean], known)
     return [(each.key[0][0], each.key[0][1], each.placed()[0].values) for each in found]
 
 

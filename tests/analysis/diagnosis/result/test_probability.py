@@ -2,7 +2,7 @@
 
 import pytest
 
-from analysis.diagnosis.result.named_effects import elsewhere, probabilities
+from analysis.diagnosis.result.named_effects import probabilities, probability_of_none
 from analysis.diagnosis.settings import ELSEWHERE_LEAST, ELSEWHERE_MOST
 
 
@@ -41,4 +41,4 @@ def test_the_more_an_explanation_leaves_the_less_likely_is_what_it_names(standin
     chances = [probabilities([standing_at(left, "force_gain")], left)[0] for left in (1.0, 1.05, 1.2, 2.0, 20.0)]
     assert chances == sorted(chances, reverse=True)
     assert chances[1] > 0.9 and chances[-1] < 0.25
-    assert ELSEWHERE_LEAST == elsewhere(0.9) < elsewhere(1e6) <= ELSEWHERE_MOST
+    assert ELSEWHERE_LEAST == probability_of_none(0.9) < probability_of_none(1e6) <= ELSEWHERE_MOST

@@ -8,7 +8,7 @@ from analysis.diagnosis.balance.motion import motions_of
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
-from analysis.diagnosis.result.candidates import reached_of, with_balances
+from analysis.diagnosis.result.candidates import balance_errors, with_balances
 from analysis.diagnosis.result.state_maps import NOT_CONFIRMED, state_maps
 from analysis.diagnosis.search.time_budget import always
 from analysis.figures.diagnosis_state_maps import state_map_pictures
@@ -90,7 +90,7 @@ def test_what_nothing_completes_has_no_second_course():
 
 def test_how_far_names_reach_is_measured_on_held_out_blocks(with_friction):
     balance, _, recording = with_friction
-    (reached,) = reached_of(NOTHING, (balance,), recording.command.channels)
+    (reached,) = balance_errors(NOTHING, (balance,), recording.command.channels)
     assert reached.named == pytest.approx(reached.linear)
     assert reached.share == pytest.approx(0.0, abs=1e-6)
     assert reached.ceiling < 0.3 * reached.linear

@@ -1,4 +1,4 @@
-"""The next recording for a finished search whose data could not tell two effects apart."""
+"""Proposes the next recording for a finished search whose data could not tell two effects apart."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.diagnosis.document import NextExperiment
 from analysis.diagnosis.errors.output_error import fitting, own_columns
-from analysis.diagnosis.next_experiment.choose_experiment import Bench, Foreseen, as_document, foresee
+from analysis.diagnosis.next_experiment.choose_experiment import Bench, PredictedGain, as_document, predict_gains
 from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
@@ -17,13 +17,13 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
-    """For two that the data hold alike."""
+    """The menu's predicted gains for two rivals that the data do not tell apart."""
 
     names: tuple[str, str]
     axis: int
     level: float
     """With which the menu was made."""
-    foreseen: tuple[Foreseen, ...]
+    foreseen: tuple[PredictedGain, ...]
     """All of the menu, the best first."""
 
     @property
@@ -32,12 +32,12 @@ class Proposal:
         return as_document(self.foreseen[0], self.names)
 
 
-def proposed_experiment(context: SearchContext, found: Explanation) -> Proposal | None:
+def propose_experiment(context: SearchContext, found: Explanation) -> Proposal | None:
     """For the first pair of rivals that some recording would tell apart, else for the last pair; None where no rival
     is as good as what is named."""
     proposal = None
     for fitted_candidates in found.rounds[: len(found.steps)]:
-        rival = _rival(fitted_candidates)
+        rival = _best_rival(fitted_candidates)
         if rival is None:
             continue
         named, other = fitted_candidates[0].fitted, rival.fitted
@@ -49,15 +49,15 @@ def proposed_experiment(context: SearchContext, found: Explanation) -> Proposal 
         rate_hz = record.recording.sample_rate_hz
         bench = Bench(context.tuning, rate_hz, record.recording.hold, context.measure.noise)
         menu = experiment_menu(context.tuning.model, rate_hz, axis, level)
-        foreseen = foresee(bench, named, other, _known(context, rival), menu)
+        foreseen = predict_gains(bench, named, other, _recorded_information(context, rival), menu)
         proposal = Proposal((claims[0].effect.name, claims[1].effect.name), axis, level, foreseen)
         if proposal.document is not None:
             break
     return proposal
 
 
-def _rival(fitted_candidates: tuple[FittedCandidate, ...]) -> FittedCandidate | None:
-    """The best of those that the answer holds beside the named effect."""
+def _best_rival(fitted_candidates: tuple[FittedCandidate, ...]) -> FittedCandidate | None:
+    """The best rival that the data do not tell from the named effect."""
     best = fitted_candidates[0]
     name = best.newest
     for other in fitted_candidates[1:]:
@@ -66,8 +66,8 @@ def _rival(fitted_candidates: tuple[FittedCandidate, ...]) -> FittedCandidate | 
     return None
 
 
-def _known(context: SearchContext, candidate: FittedCandidate) -> FloatArray:
-    """What has been recorded so far says of a candidate's numbers: the information matrix, with the calibration."""
+def _recorded_information(context: SearchContext, candidate: FittedCandidate) -> FloatArray:
+    """Information matrix of a candidate's numbers from what has been recorded, calibration included."""
     fitted = candidate.fitted
     own = own_columns(context.measure, context.tuning, fitted, fitting(context.measure, fitted.residuals))
     columns = np.vstack([sensitivity_at(context, fitted.deviations, fitted.hypothesis).columns, own])
