@@ -11,7 +11,7 @@ from study.cli.results import JsonOption
 from study.cli.screen import columns
 
 if TYPE_CHECKING:
-    from study.workflows.planning.plan_study import PlannedStudy
+    from study.workflows.views.plan_study import PlannedStudy
 
 
 def study_plan(
@@ -28,7 +28,7 @@ def study_plan(
 
     Planned is what analysis.participants of the protocol declares.
     """
-    from study.workflows.planning.plan_study import document, planned_studies
+    from study.workflows.views.plan_study import document, planned_studies
 
     studies = planned_studies(data, protocol, simulated)
     if as_json:
@@ -41,7 +41,7 @@ def study_plan(
 
 def _shown(study: "PlannedStudy", width: int | None) -> Iterator[str]:
     from study.tui.text_rows import aligned, hanging
-    from study.workflows.planning.plan_study import lines, order_words
+    from study.workflows.views.plan_study import lines, order_words
 
     for line in lines(study):
         yield from hanging(line, 2, width)

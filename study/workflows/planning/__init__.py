@@ -1,1 +1,1 @@
-"""Planning a study: its size before the first participant (`simulate_power`), and who comes next (`plan_study`)."""
+"""Planning a study: its size before the first participant (`simulate_power`). Who comes next: `views.plan_study`."""

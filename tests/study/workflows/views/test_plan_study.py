@@ -9,9 +9,9 @@ from protocols.document.dumping import dump_protocol
 from study.errors import WrongUseError
 from study.session.views.views import Unanswered
 from study.store.sessions.archive import find_session
-from study.workflows.planning.plan_study import document, lines, planned_studies
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
+from study.workflows.views.plan_study import document, lines, planned_studies
 
 
 @pytest.fixture
