@@ -16,7 +16,7 @@ from study.evaluation.challenge.bench import Bench, draw_bench
 from study.evaluation.challenge.device import Device, record
 from study.evaluation.challenge.draw_case import DECOYS, EFFECTS
 from study.evaluation.challenge.drive_plan import LEVELS_N, RATE_HZ
-from study.evaluation.challenge.nominal import as_model, calibrated
+from study.evaluation.challenge.nominal import as_model, draw_calibration
 
 PERIOD, PERIODS, REST = 1000, 3, 300
 LAST_LINE = 200
@@ -44,7 +44,7 @@ def short_case(
         device = (EFFECTS | DECOYS)[name].build(device, axis, values)
     commands, segments = _drive(random, axes)
     response, position = record(device, played(commands), random)
-    known, tolerance = calibrated(bench, random)
+    known, tolerance = draw_calibration(bench, random)
     return ShortCase(_recording(commands, response, position, axes, segments), _model(known, tolerance, axes))
 
 

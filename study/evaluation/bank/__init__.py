@@ -1,6 +1,7 @@
-"""A bank of concealed faults: sealed, answered by processes that know nothing, revealed, scored.
+"""A proof bank: concealed faults are sealed, diagnosed by separate processes without access to the truth, revealed and
+scored.
 
-`seal_cases` (`write_cases`, `proof_folder`, `proof_seals`) -> `ask_engine` (starts `answer_cases` in processes of their
-own), `follow_up`, `run_controls` -> `sealed_bank` (answers, seals and labels, of laws too) -> `proof_summary`,
-`write_proof`. Begin at `prove.py`.
+`seal_cases` (`write_cases`, `proof_folder`, `proof_seals`) -> `ask_engine` (starts `answer_cases` in separate
+processes), `follow_up`, `run_controls` -> `sealed_bank` (checks seals, pairs answers with labels; also for laws) ->
+`proof_summary`, `write_proof`. Begin at `prove.py`.
 """

@@ -1,7 +1,8 @@
-"""The diagnosis of a bank in a process of its own: `python -m study.evaluation.bank.answer_cases FOLDER`.
+"""Worker process that diagnoses the cases of a bank: `python -m study.evaluation.bank.answer_cases FOLDER`.
 
-It is given the folder of open cases and nothing else, reads a case's name per line, and says the name again once
-answer.json lies in the case's folder. It cannot import what the cases were made with, and opens no file beside them.
+It gets only the folder of open cases. It reads one case name per line on standard input, writes answer.json into the
+case's folder, and prints the name when that is done. An audit hook stops it from importing the code that made the cases
+and from opening files outside the folder.
 """
 
 import hashlib
@@ -27,10 +28,11 @@ from study.store.disk.text_file import read_text, write_text
 APART = "study.evaluation.challenge"
 OPENED = ("open", "os.listdir", "os.scandir", "os.chdir", "os.rename", "os.link", "os.symlink", "shutil.copyfile")
 STARTED = ("subprocess.Popen", "os.exec", "os.posix_spawn", "os.spawn", "os.system", "os.fork", "os.forkpty")
-"""Events of Python's audit. Library code of C opens files without them (HDF5): it is handed paths of this module's."""
+"""Audit events of Python. HDF5 opens files in C without such events; it only gets paths that this module built."""
 
 
 def main(arguments: list[str]) -> None:
+    """Read case names from standard input until it ends; answer each and print its name."""
     cases = Path(arguments[0]).resolve()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; the parent ends us
     stay_apart(cases)
@@ -42,8 +44,8 @@ def main(arguments: list[str]) -> None:
 
 
 def stay_apart(cases: Path) -> None:
-    """From here on, what made the cases cannot be loaded or read, no file or folder beside them can be opened or
-    listed by Python, and no other program can be started."""
+    """Install an audit hook: from here on this process cannot import the challenge, open or list any path beside
+    `cases`, or start a program."""
     sys.modules[APART] = cast(ModuleType, None)
     beside, inside = os.path.realpath(cases.parent), os.path.realpath(cases)
     maker = os.path.realpath(Path(study.__path__[0]).joinpath(*APART.split(".")[1:]))
@@ -64,16 +66,17 @@ def stay_apart(cases: Path) -> None:
 
 
 def others_sha256(place: Path) -> dict[str, str]:
-    """Of all further recordings that a case has, by their names in its folder."""
+    """SHA-256 of every further recording of a case, by its path relative to the case folder."""
     paths = [path for path in sorted(place.rglob("*.h5")) if path != place / RECORDING]
     return {str(path.relative_to(place)): sha256_of(path) for path in paths}
 
 
 def answer(place: Path, digest: str) -> None:
-    """Writes answer.json, whole or not at all. What breaks the diagnosis is an answer, too: a wrong one."""
+    """Diagnose the case in `place` and write answer.json atomically. A crash of the diagnosis is written as a failed
+    answer."""
     began, worked = time.perf_counter(), time.process_time()
     try:
-        said = _diagnosed(place)
+        said = _diagnose_case(place)
     except Exception:  # noqa: BLE001 - the bank goes on, and the score counts it
         said = {"failed": traceback.format_exc()}
     said |= {
@@ -90,12 +93,14 @@ def answer(place: Path, digest: str) -> None:
 
 
 def challenge_is_loaded() -> bool:
-    """The name alone stands for nothing: that is how its import is forbidden."""
+    """Whether the challenge package has been imported. A blocked import leaves None in sys.modules, which does not
+    count."""
     return any(name.split(".")[:2] == APART.split(".") for name, var in vars(sys)["modules"].items() if var is not None)
 
 
 def engine_digest() -> str:
-    """Of all code that an answer hangs on."""
+    """Hash of the source code on which an answer depends: first 16 hex digits of SHA-256 over `analysis.diagnosis`
+    and `equalizer`."""
     digest = hashlib.sha256()
     for package in (analysis.diagnosis, equalizer):
         root = Path(package.__path__[0])
@@ -105,12 +110,12 @@ def engine_digest() -> str:
 
 
 def _time_budget(processor_s: float | None) -> Callable[[], bool]:
-    """Of processor time: what else the machine does at the time changes no answer."""
+    """Whether processor time is left. Processor time, so that the load of the machine does not change an answer."""
     begun = time.process_time()
     return lambda: processor_s is None or time.process_time() - begun < processor_s
 
 
-def _diagnosed(place: Path) -> dict[str, Any]:
+def _diagnose_case(place: Path) -> dict[str, Any]:
     from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
     from analysis.diagnosis.document import diagnosis_to_json
     from study.store.formats.mechanical_model_file import read_mechanical_model

@@ -1,4 +1,4 @@
-"""A bank's open cases, answered by processes that know nothing else: one per core, each for many cases."""
+"""Run the diagnosis of a bank's open cases in worker processes, one per core, each for many cases."""
 
 import json
 import subprocess
@@ -11,18 +11,19 @@ from queue import Empty, SimpleQueue
 
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import ANSWER, DIED, RECORDING, ProofFolder
-from study.evaluation.bank.proof_seals import answer_at
+from study.evaluation.bank.proof_seals import read_answer
 from study.store.disk.text_file import write_text
 
 PATIENCE_S = 1200.0
-"""For one case; it takes seconds to a minute."""
+"""Longest wait for one case (s); a case takes seconds to a minute."""
 GLANCE_S = 0.5
+"""How often the calling thread checks that workers still run (s)."""
 TRIES = 2
-"""A process that died may have been killed from outside."""
+"""Attempts per case: a process that died may have been killed from outside."""
 
 
 class Engine:
-    """One process, begun when it is first asked, and anew when it died."""
+    """One worker process, started on the first request and restarted after it died."""
 
     def __init__(self, folder: ProofFolder) -> None:
         self._folder = folder
@@ -31,13 +32,13 @@ class Engine:
         self.ended = False
 
     def ask(self, name: str) -> bool:
-        """Whether an answer came; blocks until then."""
+        """Send one case name and block until its answer; False if the process failed, timed out or was ended."""
         with self._beginning:
             if self.ended:
                 return False
             if self._process is None or self._process.poll() is not None:
                 self.close()
-                self._process = self._begun()
+                self._process = self._start_process()
             process = self._process
         impatience = threading.Timer(PATIENCE_S, process.kill)
         impatience.daemon = True
@@ -54,7 +55,7 @@ class Engine:
             impatience.cancel()
 
     def end(self) -> None:
-        """For good: a caller that is waiting at this moment gets no answer."""
+        """Kill the process permanently; a caller that is waiting gets False."""
         with self._beginning:
             self.ended = True
             if self._process is not None:
@@ -62,12 +63,13 @@ class Engine:
                 self._process.wait()
 
     def close(self) -> None:
+        """Close the pipes of the process."""
         for pipe in () if self._process is None else (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 with suppress(OSError):
                     pipe.close()
 
-    def _begun(self) -> subprocess.Popen[str]:
+    def _start_process(self) -> subprocess.Popen[str]:
         with self._folder.log.open("a", encoding="utf-8") as log:
             return subprocess.Popen(
                 [sys.executable, "-m", "study.evaluation.bank.answer_cases", str(self._folder.open)],
@@ -79,7 +81,8 @@ class Engine:
 
 
 def ask_engine(folder: ProofFolder, names: Sequence[str], workers: int, on_answered: Callable[[str], None]) -> None:
-    """Blocks until all cases without an answer have one; `on_answered(name)` as they come, in this thread."""
+    """Diagnose all cases that have no answer yet; blocks until done. `on_answered(name)` is called in this thread
+    after each. Raises StudyError if all worker processes ended early."""
     left, answered = SimpleQueue[str](), SimpleQueue[str]()
     wanted = [name for name in names if not is_answered(folder.open / name)]
     for name in wanted:
@@ -91,7 +94,7 @@ def ask_engine(folder: ProofFolder, names: Sequence[str], workers: int, on_answe
                 name = answered.get(timeout=GLANCE_S)
             except Empty:
                 if not any(thread.is_alive() for thread in threads) and answered.empty():
-                    raise _ended(folder, missing) from None
+                    raise _processes_ended_error(folder, missing) from None
                 continue
             missing -= 1
             on_answered(name)
@@ -126,11 +129,11 @@ def _work(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered:
         if not any(engine.ask(name) for _ in range(TRIES)):
             if engine.ended:
                 return
-            _given_up(folder.open / name)
+            _write_failure(folder.open / name)
         answered.put(name)
 
 
-def _ended(folder: ProofFolder, missing: int) -> StudyError:
+def _processes_ended_error(folder: ProofFolder, missing: int) -> StudyError:
     return StudyError(
         "The processes of the diagnosis ended before their work was done",
         f"{missing} cases are without an answer; what they said last is in {folder.log}.",
@@ -140,18 +143,20 @@ def _ended(folder: ProofFolder, missing: int) -> StudyError:
 
 
 def is_answered(place: Path) -> bool:
-    """A process that died may have been killed: its case is asked again when the bank goes on."""
-    return (place / ANSWER).exists() and DIED not in answer_at(place)
+    """Whether the case has an answer. A dead process does not count (it may have been killed): the case is asked
+    again on the next run."""
+    return (place / ANSWER).exists() and DIED not in read_answer(place)
 
 
-def _given_up(place: Path) -> None:
+def _write_failure(place: Path) -> None:
     how = f"the process died {TRIES} times, or took longer than {PATIENCE_S:g} s"
     said = {"name": place.name, "failed": how, DIED: True}
     write_text(place / ANSWER, json.dumps(said, indent=1) + "\n", overwrite=True)
 
 
 def forget_recording(place: Path) -> None:
-    """Megabytes each; the label keeps their hash, and the seed gives them again. Kept where no answer came."""
+    """Delete the recording of an answered case to save disk space; the label keeps its hash, and the seed can draw
+    it again."""
     if is_answered(place):
         with suppress(OSError):
             (place / RECORDING).unlink(missing_ok=True)

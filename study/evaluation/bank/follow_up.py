@@ -1,7 +1,7 @@
-"""Starts that left several names, taken up again.
+"""Follow-up experiments for cases whose diagnosis returned several effects that the data could not separate.
 
-The device, which is still sealed, plays the recording that the diagnosis asks for, and another of the same menu that
-was drawn; processes that know nothing answer both.
+The sealed device plays the experiment that the diagnosis proposed and, for comparison, one drawn at random from the
+same menu. Separate processes diagnose both.
 """
 
 import json
@@ -18,9 +18,9 @@ from analysis.evaluation.proof.follow_up import FollowUp
 from analysis.evaluation.proof.outcome import Outcome
 from study.evaluation.bank.answer_cases import others_sha256
 from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
-from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder, opened
-from study.evaluation.bank.proof_seals import answer_at, broken_seal, is_of, label_at, seal
-from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redrawn
+from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
+from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redraw_recording
 from study.evaluation.challenge.drive_plan import RATE_HZ
 from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import read_text, write_text
@@ -28,7 +28,7 @@ from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import write_recording
 
 NEXT = "next"
-"""Folder of these cases: a bank of its own, whose labels say which start they take up."""
+"""Folder of the follow-up cases: a bank of its own, whose labels name the case they follow."""
 FURTHER = "recording_2.h5"
 PROPOSED, DRAWN = "proposed", "drawn"
 NOISE_SEED = 7
@@ -41,20 +41,21 @@ def follow_up(
     wishes: tuple[int, bool],
     on_done: Callable[[int, int], None],
 ) -> tuple[FollowUp, ...]:
-    """Of single effects. wishes: how many processes, and whether recordings stay once they are answered. Interrupted,
-    the same call goes on. Raises StudyError."""
+    """Follow up single-effect cases with several returned effects. wishes: number of processes, and whether
+    recordings are kept after they are answered. Resumable: after an interruption the same call continues. Raises
+    StudyError."""
     workers, keep = wishes
     starts = [
         outcome for outcome in outcomes if outcome.kind == "single" and len(outcome.returned) > len(outcome.named) > 0
     ]
     if not starts:
         return ()
-    again = opened(folder.path / NEXT, plan.seed, plan.brief)
+    again = open_proof_folder(folder.path / NEXT, plan.seed, plan.brief)
     for start in starts:
         if not again.label(start.number).exists():
             _seal(folder, again, plan, start)
     seal(again)
-    labels = [label_at(again.label(each.number)) for each in starts]
+    labels = [read_label(again.label(each.number)) for each in starts]
     names = [label[which]["name"] for label in labels for which in (PROPOSED, DRAWN) if which in label]
     done = sum(is_answered(again.open / name) for name in names)
     on_done(done, len(names))
@@ -72,29 +73,31 @@ def follow_up(
 
 
 def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcome) -> None:
-    """Both cases of a start; the label comes last."""
-    first = label_at(folder.label(start.number))
+    """Write both follow-up cases of `start`; the label is written last, so that a missing label means an unfinished
+    case."""
+    first = read_label(folder.label(start.number))
     place = folder.open / first["name"]
-    proposal = answer_at(place).get("proposal")
+    proposal = read_answer(place).get("proposal")
     label: dict[str, Any] = {"number": start.number, "salt": secrets.token_hex(SALT_BYTES)}
     if proposal is not None:
         model = read_mechanical_model(place / MODEL)
         menu = experiment_menu(model, RATE_HZ, proposal["axis"], proposal["level"])
         drawn = menu[int(np.random.default_rng([plan.seed, start.number, NOISE_SEED]).integers(len(menu)))]
         wanted = [(DRAWN, drawn), *((PROPOSED, each) for each in menu if each.words == proposal["best"])]
-        label |= {which: _written(again, plan, (first, place), experiment) for which, experiment in wanted}
+        label |= {which: _write_case(again, plan, (first, place), experiment) for which, experiment in wanted}
     write_text(again.label(start.number), json.dumps(label, indent=1) + "\n")
 
 
-def _written(
+def _write_case(
     again: ProofFolder, plan: BankPlan, start: tuple[dict[str, Any], Path], experiment: Experiment
 ) -> dict[str, Any]:
-    """The label's part. The first recording is drawn again, and must be the one that was answered."""
+    """Write one follow-up case and return its part of the label. The first recording is drawn again and must equal
+    the one that was answered."""
     label, first = start
     name = secrets.token_hex(6)
     place = again.open / name
     place.mkdir()
-    case = redrawn(place, plan, label)
+    case = redraw_recording(place, plan, label)
     further = case.again(experiment.commands, experiment.kind, experiment.added, NOISE_SEED)
     write_recording(place / FURTHER, further, precision="float32")
     for kept in (MODEL, SETTINGS):
@@ -112,9 +115,9 @@ def _found(again: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowU
     def said(which: str) -> tuple[str, tuple[str, ...]]:
         if which not in label:
             return "", ()
-        answer = answer_at(again.open / label[which]["name"])
-        if not is_of(label[which], answer):
-            raise broken_seal([label[which]["name"]], again.path)
+        answer = read_answer(again.open / label[which]["name"])
+        if not answers_sealed_case(label[which], answer):
+            raise broken_seal_error([label[which]["name"]], again.path)
         returned = () if "failed" in answer else diagnosis_from_json(answer["diagnosis"]).returned_set
         return label[which]["words"], returned
 

@@ -1,4 +1,4 @@
-"""The folder of a proof: what the diagnosis is given, what is sealed beside it, and what comes out."""
+"""Folder layout of a proof: open inputs of the diagnosis, sealed truths, results."""
 
 import json
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from study.store.disk.text_file import read_text, write_text
 
 @dataclass(frozen=True, slots=True)
 class ProofFolder:
-    """bank.json: which bank. open: one folder per case, all that the diagnosis is given. sealed: the truths, one file
-    each. labels.sha256: their hashes, as `sha256sum --check` reads them."""
+    """bank.json: settings of the bank. open: one folder per case with everything that the diagnosis gets. sealed:
+    the truths, one file each. labels.sha256: their hashes in the format of `sha256sum --check`."""
 
     path: Path
 
@@ -39,15 +39,16 @@ class ProofFolder:
 RECORDING, MODEL, SETTINGS, ANSWER = "recording.h5", "model.toml", "settings.json", "answer.json"
 """In a case's folder under `open`; the last is what the diagnosis adds."""
 DIED = "died"
-"""Key of an answer that no process gave."""
+"""Key in an answer that was written because the worker process died."""
 CLEAN = "clean"
-"""A folder beside them, where the case has recordings of the device when it was in order."""
+"""Sub-folder of a case with reference recordings of the intact device, where it has any."""
 
 
-def opened(path: Path, seed: int, brief: bool, of: str = "") -> ProofFolder:
-    """Made, or the one that is there already, to go on. of: what is concealed, where it is no effect of the catalogue.
+def open_proof_folder(path: Path, seed: int, brief: bool, of: str = "") -> ProofFolder:
+    """Create the folder of a bank, or open the existing one to continue. of: what is concealed, if not effects of the
+    catalogue.
 
-    Raises StudyError where it holds something else.
+    Raises StudyError where the folder holds something else or a bank with other settings.
     """
     folder, said = ProofFolder(path), path / "bank.json"
     bank = {"format": "hapteq-bank", "version": 1, "seed": seed, "brief": brief, **({"of": of} if of else {})}

@@ -1,4 +1,4 @@
-"""The seals of a proof: every label's hash, written before anything is answered, and compared ever after."""
+"""Seals of a proof: the hash of every label is written before anything is answered and compared at every later step."""
 
 import hashlib
 from pathlib import Path
@@ -13,17 +13,18 @@ from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 
 HASHED = ("recording_sha256", "model_sha256", "others_sha256")
-"""In a label, and again in the answer: what was sealed is what was answered."""
+"""Keys that appear in the label and in the answer: what was sealed is what was answered."""
 
 
 def seal(folder: ProofFolder) -> str:
-    """Adds the hashes of new labels to labels.sha256; those that are there must hold. Returns the file's SHA-256.
+    """Append the hashes of new labels to labels.sha256 after checking the existing ones. Returns the SHA-256 of that
+    file.
 
-    Raises StudyError where a label is not what was sealed.
+    Raises StudyError where a label has changed since it was sealed.
     """
-    known = seals_of(folder)
+    known = read_seals(folder)
     if broken := [name for name, digest in known.items() if _digest(folder.path / name) != digest]:
-        raise broken_seal(broken, folder.path)
+        raise broken_seal_error(broken, folder.path)
     fresh = [path for path in sorted(folder.sealed.glob("*.json")) if f"sealed/{path.name}" not in known]
     lines = [f"{digest}  {name}\n" for name, digest in known.items()]
     lines += [f"{sha256_of(path)}  sealed/{path.name}\n" for path in fresh]
@@ -32,23 +33,23 @@ def seal(folder: ProofFolder) -> str:
     return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
-def seals_of(folder: ProofFolder) -> dict[str, str]:
-    """Digests by name; none where nothing is sealed yet. Raises StudyError for a file that is not of this kind."""
+def read_seals(folder: ProofFolder) -> dict[str, str]:
+    """SHA-256 by file name; empty if nothing is sealed yet. Raises StudyError for a malformed file."""
     if not folder.seals.exists():
         return {}
     parts = [line.split() for line in read_text(folder.seals).splitlines()]
     if any(len(each) != 2 or len(each[0]) != 64 for each in parts):
-        raise broken_seal([folder.seals.name], folder.path)
+        raise broken_seal_error([folder.seals.name], folder.path)
     return {name: digest for digest, name in parts}
 
 
-def label_at(path: Path) -> dict[str, Any]:
-    """Raises StudyError."""
+def read_label(path: Path) -> dict[str, Any]:
+    """The sealed label at `path`, parsed. Raises StudyError."""
     return parse_json(path, read_text(path), "sealed label")
 
 
-def answer_at(place: Path) -> dict[str, Any]:
-    """An error that is not known is NaN there. Raises StudyError."""
+def read_answer(place: Path) -> dict[str, Any]:
+    """The answer.json in `place`, parsed; an unknown error is NaN. Raises StudyError."""
     try:
         said = load_json(read_text(place / ANSWER), with_nan=True)
     except ValueError as problem:
@@ -58,9 +59,9 @@ def answer_at(place: Path) -> dict[str, Any]:
     return said
 
 
-def is_of(label: dict[str, Any], said: dict[str, Any]) -> bool:
-    """Whether an answer is to the files that were sealed, by a process that knew nothing of the challenge. A process
-    that died read nothing that it could tell of."""
+def answers_sealed_case(label: dict[str, Any], said: dict[str, Any]) -> bool:
+    """Whether an answer belongs to the sealed files and comes from a process that had not imported the challenge.
+    True for an answer of a process that died: it contains nothing."""
     if DIED in said:
         return True
     return said.get("knows_the_challenge") is False and all(
@@ -68,7 +69,8 @@ def is_of(label: dict[str, Any], said: dict[str, Any]) -> bool:
     )
 
 
-def broken_seal(names: list[str], path: Path) -> StudyError:
+def broken_seal_error(names: list[str], path: Path) -> StudyError:
+    """The error for cases whose files are not what was sealed."""
     return StudyError(
         "A seal is broken",
         f"Of {len(names)} cases ({', '.join(names[:5])}) in {path} the label, the recording or the model is not what "

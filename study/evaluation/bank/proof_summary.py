@@ -1,4 +1,4 @@
-"""What a proof amounts to, for the terminal: misses first."""
+"""Summary of a proof for the terminal, misses first."""
 
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -9,6 +9,7 @@ from study.evaluation.bank.prove import Proof
 
 
 def proof_lines(proof: Proof) -> Iterator[str]:
+    """Figures, misses and controls as terminal lines."""
     score = proof.score
     yield f"{len(score.misses)} misses in {len(proof.outcomes)} cases"
     for miss in score.misses:
@@ -30,7 +31,7 @@ def proof_lines(proof: Proof) -> Iterator[str]:
 
 
 def control_lines(proof: Proof) -> Iterator[str]:
-    """Those that did not hold one by one."""
+    """Result of the controls; failed ones are listed one by one."""
     if proof.controls:
         yield f"{sum(each.held for each in proof.controls)} of {len(proof.controls)} controls held"
     for control in proof.controls:
@@ -39,6 +40,7 @@ def control_lines(proof: Proof) -> Iterator[str]:
 
 
 def remarks(proof: Proof) -> Iterator[str]:
+    """What limits this proof: cases left out, or answers from several versions of the code."""
     if proof.left_out:
         yield (
             f"{proof.left_out} cases of the second physics engine were left out: MuJoCo is not installed "
@@ -51,6 +53,7 @@ def remarks(proof: Proof) -> Iterator[str]:
 
 
 def summary(proof: Proof) -> dict[str, Any]:
+    """The summary as a JSON-serialisable mapping."""
     return {
         "folder": str(proof.folder.path),
         "cases": len(proof.outcomes),

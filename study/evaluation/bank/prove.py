@@ -1,4 +1,4 @@
-"""A bank of concealed physics from start to end: sealed, answered by processes that know nothing, revealed."""
+"""Run a bank of concealed effects: seal, diagnose in separate processes, reveal, score."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,19 +12,20 @@ from analysis.evaluation.proof.outcome import Concealed, Outcome
 from analysis.evaluation.proof.score import Score, score
 from study.evaluation.bank.ask_engine import is_answered
 from study.evaluation.bank.follow_up import NEXT, follow_up
-from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, opened
-from study.evaluation.bank.proof_seals import label_at
+from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.run_controls import run_controls
-from study.evaluation.bank.seal_cases import BankPlan, redrawn, seal_cases, sealed_names, to_draw
+from study.evaluation.bank.seal_cases import BankPlan, drawable_cases, read_case_names, redraw_recording, seal_cases
 from study.evaluation.bank.sealed_bank import Progress, Wishes, answer_bank, engines, resumable, reveal_bank
 
 
 def reveal_cases(folder: ProofFolder, cases: int) -> tuple[Outcome, ...]:
-    """Of the first so many numbers, all that are answered. Raises StudyError where a seal is broken."""
+    """Outcomes of the answered cases among the first `cases` numbers. Raises StudyError where a seal is broken."""
     return reveal_bank(folder, cases, outcome_of)
 
 
 def outcome_of(label: dict[str, Any], said: dict[str, Any]) -> Outcome:
+    """Pair a revealed label with the answer of the diagnosis."""
     concealed = tuple(
         Concealed(each["effect"], each["place"], each["axis"], {**each["values"], **each["unseen"]})
         for each in label["truth"]
@@ -46,7 +47,7 @@ def outcome_of(label: dict[str, Any], said: dict[str, Any]) -> Outcome:
 
 
 CONTROL_TURNS = 3
-"""Each with a seed of its own."""
+"""Repetitions of the controls, each with its own seed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +59,9 @@ class Proof:
     outcomes: tuple[Outcome, ...]
     score: Score
     engines: tuple[str, ...]
-    """Digests of the code that answered the bank,"""
+    """Digests of the code that answered the bank."""
     beside: tuple[str, ...]
-    """and follow-ups and controls."""
+    """Digests of the code that answered follow-ups and controls."""
     controls: tuple[Controlled, ...]
     followed: tuple[FollowUp, ...]
     left_out: int
@@ -68,13 +69,13 @@ class Proof:
 
 
 def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> Proof:
-    """Interrupted, the same call goes on. Raises StudyError."""
-    folder = opened(path, plan.seed, plan.brief)
-    numbers = [each.number for each in to_draw(plan)]
+    """Run or continue the bank in the folder `path`. Resumable. Raises StudyError."""
+    folder = open_proof_folder(path, plan.seed, plan.brief)
+    numbers = [each.number for each in drawable_cases(plan)]
     with resumable(path):
         seal = seal_cases(folder, plan, wishes.workers, lambda done: on_progress("sealing", done, len(numbers)))
-        names = sealed_names(folder, numbers)
-        _answered(folder, plan, wishes, dict(zip(names, numbers, strict=True)), on_progress)
+        names = read_case_names(folder, numbers)
+        _answer_cases(folder, plan, wishes, dict(zip(names, numbers, strict=True)), on_progress)
         outcomes = reveal_cases(folder, plan.cases)
         followed = follow_up(
             folder,
@@ -91,6 +92,7 @@ def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> 
 
 
 def _beside(path: Path) -> tuple[str, ...]:
+    """Digests of the code that answered follow-ups and controls."""
     folders = [ProofFolder(path / NEXT), *(ProofFolder(each) for each in sorted(path.glob("controls/*")))]
     found = {
         digest for folder in folders for digest in engines(folder, [place.name for place in folder.open.glob("*")])
@@ -98,13 +100,13 @@ def _beside(path: Path) -> tuple[str, ...]:
     return tuple(sorted(found))
 
 
-def _answered(
+def _answer_cases(
     folder: ProofFolder, plan: BankPlan, wishes: Wishes, numbers: Mapping[str, int], on_progress: Progress
 ) -> None:
-    """numbers: by the names of the cases."""
+    """Diagnose all open cases; deleted recordings are drawn again first. numbers: case number by case name."""
     for name, number in numbers.items():
         if not is_answered(folder.open / name) and not (folder.open / name / RECORDING).exists():
-            redrawn(folder.open / name, plan, label_at(folder.label(number)))
+            redraw_recording(folder.open / name, plan, read_label(folder.label(number)))
     answer_bank(folder, numbers, tuple(numbers), wishes, on_progress)
 
 

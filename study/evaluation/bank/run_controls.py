@@ -1,4 +1,5 @@
-"""Controls of a diagnosis, asked of the same processes as a bank: files in, answers out, claims checked."""
+"""Controls of a diagnosis: altered inputs with a known expected change of the answer, diagnosed by the same
+processes as a bank."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -9,7 +10,7 @@ from analysis.evaluation.proof.controlled import Controlled, controlled
 from study.errors import StudyError
 from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
-from study.evaluation.bank.proof_seals import answer_at
+from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.challenge.controls import CONTROLS, Asked, Control
 from study.evaluation.challenge.rig import Rig
 from study.store.disk.strict_json import load_json
@@ -28,10 +29,11 @@ def run_controls(
     controls: Sequence[Control] = CONTROLS,
     rig: Rig = SHORT,
 ) -> tuple[Controlled, ...]:
-    """`on_done(answers so far, of all)`. In `path`; interrupted, the same call goes on. Raises StudyError."""
+    """Write, diagnose and judge the controls in the folder `path`. `on_done(answered, total)`. Resumable. Raises
+    StudyError."""
     folder = ProofFolder(path)
     folder.open.mkdir(parents=True, exist_ok=True)
-    names = {control.name: _given(folder, seed, control, rig) for control in controls}
+    names = {control.name: _prepare_control(folder, seed, control, rig) for control in controls}
     every = [name for each in names.values() for name in each]
     done = sum(is_answered(folder.open / name) for name in every)
     on_done(done, len(every))
@@ -51,8 +53,8 @@ def run_controls(
     )
 
 
-def _given(folder: ProofFolder, seed: int, control: Control, rig: Rig) -> tuple[str, ...]:
-    """Writes what is not written yet; the settings come last."""
+def _prepare_control(folder: ProofFolder, seed: int, control: Control, rig: Rig) -> tuple[str, ...]:
+    """Write the inputs of one control if missing and return their case names; the settings file is written last."""
     known = folder.path / f"{control.name.replace(' ', '-')}.json"
     begun = f"{CONTROLS.index(control):02d}"
     if (written := _names(known, begun)) is not None:
@@ -66,7 +68,8 @@ def _given(folder: ProofFolder, seed: int, control: Control, rig: Rig) -> tuple[
 
 
 def _names(known: Path, begun: str) -> tuple[str, ...] | None:
-    """None where they are not written yet, or are not those that this program writes: they are then drawn again."""
+    """Case names of a control; None where they are not written yet or do not match this program: they are then drawn
+    again."""
     try:
         names = load_json(read_text(known))
     except (StudyError, ValueError):
@@ -83,5 +86,5 @@ def _write(place: Path, asked: Asked) -> None:
 
 
 def _said(place: Path) -> Diagnosis | None:
-    answer = answer_at(place)
+    answer = read_answer(place)
     return None if "failed" in answer else diagnosis_from_json(answer["diagnosis"])

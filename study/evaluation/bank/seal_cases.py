@@ -1,4 +1,4 @@
-"""A bank's cases as files: what a diagnosis gets, and apart from it the truth, under a seal that comes first."""
+"""Write a bank's cases as files: open inputs for the diagnosis, and the truth under a seal that is made first."""
 
 import json
 import secrets
@@ -10,7 +10,7 @@ from typing import Any
 
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
-from study.evaluation.bank.proof_seals import label_at, seal
+from study.evaluation.bank.proof_seals import read_label, seal
 from study.evaluation.challenge.draw_bank import Draw, case_of, draw
 from study.evaluation.challenge.draw_case import Case
 from study.evaluation.challenge.second_engine import second_engine
@@ -22,7 +22,7 @@ from study.workflows.worker_processes import worker_processes
 
 
 def truths(case: Case) -> list[dict[str, Any]]:
-    """One entry per effect; empty where the model lacks nothing."""
+    """One entry per concealed effect; empty where the model lacks nothing."""
     return [
         {
             "effect": truth.effect,
@@ -37,7 +37,7 @@ def truths(case: Case) -> list[dict[str, Any]]:
 
 SALT_BYTES = 16
 PROCESSOR_S = 60.0
-"""For the search of one case: what was found until then is its answer."""
+"""Processor time for the search in one case (s); the best result so far is then the answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,16 +48,16 @@ class BankPlan:
     """One axis and short periods: for tests, and for a quick look."""
 
 
-def to_draw(plan: BankPlan) -> tuple[Draw, ...]:
-    """All that can be drawn here: without the second engine its cases are left out."""
+def drawable_cases(plan: BankPlan) -> tuple[Draw, ...]:
+    """All cases that can be drawn on this machine: without MuJoCo its cases are left out."""
     whole = (draw(plan.seed, number, plan.brief) for number in range(plan.cases))
     return tuple(each for each in whole if each.bank != "engine" or second_engine.is_installed())
 
 
 def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
-    """Draws, writes and seals what is not sealed yet, calling `on_sealed(how many are)`. Returns the SHA-256 of
-    labels.sha256, to be kept elsewhere before anything is diagnosed. Raises StudyError."""
-    drawn = to_draw(plan)
+    """Draw, write and seal the missing cases, calling `on_sealed(count)`. Returns the SHA-256 of labels.sha256, to
+    be published before anything is diagnosed. Raises StudyError."""
+    drawn = drawable_cases(plan)
     left = [each for each in drawn if not folder.label(each.number).exists()]
     done = len(drawn) - len(left)
     on_sealed(done)
@@ -70,7 +70,7 @@ def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Cal
 
 
 def seal_one(folder: ProofFolder, each: Draw) -> None:
-    """The label comes last: a case without one is drawn again."""
+    """Write one case; the label is written last, so that a missing label means an unfinished case."""
     name = secrets.token_hex(6)
     case, place = case_of(each, name), folder.open / name
     place.mkdir()
@@ -81,13 +81,13 @@ def seal_one(folder: ProofFolder, each: Draw) -> None:
 
 
 def settings_text(without: Sequence[str], processor_s: float | None = None) -> str:
-    """What a process of the diagnosis is told beside the files: effects that it must not consider, and how long the
-    search may take."""
+    """Settings of a diagnosis as JSON. without: effects that it must not consider; processor_s: limit of the search
+    (s)."""
     return json.dumps({"without": list(without), "processor_s": processor_s}) + "\n"
 
 
-def redrawn(place: Path, plan: BankPlan, label: dict[str, Any]) -> Case:
-    """Writes the recording of a sealed case again. Raises StudyError where it is not the one that was sealed."""
+def redraw_recording(place: Path, plan: BankPlan, label: dict[str, Any]) -> Case:
+    """Draw and write the recording of a sealed case again. Raises StudyError where its hash is not the sealed one."""
     case = case_of(draw(plan.seed, label["number"], plan.brief), label["name"])
     write_recording(place / RECORDING, case.recording, precision="float32", overwrite=True)
     if sha256_of(place / RECORDING) != label["recording_sha256"]:
@@ -101,7 +101,8 @@ def redrawn(place: Path, plan: BankPlan, label: dict[str, Any]) -> Case:
 
 
 def _label(each: Draw, case: Case, place: Path) -> dict[str, Any]:
-    """All that is concealed. The salt keeps a hash from being guessed: there are few effects."""
+    """Everything that is concealed. A random salt keeps the content from being guessed from its hash: there are few
+    effects."""
     drawn = asdict(each)
     return {
         "name": place.name,
@@ -117,7 +118,7 @@ def _label(each: Draw, case: Case, place: Path) -> dict[str, Any]:
     }
 
 
-def sealed_names(folder: ProofFolder, numbers: Sequence[int]) -> tuple[str, ...]:
-    """What the cases are called under `open`, in the order of their numbers."""
-    found = [label_at(folder.label(number)) for number in numbers]
+def read_case_names(folder: ProofFolder, numbers: Sequence[int]) -> tuple[str, ...]:
+    """Folder names of the cases under `open`, in the order of their numbers."""
+    found = [read_label(folder.label(number)) for number in numbers]
     return tuple(str(label["name"]) for label in found)

@@ -1,4 +1,4 @@
-"""What every sealed bank does: its open cases are answered, its seals checked, its labels revealed."""
+"""Steps that all sealed banks share: answer the open cases, check the seals, reveal the labels."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -9,26 +9,34 @@ from typing import Any, TypeVar
 from study.errors import LeftError
 from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import ANSWER, ProofFolder
-from study.evaluation.bank.proof_seals import answer_at, broken_seal, is_of, label_at, seals_of
+from study.evaluation.bank.proof_seals import (
+    answers_sealed_case,
+    broken_seal_error,
+    read_answer,
+    read_label,
+    read_seals,
+)
 from study.store.disk.provenance import sha256_of
 
 Progress = Callable[[str, int, int], None]
-"""What is being done; how many are done, of how many."""
+"""Called with the current step, the number done, the total."""
 Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, slots=True)
 class Wishes:
+    """How a bank is run."""
+
     workers: int = 2
     keep: bool = False
-    """Recordings stay once they are answered."""
+    """Keep recordings after they are answered."""
     controls: bool = False
-    """What must change, or must not, is asked too."""
+    """Also run the controls."""
 
 
 @contextmanager
 def resumable(path: Path) -> Iterator[None]:
-    """Raises LeftError for an interruption: the same call goes on."""
+    """Turn a keyboard interruption into LeftError, which says that the same call continues."""
     try:
         yield
     except KeyboardInterrupt as interruption:
@@ -43,7 +51,7 @@ def resumable(path: Path) -> Iterator[None]:
 def answer_bank(
     folder: ProofFolder, names: Iterable[str], asked: Sequence[str], wishes: Wishes, on_progress: Progress
 ) -> None:
-    """names: of all cases. asked: of those that the engine is handed; it leaves out what is answered."""
+    """Diagnose the cases in `asked` that have no answer. names: all cases, for the progress."""
     every = tuple(names)
     done = sum(is_answered(folder.open / name) for name in every)
     on_progress("diagnosing", done, len(every))
@@ -64,32 +72,33 @@ def reveal_bank(
     outcome_of: Callable[[dict[str, Any], dict[str, Any]], Found],
     is_whole: Callable[[dict[str, Any]], bool] = lambda label: True,
 ) -> tuple[Found, ...]:
-    """Of the first so many numbers, all that are answered. outcome_of: what a label and its answer come to. is_whole:
-    whether what a label seals beside itself is as it was. Raises StudyError where a seal is broken."""
-    seals = seals_of(folder)
+    """Outcomes of the answered cases among the first `cases` numbers. outcome_of: makes an outcome from a label and
+    its answer. is_whole: whether further files under the label's seal are unchanged. Raises StudyError where a seal
+    is broken."""
+    seals = read_seals(folder)
     found: list[Found] = []
     broken: list[str] = []
     for path in sorted(folder.sealed.glob("*.json")):
         if seals.get(f"sealed/{path.name}") != sha256_of(path):
             broken.append(path.name)
             continue
-        label = label_at(path)
+        label = read_label(path)
         if not is_whole(label):
             broken.append(path.name)
             continue
         place = folder.open / label["name"]
         if label["number"] >= cases or not (place / ANSWER).exists():
             continue
-        said = answer_at(place)
-        if not is_of(label, said):
+        said = read_answer(place)
+        if not answers_sealed_case(label, said):
             broken.append(path.name)
         found.append(outcome_of(label, said))
     if broken:
-        raise broken_seal(broken, folder.path)
+        raise broken_seal_error(broken, folder.path)
     return tuple(found)
 
 
 def engines(folder: ProofFolder, names: Iterable[str]) -> tuple[str, ...]:
-    """Digests of the code that gave the answers; more than one where it changed on the way."""
-    answers = [answer_at(folder.open / name) for name in names if (folder.open / name / ANSWER).exists()]
+    """Digests of the code that gave the answers; more than one if the code changed during the run."""
+    answers = [read_answer(folder.open / name) for name in names if (folder.open / name / ANSWER).exists()]
     return tuple(sorted({answer["engine"] for answer in answers if "engine" in answer}))

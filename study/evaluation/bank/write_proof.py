@@ -1,4 +1,4 @@
-"""What a proof leaves behind: a document, a table with one row per case, a page, and a small table to keep."""
+"""Write the results of a proof: a JSON document, a table with one row per case, a page, and a small table to keep."""
 
 import json
 import subprocess
@@ -60,8 +60,8 @@ class FigureRow:
 
 
 def write_proof(proof: Proof) -> None:
-    """Anew each time: what it is made from stays. Raises StudyError."""
-    folder, at = proof.folder.path, answered_at(proof)
+    """Write document, table and page, replacing earlier ones. Raises StudyError."""
+    folder, at = proof.folder.path, answering_commit(proof)
     score = proof.score
     document = {
         "seed": proof.plan.seed,
@@ -93,7 +93,8 @@ def write_proof(proof: Proof) -> None:
 
 
 def write_table(path: Path, proof: Proof) -> None:
-    """Figures with what they were measured on, small enough to be kept beside the code. Raises StudyError."""
+    """Write the figures and what they were measured on as a small table that can be kept beside the code. Raises
+    StudyError."""
     calibration = proof.score.calibration
     figures = [
         FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in proof.score.figures
@@ -104,7 +105,7 @@ def write_table(path: Path, proof: Proof) -> None:
     held = f"{len(proof.controls) - len(failed)} of {len(proof.controls)} held" if proof.controls else "not asked"
     lines = [
         f"# {len(proof.outcomes)} cases, seeds {seeds(proof)}",
-        f"# commit {answered_at(proof)}, code of the diagnosis {' '.join(proof.engines)}",
+        f"# commit {answering_commit(proof)}, code of the diagnosis {' '.join(proof.engines)}",
         f"# follow-ups and controls by code {' '.join(proof.beside) or 'none'}",
         f"# seal of the labels {proof.seal}",
         f"# versions {json.dumps(versions())}",
@@ -116,12 +117,12 @@ def write_table(path: Path, proof: Proof) -> None:
 
 
 def misses_table(path: Path) -> Path:
-    """Beside the table of figures."""
+    """Path of the table of misses, beside the table of figures."""
     return path.with_name(f"{path.stem}-misses{path.suffix}")
 
 
-def answered_at(proof: Proof) -> str:
-    """The commit at which the answers were first written down; this checkout's where they are its own."""
+def answering_commit(proof: Proof) -> str:
+    """The commit recorded when the answers were first written; the current one where the same code gave them."""
     document = proof.folder.path / DOCUMENT
     if document.exists():
         before = read_json(document, FORMAT, VERSION)
@@ -135,7 +136,7 @@ def seeds(proof: Proof) -> str:
 
 
 def commit() -> str:
-    """Of the checkout that runs, "+" where files of it are changed; "unknown" where it is none."""
+    """Commit of the running checkout, "+" if its files are changed; "unknown" outside a checkout."""
     root = Path(analysis.diagnosis.__path__[0]).parent
     try:
         at = _git(root, "rev-parse", "HEAD")

@@ -1,7 +1,7 @@
-"""The reality of concealed cases: a bench with what a model of it may lack, in its own equations.
+"""Generator of the concealed cases: a test bench whose model lacks some of its physics, in equations of its own.
 
-`rig` (how large) -> `bench`, `device` (what it really is, `effects` built in, `extras` that every device has) ->
-`drive_plan` (what it is driven with) -> `sensor` -> `nominal` (the model a lab would have) -> `draw_case`,
-`draw_bank`. `controls`, `injection` (faults put into real recordings) and `second_engine` (MuJoCo) stand beside it.
-Begin at `draw_case.py`.
+`rig` (size) -> `bench`, `device` (the true physics, with `effects` built in and `extras` that every device has) ->
+`drive_plan` (excitation) -> `sensor` -> `nominal` (the model a laboratory would have) -> `draw_case`, `draw_bank`.
+`controls`, `injection` (faults put into real recordings) and `second_engine` (MuJoCo) stand beside it. Begin at
+`draw_case.py`.
 """

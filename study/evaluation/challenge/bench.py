@@ -1,4 +1,4 @@
-"""The bare bench: three driven axes at a handle on a soft ground, with three oscillators attached to it."""
+"""The linear bench: three driven axes at a handle on an elastic ground, with three oscillators attached."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 OFFSET_KG, OFFSET_STIFFNESS = 0.012, 0.03
-"""How far the off-diagonals reach: kg, and as a part of the mean stiffness."""
+"""Largest off-diagonal terms: mass (kg), and stiffness as a fraction of the mean."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Oscillators:
-    """Masses on springs, each moving along a direction that is fixed to the handle."""
+    """Masses on springs, each moving along a direction fixed to the handle."""
 
     frequency_hz: FloatArray
     """(k,), with the handle held"""
@@ -52,7 +52,11 @@ class Bench:
         mass = np.zeros((3 + len(spring),) * 2)
         mass[:3, :3] = self.mass
         mass[3:, 3:] = np.diag(parts.mass_kg)
-        return mass, _joined(self.damping, damper, parts.direction), _joined(self.stiffness, spring, parts.direction)
+        return (
+            mass,
+            _with_oscillators(self.damping, damper, parts.direction),
+            _with_oscillators(self.stiffness, spring, parts.direction),
+        )
 
 
 def draw_bench(random: np.random.Generator) -> Bench:
@@ -79,7 +83,8 @@ def _symmetric(random: np.random.Generator, reach: float) -> FloatArray:
     return both
 
 
-def _joined(ground: FloatArray, each: FloatArray, direction: FloatArray) -> FloatArray:
+def _with_oscillators(ground: FloatArray, each: FloatArray, direction: FloatArray) -> FloatArray:
+    """Damping or stiffness matrix (3 + k, 3 + k) of handle and k oscillators, attached along `direction`."""
     size = 3 + len(each)
     joined = np.zeros((size, size))
     joined[:3, :3] = ground + direction.T @ np.diag(each) @ direction

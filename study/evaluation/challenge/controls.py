@@ -1,4 +1,4 @@
-"""Controls: recordings and models changed so that the right answer changes with them, or must not change."""
+"""Control inputs: recordings and models altered such that the correct answer changes in a known way, or not at all."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,14 +14,14 @@ from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
 CONCEALED, STRONG = "force_saturation", 0.9
-"""On one axis, and nothing else looks like it."""
+"""Effect and strength of the control cases: it acts on one axis, and no other effect resembles it."""
 PUSHED = "constant_force"
 WRONG = "mains_hum"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Asked:
-    """What a diagnosis is given."""
+    """Input of one diagnosis."""
 
     recording: Recording
     model: MechanicalModel
@@ -30,8 +30,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """claim: how the answers are judged, in `proof.controlled`. draw: from a seed and a rig what is asked, one after
-    another."""
+    """claim: how the answers are judged, in `proof.controlled`. draw: makes the inputs from a seed and a rig."""
 
     name: str
     claim: str
@@ -51,14 +50,14 @@ def _plain(seed: int, rig: Rig) -> tuple[Asked, ...]:
     return (Asked(case.recording, case.model),)
 
 
-def _shuffled(seed: int, rig: Rig) -> tuple[Asked, ...]:
+def _shuffle_in_time(seed: int, rig: Rig) -> tuple[Asked, ...]:
     case = _strong(seed, rig)
     order = np.random.default_rng(seed).permutation(len(case.recording))
-    return (Asked(_mapped(case.recording, lambda samples: samples[order], command=False), case.model),)
+    return (Asked(_map_samples(case.recording, lambda samples: samples[order], command=False), case.model),)
 
 
 def _other_model(seed: int, rig: Rig) -> tuple[Asked, ...]:
-    """Its tolerances as tight as if it were this device's own."""
+    """Recording of one device with the model of another, whose tolerances are as tight as its own."""
     return (Asked(_strong(seed, rig).recording, _clean(seed + 1, rig).model),)
 
 
@@ -76,8 +75,8 @@ def _silent(seed: int, rig: Rig) -> tuple[Asked, ...]:
     return (Asked(recording, case.model),)
 
 
-def _permuted(seed: int, rig: Rig) -> tuple[Asked, ...]:
-    """The channels of command, response and position in reverse; each keeps its name."""
+def _permute_channels(seed: int, rig: Rig) -> tuple[Asked, ...]:
+    """Channels of command, response and position in reverse order; each keeps its name."""
     two = replace(rig, axes=(0, 1))
     case = _strong(seed, two)
     recording, model = case.recording, case.model
@@ -85,26 +84,26 @@ def _permuted(seed: int, rig: Rig) -> tuple[Asked, ...]:
         return ()
     turned = replace(
         recording,
-        command=_reversed(recording.command),
-        response=_reversed(recording.response),
-        position=_reversed(recording.position),
+        command=_reverse_channels(recording.command),
+        response=_reverse_channels(recording.response),
+        position=_reverse_channels(recording.position),
     )
     other = replace(model, input=model.input[:, ::-1], output=model.output[::-1])
     return Asked(recording, model), Asked(turned, other)
 
 
-def _exchanged(seed: int, rig: Rig) -> tuple[Asked, ...]:
-    """What was read of one axis now bears the other's name, in command, response, position and model."""
+def _exchange_axes(seed: int, rig: Rig) -> tuple[Asked, ...]:
+    """The readings of two axes exchange their names, in command, response, position and model."""
     two = replace(rig, axes=(0, 1))
     case = _strong(seed, two)
-    turned = _mapped(case.recording, lambda samples: samples[:, ::-1])
+    turned = _map_samples(case.recording, lambda samples: samples[:, ::-1])
     other = replace(case.model, input=case.model.input[:, ::-1], output=case.model.output[::-1])
     return Asked(case.recording, case.model), Asked(turned, other)
 
 
-def _mirrored(seed: int, rig: Rig) -> tuple[Asked, ...]:
+def _mirror_signs(seed: int, rig: Rig) -> tuple[Asked, ...]:
     case = draw_case(seed, (PUSHED,), "calibrated", STRONG, "a", rig)
-    turned = _mapped(case.recording, lambda samples: -samples)
+    turned = _map_samples(case.recording, lambda samples: -samples)
     return Asked(case.recording, case.model), Asked(turned, case.model)
 
 
@@ -114,7 +113,7 @@ def _fewer(seed: int, rig: Rig) -> tuple[Asked, ...]:
     return Asked(case.recording, case.model, irrelevant), Asked(case.recording, case.model)
 
 
-def _renamed(seed: int, rig: Rig) -> tuple[Asked, ...]:
+def _rename_channels(seed: int, rig: Rig) -> tuple[Asked, ...]:
     case = _strong(seed, rig)
     recording, new = case.recording, tuple(f"q{number}" for number in range(len(rig.axes)))
     other = replace(
@@ -138,8 +137,8 @@ def _one_wrong(seed: int, rig: Rig) -> tuple[Asked, ...]:
     )
 
 
-def _mapped(recording: Recording, how: Callable[[FloatArray], FloatArray], command: bool = True) -> Recording:
-    """Response and position changed, and the command with them."""
+def _map_samples(recording: Recording, how: Callable[[FloatArray], FloatArray], command: bool = True) -> Recording:
+    """The recording with `how` applied to response and position, and to the command unless told otherwise."""
     position = recording.position
     return replace(
         recording,
@@ -153,19 +152,19 @@ def _with(signal: Signal, samples: FloatArray) -> Signal:
     return Signal(samples, signal.sample_rate_hz, signal.quantity, signal.unit, signal.channels)
 
 
-def _reversed(signal: Signal) -> Signal:
+def _reverse_channels(signal: Signal) -> Signal:
     return Signal(signal.samples[:, ::-1], signal.sample_rate_hz, signal.quantity, signal.unit, signal.channels[::-1])
 
 
 CONTROLS = (
-    Control("a recording shuffled in time", "no name", _shuffled),
+    Control("a recording shuffled in time", "no name", _shuffle_in_time),
     Control("the model of another device", "not explained", _other_model),
     Control("a silent recording", "no name", _silent),
-    Control("axes in another order", "same", _permuted),
-    Control("axes exchanged", "axis exchanged", _exchanged),
-    Control("everything mirrored", "opposite", _mirrored),
+    Control("axes in another order", "same", _permute_channels),
+    Control("axes exchanged", "axis exchanged", _exchange_axes),
+    Control("everything mirrored", "opposite", _mirror_signs),
     Control("strength zero", "nothing", _plain),
     Control("irrelevant hypotheses added", "same", _fewer),
-    Control("other names of device and channels", "same but axes", _renamed),
+    Control("other names of device and channels", "same but axes", _rename_channels),
     Control("a catalogue of one wrong hypothesis", "not explained", _one_wrong),
 )

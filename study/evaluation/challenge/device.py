@@ -1,4 +1,4 @@
-"""A device as it really is: a bench with everything that a model of it may lack. `record` reads it."""
+"""The true device: a bench with all physics that its model may lack. `record` measures it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,11 +11,11 @@ from study.evaluation.challenge.actuator_kernel import GAIN, drive
 from study.evaluation.challenge.bench import Bench
 from study.evaluation.challenge.drive_plan import RATE_HZ
 from study.evaluation.challenge.law_kernel import COLUMNS
-from study.evaluation.challenge.mechanism_kernel import AXIS, MOTOR_MASS, Mechanism, Moved, move
+from study.evaluation.challenge.mechanism_kernel import AXIS, MOTOR_MASS, Mechanism, Motion, move
 from study.evaluation.challenge.sensor import Sensor, read
 
 STEPS = 20
-"""Of the integrator in a sample, where nothing else is said."""
+"""Default number of integration steps per sample."""
 
 
 def _no_forces() -> FloatArray:
@@ -36,7 +36,8 @@ def _no_play() -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Device:
-    """Columns of the arrays are named in the kernels that read them."""
+    """Parameters of bench, actuators, mechanism and sensor. The columns of the arrays are named in the kernels that
+    read them."""
 
     bench: Bench
     amplifiers: FloatArray = field(default_factory=_exact_amplifiers)
@@ -52,14 +53,14 @@ class Device:
     creep_time_s: FloatArray = field(default_factory=lambda: np.ones(1))
     coupling: float = 0.0
     skipped: int = 0
-    """Every so many commands one is not written; 0 = never."""
+    """Every n-th command is not written; 0 = none."""
     laws: FloatArray = field(default_factory=lambda: np.zeros((0, COLUMNS)))
     """(laws, 7), columns in `law_kernel`"""
     drive_law: Callable[[FloatArray], FloatArray] | None = None
-    """What becomes of the commands (samples, 3), before the amplifiers."""
+    """Maps the commands (samples, 3) before they reach the amplifiers."""
     sensor: Sensor = field(default_factory=Sensor)
     steps: int = STEPS
-    """Of the integrator in a sample."""
+    """Integration steps per sample."""
 
     def mechanism(self) -> Mechanism:
         mass, damping, stiffness = self.bench.matrices()
@@ -75,15 +76,16 @@ class Device:
 
 
 def motion(device: Device, command: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What the handle really does: acceleration and position at the samples, (samples, 3) each. As `whole_motion`."""
+    """True acceleration (m/s^2) and position (m) of the handle at the samples, (samples, 3) each. Raises ValueError
+    as `whole_motion`."""
     moved = whole_motion(device, command)
     return moved.acceleration, moved.position
 
 
-def whole_motion(device: Device, command: FloatArray) -> Moved:
-    """With its speed and the forces of its laws.
+def whole_motion(device: Device, command: FloatArray) -> Motion:
+    """True motion of the handle, with velocity and the forces of its laws. command: (samples, 3), N.
 
-    Raises ValueError where the device does not stay in one place: its parts contradict each other.
+    Raises ValueError where the motion diverges: the drawn parameters contradict each other.
     """
     written = command.copy() if device.drive_law is None else device.drive_law(command)
     if device.skipped:
@@ -96,6 +98,6 @@ def whole_motion(device: Device, command: FloatArray) -> Moved:
 
 
 def record(device: Device, command: FloatArray, random: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Response and position as read, (samples, 3) each."""
+    """Measured acceleration and position, (samples, 3) each."""
     acceleration, position = motion(device, command)
     return read(device.sensor, acceleration, position, RATE_HZ, random)

@@ -25,19 +25,20 @@ COUNTS: dict[tuple[Kind, Bank], int] = {
 TURN: tuple[tuple[Kind, Bank], ...] = tuple(each for each, count in COUNTS.items() for _ in range(count))
 EXTRAS: dict[Bank, float] = {"main": 1.0, "dirty": 2.0, "engine": 0.0}
 LOWEST: dict[Kind, float] = {"nothing": 0.0, "single": 0.0, "pair": 0.4, "outside": 0.3, "without": 0.4}
-"""Strength. Singles go from invisible to strong; the others ask what is said of something that is there."""
+"""Lowest strength per kind. Single effects range from undetectable to strong; the others test what is said about a
+detectable effect."""
 GOLDEN = 0.5 * (5**0.5 - 1)
 SIZES = (0.72, 0.14)
-"""Parts of the bank with one and with two driven axes."""
+"""Fractions of the bank with one and with two driven axes."""
 STEPS = 80
-"""Of the bench's integrator in a sample: its error must not be what is found."""
+"""Integration steps per sample: enough that the integration error is not what a diagnosis finds."""
 ALL_AXES = ("sensor_misalignment", "cross_axis_sensitivity", "crossed_axes")
-"""Less than three axes do not show them for what they are."""
+"""Effects that need three axes to be identifiable."""
 ONE_ROW = (
     frozenset(name for name in EFFECTS if "friction" in name or name == "presliding_hysteresis"),
     frozenset(("sensor_misalignment", "cross_axis_sensitivity")),
 )
-"""Of each, a device can have one."""
+"""Sets of effects that share one table row: a device can have only one of each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +54,13 @@ class Draw:
 
     @property
     def without(self) -> tuple[str, ...]:
-        """What the diagnosis must not consider."""
+        """Effects that the diagnosis must not consider."""
         return self.effects if self.kind == "without" else ()
 
 
 def draw(seed: int, number: int, brief: bool = False) -> Draw:
-    """The same for the same seed and number, however large the bank is. brief: a single axis and short periods, for
-    tests."""
+    """Draw the case of one number: the same for the same seed and number, however large the bank. brief: one axis
+    and short periods, for tests."""
     turn, place = divmod(number, len(TURN))
     order = np.random.default_rng([seed, 1, turn]).permutation(len(TURN))
     kind, bank = TURN[order[place]]
@@ -76,7 +77,8 @@ def draw(seed: int, number: int, brief: bool = False) -> Draw:
 
 
 def case_of(each: Draw, name: str) -> Case:
-    """name: what recording and model call the device. Raises ImportError where the second engine is not installed."""
+    """Generate the drawn case. name: device name in recording and model. Raises ImportError where MuJoCo is needed
+    and not installed."""
     if each.bank == "engine":
         return second_engine.draw_engine_case(each.seed, each.effects, each.concealed, each.strengths, name, each.rig)
     return draw_case(each.seed, each.effects, each.concealed, each.strengths or None, name, each.rig)

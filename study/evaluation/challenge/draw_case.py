@@ -1,4 +1,4 @@
-"""Concealed-physics cases: a recording, a model that lacks something, and what it lacks. All from one seed."""
+"""A concealed-physics case from one seed: a recording, a model that lacks some physics, and the truth."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from study.evaluation.challenge.drive_plan import AXES, RATE_HZ, DrivePlan, draw
 from study.evaluation.challenge.effects import actuator, decoys, friction, hand, inertia_and_drag, sensor, springs
 from study.evaluation.challenge.extras import with_extras
 from study.evaluation.challenge.hidden import Circumstances, HiddenEffect
-from study.evaluation.challenge.nominal import as_model, calibrated, retuned
+from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.rig import WHOLE, Rig
 from study.evaluation.challenge.sensor import NOISE_MPS2, POSITION_NOISE_M, POSITION_STEP_M, RANGE_MPS2, read
 
@@ -25,13 +25,13 @@ EFFECTS: dict[str, HiddenEffect] = {
     for group in (friction, springs, inertia_and_drag, hand, actuator, sensor)
     for effect in group.EFFECTS
 }
-"""The whole vocabulary."""
+"""All effects of the vocabulary."""
 DECOYS: dict[str, HiddenEffect] = {effect.name: effect for effect in decoys.DECOYS}
-"""Outside of it."""
+"""Effects outside the vocabulary."""
 
 Concealed = Literal["calibrated", "retuned"]
-Moved = tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
-"""Acceleration and position of one device, then of another."""
+MotionPair = tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+"""Acceleration and position of a first device, then of a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +42,14 @@ class Truth:
     place: str
     axis: str | None
     values: dict[str, float]
-    """By the vocabulary's names; of a decoy, its own."""
+    """Parameters by their names in the vocabulary; a decoy has its own."""
     unseen: dict[str, float]
-    """Numbers that the vocabulary has no name for: which of several readings of the effect was drawn."""
+    """Parameters without a name in the vocabulary: which variant of the effect was drawn."""
 
 
 Again = Callable[[FloatArray, str, float, int], Recording]
-"""One more recording of the same device: commands (samples, axes) in N, their kind, a mass in kg, the noise's seed."""
+"""Makes a further recording of the same device: commands (samples, axes) in N, kind of excitation, added mass (kg),
+noise seed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,11 +59,11 @@ class Case:
     truth: tuple[Truth, ...]
     again: Again
     adds: float = 0.0
-    """What the concealed effects change of the readings, in the worst channel: rms over that of the noise."""
+    """Detectability: change of the readings by the concealed effects over the noise, both rms, in the worst channel."""
 
 
 NOISE = np.array([*NOISE_MPS2, *[float(np.hypot(POSITION_NOISE_M, POSITION_STEP_M / 12**0.5))] * 3])
-"""Of acceleration, then position."""
+"""Standard deviation of the noise of acceleration (m/s^2), then position (m)."""
 
 
 def draw_case(
@@ -73,13 +74,13 @@ def draw_case(
     name: str = "",
     rig: Rig = WHOLE,
 ) -> Case:
-    """effects: names, of the vocabulary or of DECOYS; none = nothing is missing. strength: 0 (weakest) to 1, for all
-    or one each; None draws it evenly. The same arguments give the same case.
+    """Draw one case. effects: names from the vocabulary or DECOYS; none = nothing is missing. strength: 0 (weakest) to
+    1, one for all or one each; None draws it uniformly. The same arguments give the same case.
 
-    Raises ValueError for an unknown name, a strength outside 0..1, or a hand behind a re-tuned model, which would
-    take it for the device's own.
+    Raises ValueError for an unknown name, a strength outside 0..1, or a hand with a re-tuned model, which would absorb
+    the hand into the device.
     """
-    hidden = [_known(effect) for effect in effects]
+    hidden = [_find_effect(effect) for effect in effects]
     if concealed == "retuned" and any(effect.name == "hand_impedance" for effect in hidden):
         raise ValueError("a hand can be concealed from a calibrated model only: a re-tuned one contains it")
     random = np.random.default_rng([seed, len(hidden)])
@@ -87,28 +88,28 @@ def draw_case(
     bare = with_extras(Device(bench, steps=rig.steps), rig.extras, seed)
     strengths = _strengths(strength, len(hidden), random)
     free = motion(bare, plan.command)
-    device, truth = _concealed(bare, free, (hidden, strengths), random, rig)
+    device, truth = _conceal(bare, free, (hidden, strengths), random, rig)
     moved = motion(device, plan.command) if hidden else free
     response, position = read(device.sensor, *moved, RATE_HZ, random)
     if concealed == "calibrated":
-        known, tolerance = calibrated(bench, random, rig.axes)
+        known, tolerance = draw_calibration(bench, random, rig.axes)
     else:
-        known, tolerance = retuned(bench, response, plan, rig.axes)
+        known, tolerance = retune(bench, response, plan, rig.axes)
     label = name or f"bench {seed}"
     model = as_model(label, known, tolerance, rig.axes)
-    recording = recording_of(label, plan, response, position, rig)
+    recording = make_recording(label, plan, response, position, rig)
 
     def again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
         further = further_plan(command, kind, rig)
         heavier = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
         seen = read(device.sensor, *motion(heavier, further.command), RATE_HZ, np.random.default_rng([seed, noise]))
-        return replace(recording_of(label, further, *seen, rig), meta=carried(added_kg))
+        return replace(make_recording(label, further, *seen, rig), meta=added_mass_meta(added_kg))
 
-    return Case(recording, model, truth, again, added(bare, device, (free, moved), rig) if hidden else 0.0)
+    return Case(recording, model, truth, again, visibility(bare, device, (free, moved), rig) if hidden else 0.0)
 
 
-def added(bare: Device, device: Device, moved: Moved, rig: Rig) -> float:
-    """By which two devices' readings differ: rms over that of the noise, in the worst channel. moved: how both move."""
+def visibility(bare: Device, device: Device, moved: MotionPair, rig: Rig) -> float:
+    """Difference of two devices' readings over the noise, both rms, in the worst channel. moved: the motion of each."""
     readings = []
     for each, (acceleration, position) in zip((bare, device), moved, strict=True):
         # The same noise and the same losses for both: what is left is the difference of the devices.
@@ -119,7 +120,7 @@ def added(bare: Device, device: Device, moved: Moved, rig: Rig) -> float:
     return float(np.sqrt(power.max()))
 
 
-def _known(name: str) -> HiddenEffect:
+def _find_effect(name: str) -> HiddenEffect:
     found = EFFECTS.get(name) or DECOYS.get(name)
     if found is None:
         raise ValueError(f"there is no way to conceal '{name}'; known are {', '.join((*EFFECTS, *DECOYS))}")
@@ -133,14 +134,15 @@ def _strengths(given: float | Sequence[float] | None, count: int, random: np.ran
     return drawn
 
 
-def _concealed(
+def _conceal(
     device: Device,
     free: tuple[FloatArray, FloatArray],
     wanted: tuple[Sequence[HiddenEffect], FloatArray],
     random: np.random.Generator,
     rig: Rig,
 ) -> tuple[Device, tuple[Truth, ...]]:
-    """free: how the device moves without them."""
+    """Draw the parameters of the effects and build them into the device. free: acceleration and position without
+    them."""
     (hidden, strengths), (acceleration, position) = wanted, free
     bench, truth = device.bench, []
     peak = np.minimum(np.abs(acceleration).max(axis=0), RANGE_MPS2)
@@ -155,18 +157,19 @@ def _concealed(
 
 
 def further_plan(command: FloatArray, kind: str, rig: Rig) -> DrivePlan:
-    """command: (samples, axes)"""
+    """Excitation plan of a further recording. command: (samples, axes), N."""
     whole = np.zeros((len(command), 3))
     whole[:, rig.axes] = command
     return DrivePlan(whole, (Segment(0, len(whole), kind, float(np.abs(whole).max()), 0, "fit"),))
 
 
-def carried(added_kg: float) -> dict[str, float]:
-    """As a recording says it."""
+def added_mass_meta(added_kg: float) -> dict[str, float]:
+    """Recording metadata of an added mass; empty for none."""
     return {"added_mass_kg": added_kg} if added_kg else {}
 
 
 def truth_of(effect: HiddenEffect, axis: int, values: dict[str, float]) -> Truth:
+    """The label of one concealed effect."""
     known = EFFECTS_BY_NAME.get(effect.name)
     names = set(values) if known is None else {parameter.name for parameter in known.parameters}
     return Truth(
@@ -178,8 +181,8 @@ def truth_of(effect: HiddenEffect, axis: int, values: dict[str, float]) -> Truth
     )
 
 
-def recording_of(name: str, plan: DrivePlan, response: FloatArray, position: FloatArray, rig: Rig) -> Recording:
-    """response, position: (samples, 3)"""
+def make_recording(name: str, plan: DrivePlan, response: FloatArray, position: FloatArray, rig: Rig) -> Recording:
+    """Recording of the rig's axes. response (m/s^2), position (m): (samples, 3)."""
     axes, names = list(rig.axes), tuple(AXES[axis] for axis in rig.axes)
     return Recording(
         device=name,

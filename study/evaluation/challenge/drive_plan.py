@@ -1,4 +1,4 @@
-"""What every challenge recording is driven with: multisines to fit, then sweeps, all axes at once and slow sines."""
+"""Excitation of every challenge recording: multisines to fit; sweeps, all axes at once and slow sines to test."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ LEVELS_N = (0.5, 1.5, 3.0)
 PERIOD, PERIODS, TEST_PERIODS = 2000, 4, 2
 REST = 500
 FIRST_LINE, LAST_LINE = 3, 479
-"""Of a 2 s period: 1.5 to 239.5 Hz, odd lines alone."""
+"""Lines of a 2 s period: 1.5 to 239.5 Hz, odd lines only."""
 SWEEP_N, SWEEP_HZ, SWEEP_SAMPLES, SWEEP_FADE = 1.8, (1.0, 240.0), 6000, 200
 SLOW_N, SLOW_HZ, SLOW_SAMPLES, SLOW_FADE = 1.6, (0.9, 1.3, 2.1), 4000, 500
 
@@ -27,8 +27,8 @@ class DrivePlan:
 
 
 def multisine(random: np.random.Generator, level_n: float, period: int = PERIOD) -> FloatArray:
-    """One period, (period,), with peak `level_n`: odd lines of amplitude f^-1/2 and random phase, one of every four
-    neighbours left silent, so that it shows what odd distortion puts there."""
+    """One period, (period,), N, with peak `level_n`: odd lines of amplitude f^-1/2 and random phase. One of every
+    four neighbouring lines is left out, so that it shows odd distortion."""
     lines = np.arange(FIRST_LINE * period // PERIOD | 1, LAST_LINE * period // PERIOD + 1, 2)
     silent = [group[random.integers(len(group))] for group in np.array_split(lines, -(-len(lines) // 4))]
     spectrum = np.zeros(period // 2 + 1, dtype=complex)
@@ -40,7 +40,7 @@ def multisine(random: np.random.Generator, level_n: float, period: int = PERIOD)
 
 
 def draw_plan(random: np.random.Generator, rig: Rig = WHOLE) -> DrivePlan:
-    """105 s for the whole bench."""
+    """Commands and segments of a recording; 105 s for the whole bench."""
     blocks: list[FloatArray] = []
     segments: list[Segment] = []
     start = 0
@@ -77,7 +77,7 @@ def _along(axis: int, wave: FloatArray) -> FloatArray:
 
 
 def _sweep(samples: int) -> FloatArray:
-    """Logarithmic, with a straight rise and fall."""
+    """Logarithmic sweep with linear fade-in and fade-out."""
     t, total = np.arange(samples) / RATE_HZ, samples / RATE_HZ
     octaves = np.log(SWEEP_HZ[1] / SWEEP_HZ[0])
     turns = SWEEP_HZ[0] * total / octaves * (np.exp(octaves * t / total) - 1.0)
@@ -87,7 +87,7 @@ def _sweep(samples: int) -> FloatArray:
 
 
 def _slow(rig: Rig) -> FloatArray:
-    """All axes at once, each at its own frequency; it ends without a fall."""
+    """All axes at once, each at its own frequency; no fade-out at the end."""
     samples = np.arange(rig.along(SLOW_SAMPLES))
     rise = np.minimum(samples / SLOW_FADE, 1.0)
     block: FloatArray = SLOW_N * np.sin(2 * np.pi * np.outer(samples / RATE_HZ, SLOW_HZ)) * rise[:, None]

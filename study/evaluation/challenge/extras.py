@@ -1,6 +1,6 @@
-"""What every real device has a little of, and no label names: four small things, other ones on every device.
+"""Small unmodelled effects that every real device has and that no label names: four per device, drawn from seven.
 
-At a factor of 1 they change the readings by about a tenth of their noise; the factor is that of each thing's size.
+At factor 1 they change the readings by about a tenth of the noise; the factor scales the size of each.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ COUNT = 4
 
 
 def with_extras(device: Device, factor: float, seed: int) -> Device:
-    """The same seed gives the same things; factor 0 leaves the device alone."""
+    """The device with four drawn extras. The same seed gives the same ones; factor 0 leaves the device as it is."""
     if factor == 0.0:
         return device
     random = np.random.default_rng([seed, 977])
@@ -27,36 +27,37 @@ def with_extras(device: Device, factor: float, seed: int) -> Device:
     return device
 
 
-def _added(table: FloatArray, cells: dict[int, FloatArray | float]) -> FloatArray:
+def _with_columns(table: FloatArray, cells: dict[int, FloatArray | float]) -> FloatArray:
+    """A copy of the table with these columns set."""
     changed = table.copy()
     for column, values in cells.items():
         changed[:, column] = values
     return changed
 
 
-def _rubbing(device: Device, factor: float, random: np.random.Generator) -> Device:
+def _add_friction(device: Device, factor: float, random: np.random.Generator) -> Device:
     level = factor * random.uniform(0.25e-4, 1e-4, 3)
-    return replace(device, friction=_added(device.friction, {STIFFNESS: 3e5, POSITIVE: level, NEGATIVE: level}))
+    return replace(device, friction=_with_columns(device.friction, {STIFFNESS: 3e5, POSITIVE: level, NEGATIVE: level}))
 
 
-def _ripple(device: Device, factor: float, random: np.random.Generator) -> Device:
+def _add_ripple(device: Device, factor: float, random: np.random.Generator) -> Device:
     cells = {
         RIPPLE: factor * random.uniform(0.5e-4, 2e-4, 3),
         PITCH: random.uniform(7e-4, 3e-3, 3),
         PHASE: random.uniform(0.0, 2 * np.pi, 3),
     }
-    return replace(device, forces=_added(device.forces, dict(cells)))
+    return replace(device, forces=_with_columns(device.forces, dict(cells)))
 
 
-def _hardening(device: Device, factor: float, random: np.random.Generator) -> Device:
-    return replace(device, forces=_added(device.forces, {CUBE: factor * random.uniform(-40.0, 40.0, 3)}))
+def _add_hardening(device: Device, factor: float, random: np.random.Generator) -> Device:
+    return replace(device, forces=_with_columns(device.forces, {CUBE: factor * random.uniform(-40.0, 40.0, 3)}))
 
 
-def _drag(device: Device, factor: float, random: np.random.Generator) -> Device:
-    return replace(device, forces=_added(device.forces, {DRAG: factor * random.uniform(0.0, 0.004, 3)}))
+def _add_drag(device: Device, factor: float, random: np.random.Generator) -> Device:
+    return replace(device, forces=_with_columns(device.forces, {DRAG: factor * random.uniform(0.0, 0.004, 3)}))
 
 
-def _modes_off(device: Device, factor: float, random: np.random.Generator) -> Device:
+def _shift_modes(device: Device, factor: float, random: np.random.Generator) -> Device:
     parts = device.bench.oscillators
     off = 1.0 + factor * random.uniform(-4e-4, 4e-4, parts.frequency_hz.shape)
     return replace(
@@ -64,13 +65,21 @@ def _modes_off(device: Device, factor: float, random: np.random.Generator) -> De
     )
 
 
-def _crossed(device: Device, factor: float, random: np.random.Generator) -> Device:
+def _mix_channels(device: Device, factor: float, random: np.random.Generator) -> Device:
     mixing = device.sensor.orientation + factor * random.uniform(-3e-3, 3e-3, (3, 3)) * (1.0 - np.eye(3))
     return replace(device, sensor=replace(device.sensor, orientation=mixing))
 
 
-def _humming(device: Device, factor: float, random: np.random.Generator) -> Device:
+def _add_hum(device: Device, factor: float, random: np.random.Generator) -> Device:
     return replace(device, sensor=replace(device.sensor, hum=factor * random.uniform(-0.004, 0.004, (2, 3))))
 
 
-EXTRAS: tuple[Extra, ...] = (_rubbing, _ripple, _hardening, _drag, _modes_off, _crossed, _humming)
+EXTRAS: tuple[Extra, ...] = (
+    _add_friction,
+    _add_ripple,
+    _add_hardening,
+    _add_drag,
+    _shift_modes,
+    _mix_channels,
+    _add_hum,
+)

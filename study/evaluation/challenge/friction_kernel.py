@@ -1,4 +1,4 @@
-"""Dry friction as a relaxed bristle, compiled: one step on one axis."""
+"""Dry friction as a relaxed bristle: one integration step on one axis (compiled)."""
 
 from math import exp
 
@@ -7,16 +7,17 @@ from numba import njit
 from equalizer.signals.signal import FloatArray
 
 POSITIVE, NEGATIVE, STATIC_RATIO, SPEED, STIFFNESS, SLOPE, BEND = range(7)
-"""Columns of an axis's friction: N while moving forwards, N while moving backwards, static over moving level, m/s at
-which that excess has fallen to 1/e, N/m of the bristle; 1/m and 1/m^2 by which the level changes along the way."""
+"""Columns of an axis: level (N) while moving forwards, level (N) while moving backwards, ratio of static to moving
+level, speed at which that excess has fallen to 1/e (m/s), bristle stiffness (N/m), change of the level with position
+(1/m and 1/m^2)."""
 
 
 @njit(cache=True, nogil=True)
 def bristle_force(row: FloatArray, x: float, v: float, bend: float, step_s: float) -> tuple[float, float]:
-    """The force on the handle (N) and the bristle's new bend (m).
+    """Force on the handle (N) and new deflection of the bristle (m).
 
-    The bend follows the motion and relaxes towards level / stiffness. Implicit in the relaxation, so that a stiff
-    bristle cannot swing from step to step.
+    The deflection follows the motion and relaxes towards level / stiffness. The relaxation is integrated implicitly, so
+    that a stiff bristle does not oscillate from step to step.
     """
     level = row[POSITIVE] if v > 0.0 else row[NEGATIVE]
     level *= 1.0 + (row[SLOPE] + row[BEND] * x) * x

@@ -1,4 +1,4 @@
-"""Forces that depend on where the handle is and how fast it moves, compiled: one axis at one instant."""
+"""Position- and velocity-dependent forces on one axis of the handle at one instant (compiled)."""
 
 from math import pi, sin
 
@@ -7,13 +7,13 @@ from numba import njit
 from equalizer.signals.signal import FloatArray
 
 CONSTANT, SQUARE, CUBE, RIPPLE, PITCH, PHASE, ABOVE, BELOW, STOP, DRAG, DAMPING_SQUARE = range(11)
-"""Columns of an axis: N; N/m^2; N/m^3; N, m and rad of a ripple; m and m where a stop begins on either side, and its
-N/m; N s^2/m^2; N s/m for every square metre away from the centre."""
+"""Columns of an axis: N; N/m^2; N/m^3; amplitude (N), pitch (m) and phase (rad) of cogging; upper and lower position
+(m) at which an end stop begins, and its N/m; N s^2/m^2; N s/m per square metre from the centre."""
 
 
 @njit(cache=True, nogil=True)
 def handle_force(row: FloatArray, x: float, v: float) -> float:
-    """N, on the handle."""
+    """Force on the handle, N."""
     force: float = row[CONSTANT] - (row[SQUARE] + row[CUBE] * x) * x * x
     force -= (row[DRAG] * abs(v) + row[DAMPING_SQUARE] * x * x) * v
     if row[RIPPLE] != 0.0:

@@ -1,4 +1,5 @@
-"""What it takes to conceal one effect: to draw its numbers at a strength, and to build it into a device."""
+"""Definition of a concealable effect: how its parameters are drawn for a strength, and how it is built into a
+device."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -16,25 +17,26 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Circumstances:
-    """What a draw may look at, so that its strengths mean the same on every bench."""
+    """What a draw may use, so that a strength means the same on every bench."""
 
     random: np.random.Generator
     strength: float
-    """0 = the weakest that is drawn, 1 = the strongest; the main parameter lies log-uniformly between."""
+    """0 = weakest that is drawn, 1 = strongest; the main parameter lies log-uniformly between."""
     bench: Bench
     axis: int
     travel_m: FloatArray
-    """(3,): how far the handle moves from the centre where nothing is concealed."""
+    """(3,): largest distance of the handle from the centre without the effect."""
     peak_mps2: FloatArray
-    """(3,): the largest reading there."""
+    """(3,): largest reading without the effect."""
     axes: tuple[int, ...] = (0, 1, 2)
-    """Those that are driven and read."""
+    """Driven and read axes."""
 
-    def between(self, weakest: float, strongest: float) -> float:
+    def log_between(self, weakest: float, strongest: float) -> float:
+        """Geometric interpolation between two values by the strength."""
         return float(weakest * (strongest / weakest) ** self.strength)
 
-    def some(self, lowest: float, highest: float) -> float:
-        """Log-uniform, whatever the strength."""
+    def draw_log_uniform(self, lowest: float, highest: float) -> float:
+        """Log-uniform random value, independent of the strength."""
         return float(np.exp(self.random.uniform(np.log(lowest), np.log(highest))))
 
     def sign(self) -> float:
@@ -49,17 +51,17 @@ class Circumstances:
 @dataclass(frozen=True, slots=True)
 class HiddenEffect:
     name: str
-    """Of the vocabulary, or of its own where it lies outside."""
+    """Name in the vocabulary; a name of its own for a decoy."""
     place: Place
     of_axis: bool
-    """It sits at one axis; else all share it."""
+    """It acts on one axis; otherwise on all."""
     draw: Callable[[Circumstances], dict[str, float]]
-    """Numbers by name: those of the vocabulary, and what else `build` needs."""
+    """Parameters by name: those of the vocabulary, and what else `build` needs."""
     build: Callable[[Device, int, Values], Device]
 
 
 def with_cells(table: FloatArray, axis: int, cells: Mapping[int, float]) -> FloatArray:
-    """A copy with these columns of the axis's row set."""
+    """A copy of the table with these columns of the axis's row set."""
     changed = table.copy()
     for column, value in cells.items():
         changed[axis, column] = value
@@ -71,7 +73,7 @@ def with_forces(device: Device, axis: int, cells: Mapping[int, float]) -> Device
 
 
 def with_amplifier(device: Device, axis: int | None, cells: Mapping[int, float]) -> Device:
-    """None: the amplifiers of all axes."""
+    """The device with these amplifier columns set; axis None: on all axes."""
     table = device.amplifiers
     for index in range(3) if axis is None else (axis,):
         table = with_cells(table, index, cells)

@@ -1,4 +1,4 @@
-"""Forces that no catalogue names, compiled: one row per law, at one instant of the mechanism's steps."""
+"""Forces outside the catalogue, one row per law, at one integration step (compiled)."""
 
 from math import atan, pi, sin, sqrt, tanh
 
@@ -7,7 +7,7 @@ from numba import njit
 from equalizer.signals.signal import FloatArray
 
 KIND, AXIS, OTHER, FACTOR, FIRST, SECOND, SIDE = range(7)
-"""Columns of a row: which law; the axis that it pushes; another axis; its numbers; +1 or -1 for a side."""
+"""Columns of a row: law; axis on which it acts; another axis; its three parameters; +1 or -1 for a side."""
 COLUMNS = 7
 (
     SPEED_POWER, PLACE_POWER, PLACE_DRAG, SPEED_SPRING, ATTRACTION, SOFT_DRAG, SOFT_SPRING, FADING_DRAG, CONTACT,
@@ -18,7 +18,7 @@ COLUMNS = 7
 
 @njit(cache=True, nogil=True)
 def law_force(row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, kept: float, t: float) -> float:
-    """N, along the row's axis. kept: what a law with a memory remembers (`law_memory`)."""
+    """Force along the row's axis, N. kept: state of a law with memory (`law_memory`)."""
     kind, j, k = int(row[KIND]), int(row[AXIS]), int(row[OTHER])
     if kind >= CROSS_SQUARE:
         return _across(row, q[j], v[j], q[k], v[k])
@@ -29,7 +29,7 @@ def law_force(row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, 
 
 @njit(cache=True, nogil=True)
 def _along(row: FloatArray, x: float, speed: float) -> float:
-    """By the axis's own place and speed."""
+    """Laws of the axis's own position and velocity."""
     kind, first, side = int(row[KIND]), row[FIRST], row[SIDE]
     if kind == SPEED_POWER:
         force = abs(speed) ** first * (1.0 if speed > 0.0 else -1.0)
@@ -57,7 +57,7 @@ def _along(row: FloatArray, x: float, speed: float) -> float:
 
 @njit(cache=True, nogil=True)
 def _with_more(row: FloatArray, x: float, drive: float, kept: float, t: float) -> float:
-    """By the command, the time, or what was before."""
+    """Laws of the command, the time or a memory state."""
     kind, first, second = int(row[KIND]), row[FIRST], row[SECOND]
     if kind == GAIN_RIPPLE:
         force = -drive * sin(2.0 * pi * x / first + second)
@@ -73,7 +73,7 @@ def _with_more(row: FloatArray, x: float, drive: float, kept: float, t: float) -
 
 @njit(cache=True, nogil=True)
 def _across(row: FloatArray, x: float, speed: float, other_x: float, other_speed: float) -> float:
-    """By another axis's motion."""
+    """Laws of another axis's motion."""
     kind, side = int(row[KIND]), row[SIDE]
     if kind == CROSS_SQUARE:
         force = side * other_x * other_x
@@ -91,7 +91,7 @@ def _across(row: FloatArray, x: float, speed: float, other_x: float, other_speed
 
 @njit(cache=True, nogil=True)
 def law_memory(row: FloatArray, q: FloatArray, drive: FloatArray, kept: float, step_s: float) -> float:
-    """At the end of a step."""
+    """Memory state at the end of the step."""
     kind, j, now = int(row[KIND]), int(row[AXIS]), kept
     if kind == RELAXATION:
         now += (q[j] - kept) * step_s / row[FIRST]
@@ -104,7 +104,8 @@ def law_memory(row: FloatArray, q: FloatArray, drive: FloatArray, kept: float, s
 def law_forces(
     rows: FloatArray, at: tuple[FloatArray, FloatArray, FloatArray], kept: FloatArray, t: float, out: FloatArray
 ) -> None:
-    """Fills out (3,), N. at: places, speeds and drives, of which the first three count. kept: (laws,)"""
+    """Add up all laws in `out` (3,), N. at: positions, velocities and drive forces, of which the first three count.
+    kept: memory states (laws,)."""
     out[:] = 0.0
     for number in range(rows.shape[0]):
         out[int(rows[number, AXIS])] += law_force(rows[number], at[0], at[1], at[2], kept[number], t)

@@ -1,7 +1,8 @@
-"""The mechanism's motion, compiled: semi-implicit steps, many to a sample; velocity first, then position with it.
+"""Equations of motion of the mechanism: semi-implicit Euler, many steps per sample (compiled).
 
-So a velocity belongs half a step before its position. What damps and rubs sees it carried on by that half step, with
-the acceleration before: otherwise all modes would seem lighter by damping times half a step.
+Velocity is updated first, then position, so that a velocity belongs half a step before its position. Damping and
+friction use the velocity extrapolated by half a step with the previous acceleration: otherwise all modes would seem
+lighter by damping times half a step.
 """
 
 from math import pi, sin
@@ -16,16 +17,17 @@ from study.evaluation.challenge.handle_force_kernel import handle_force
 from study.evaluation.challenge.law_kernel import law_forces, law_memory
 
 RATE, DAMPING_DEPTH, STIFFNESS_DEPTH, TURN, SQUARE = range(5)
-"""Of `varying`: Hz, N s/m and N/m by which the ground's damping and stiffness swing, rad; 1 = to and fro in jumps."""
+"""Columns of `varying`: frequency (Hz), modulation of the ground's damping (N s/m) and stiffness (N/m), phase (rad),
+1 = square wave."""
 AXIS, MOTOR_MASS, GAP, CONTACT, CONTACT_DAMPING = range(5)
-"""Of `play`: the axis, or -1 for none; kg; m in all; N/m; N s/m while in contact."""
+"""Columns of `play`: axis (-1 = none), motor mass (kg), total gap (m), contact stiffness (N/m) and damping (N s/m)."""
 
 
 class Mechanism(NamedTuple):
-    """Handle coordinates first, then the attached oscillators: n in all."""
+    """Parameters in the coordinates of the handle, then of the attached oscillators: n in all."""
 
     inverse_mass: FloatArray
-    """(n, n); of the handle without the motor, where there is play."""
+    """(n, n), 1/kg; of the handle without the motor, where there is play."""
     damping: FloatArray
     """(n, n)"""
     stiffness: FloatArray
@@ -45,28 +47,28 @@ class Mechanism(NamedTuple):
     creep_stiffness: FloatArray
     """(3, elements), N/m"""
     creep_share: FloatArray
-    """(elements,), of the way that remains, in one step"""
+    """(elements,), relaxed fraction of the remaining creep in one step."""
     coupling: float
     """N/m^2: the potential coupling * x^2 y / 2."""
     laws: FloatArray
     """(laws, 7), columns in `law_kernel`"""
 
 
-class Moved(NamedTuple):
-    """At the samples, (samples, 3) each."""
+class Motion(NamedTuple):
+    """Motion at the samples, (samples, 3) each, SI."""
 
     acceleration: FloatArray
     position: FloatArray
     velocity: FloatArray
     lawful: FloatArray
-    """N, of the laws alone, with the force that begins there."""
+    """N, force of the laws alone, at the start of the sample."""
 
 
 @njit(cache=True, nogil=True)
-def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> Moved:
-    """force: (samples * steps, 3), N.
+def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> Motion:
+    """Integrate the motion from rest. force: (samples * steps, 3), N.
 
-    A sample is read just before the force of its own step acts: the acceleration is that of the force before.
+    A sample is read just before the force of its own step acts, so its acceleration belongs to the previous force.
     """
     n, samples, h = m.inverse_mass.shape[0], force.shape[0] // steps, 1.0 / (rate_hz * steps)
     acceleration, position = np.zeros((samples, 3)), np.zeros((samples, 3))
@@ -100,7 +102,7 @@ def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> Moved:
             v[i] += h * a[i]
             q[i] += h * v[i]
         before[:] = drive
-    return Moved(acceleration, position, velocity, lawful)
+    return Motion(acceleration, position, velocity, lawful)
 
 
 @njit(cache=True, nogil=True)
@@ -115,7 +117,7 @@ def _inner(m: Mechanism, q: FloatArray, v: FloatArray, f: FloatArray) -> None:
 
 @njit(cache=True, nogil=True)
 def _ground(m: Mechanism, q: FloatArray, v: FloatArray, bend: FloatArray, h: float, f: FloatArray) -> None:
-    """Adds what acts between the handle and the ground."""
+    """Add the forces between handle and ground to `f`."""
     for j in range(3):
         rubbing, bend[j] = bristle_force(m.friction[j], q[j], v[j], bend[j], h)
         f[j] += rubbing + handle_force(m.forces[j], q[j], v[j])
@@ -126,7 +128,7 @@ def _ground(m: Mechanism, q: FloatArray, v: FloatArray, bend: FloatArray, h: flo
 
 @njit(cache=True, nogil=True)
 def _slow_ground(m: Mechanism, q: FloatArray, v: FloatArray, slow: FloatArray, t: float, f: FloatArray) -> None:
-    """Adds what remembers, and what changes with time."""
+    """Add creep and time-varying forces to `f`."""
     for j in range(3):
         for e in range(slow.shape[1]):
             if m.creep_stiffness[j, e] != 0.0:
@@ -144,7 +146,7 @@ def _slow_ground(m: Mechanism, q: FloatArray, v: FloatArray, slow: FloatArray, t
 def _through_play(
     play: FloatArray, q: FloatArray, v: FloatArray, motor: FloatArray, drive: FloatArray, h: float
 ) -> None:
-    """Moves the motor and puts the contact's force in the place of its drive."""
+    """Move the motor and replace its drive force by the contact force."""
     j = int(play[AXIS])
     apart, closing = motor[0] - q[j], motor[1] - v[j]
     into = max(apart - 0.5 * play[GAP], 0.0) + min(apart + 0.5 * play[GAP], 0.0)

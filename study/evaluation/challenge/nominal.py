@@ -1,8 +1,8 @@
-"""The model that a lab would have of the device: calibrated before, or re-tuned to what it recorded.
+"""The nominal model: what a laboratory would know of the device, calibrated earlier or re-tuned to the recording.
 
-Calibrated: the bare bench, its mass, damping and stiffness at each driven axis off by one tight tolerance, normally
-distributed. Re-tuned: these nine fitted to the response of the device as it is, at 1.5 N, so that they hide what they
-can of the concealed effect; the tolerances are wide. Off-diagonals and modes are known in both.
+Calibrated: mass, damping and stiffness of the bare bench at each driven axis with normally distributed errors of one
+tight tolerance. Re-tuned: these nine numbers fitted to the response of the true device at 1.5 N, so that they absorb as
+much of the concealed effect as they can; the tolerances are wide. Off-diagonals and modes are known exactly in both.
 """
 
 from dataclasses import replace
@@ -24,8 +24,10 @@ DECIMALS = 8
 """Significant digits of the matrices in the file."""
 
 
-def calibrated(bench: Bench, random: np.random.Generator, axes: tuple[int, ...] = (0, 1, 2)) -> tuple[Bench, Tolerance]:
-    """The bench as its owner knows it, and how well. axes: those of which anything is unknown."""
+def draw_calibration(
+    bench: Bench, random: np.random.Generator, axes: tuple[int, ...] = (0, 1, 2)
+) -> tuple[Bench, Tolerance]:
+    """The bench with calibration errors, and the tolerance. axes: those with unknown parameters."""
     tolerance = Tolerance(
         mass_kg=float(np.diag(bench.mass).mean() * random.uniform(0.013, 0.022)),
         damping_n_s_per_m=float(np.diag(bench.damping).mean() * random.uniform(0.035, 0.09)),
@@ -34,14 +36,14 @@ def calibrated(bench: Bench, random: np.random.Generator, axes: tuple[int, ...] 
     )
     sizes = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
     off = random.normal(size=9) * np.repeat(np.array(sizes, dtype=np.float64), 3)
-    return shifted(bench, off * _of_axes(axes)), tolerance
+    return shift_diagonals(bench, off * _of_axes(axes)), tolerance
 
 
-def retuned(
+def retune(
     bench: Bench, response: FloatArray, plan: DrivePlan, axes: tuple[int, ...] = (0, 1, 2)
 ) -> tuple[Bench, Tolerance]:
-    """The bench whose numbers at these axes, nine of three, fit the response (samples, 3) of the multisines at 1.5 N
-    best."""
+    """The bench whose mass, damping and stiffness at these axes best fit the response (samples, 3) to the multisines
+    at 1.5 N (Gauss-Newton), and its tolerance."""
     parts = [s for s in plan.segments if s.role == "fit" and s.amplitude == LEVELS_N[1]]
     commands = [plan.command[s.start : s.stop] for s in parts]
     seen, free = list(axes), _of_axes(axes)
@@ -51,7 +53,7 @@ def retuned(
     shift = np.zeros(9)
 
     def predicted(at: FloatArray) -> FloatArray:
-        played = np.vstack([_linear_response(shifted(bench, at), command)[:, seen] for command in commands])
+        played = np.vstack([_linear_response(shift_diagonals(bench, at), command)[:, seen] for command in commands])
         return np.asarray(played / noise)
 
     slopes = np.zeros((wanted.size, 9))
@@ -64,11 +66,11 @@ def retuned(
         shift = _within(shift + change, bench)
         if np.abs(change / steps).max() < 0.05:
             break
-    return shifted(bench, shift), WIDE
+    return shift_diagonals(bench, shift), WIDE
 
 
-def shifted(bench: Bench, by: FloatArray) -> Bench:
-    """by: (9,): kg, N s/m and N/m, of x, y, z each, added at the handle."""
+def shift_diagonals(bench: Bench, by: FloatArray) -> Bench:
+    """The bench with numbers added at the handle. by: (9,): kg, N s/m and N/m, for x, y, z each."""
     mass, damping, stiffness = (np.diag(part) for part in np.asarray(by).reshape(3, 3))
     return replace(
         bench, mass=bench.mass + mass, damping=bench.damping + damping, stiffness=bench.stiffness + stiffness
@@ -76,8 +78,8 @@ def shifted(bench: Bench, by: FloatArray) -> Bench:
 
 
 def as_model(name: str, bench: Bench, tolerance: Tolerance, axes: tuple[int, ...] = (0, 1, 2)) -> MechanicalModel:
-    """Values as they are written: 8 significant digits."""
-    mass, damping, stiffness = (_rounded(matrix) for matrix in bench.matrices())
+    """The model as it is written to the file: 8 significant digits."""
+    mass, damping, stiffness = (_round_significant(matrix) for matrix in bench.matrices())
     seen = np.eye(len(AXES), len(mass))[list(axes)]
     return MechanicalModel(
         name, "acceleration", mass, damping, stiffness, seen.T, seen,
@@ -86,7 +88,7 @@ def as_model(name: str, bench: Bench, tolerance: Tolerance, axes: tuple[int, ...
 
 
 def _of_axes(axes: tuple[int, ...]) -> FloatArray:
-    """(9,): 1 for what belongs to these axes, else 0."""
+    """(9,): 1 for the parameters of these axes, otherwise 0."""
     mask: FloatArray = np.array([float(axis in axes) for axis in range(3)] * 3)
     return mask
 
@@ -98,7 +100,7 @@ def _linear_response(bench: Bench, command: FloatArray) -> FloatArray:
 
 
 def _within(shift: FloatArray, bench: Bench) -> FloatArray:
-    """No lighter than half of the bench, and neither damping nor stiffness below a tenth."""
+    """Limit the shift: at least half of the mass and a tenth of damping and stiffness remain."""
     lowest = np.concatenate(
         [-0.5 * np.diag(bench.mass), -0.9 * np.diag(bench.damping), -0.9 * np.diag(bench.stiffness)]
     )
@@ -106,6 +108,6 @@ def _within(shift: FloatArray, bench: Bench) -> FloatArray:
     return allowed
 
 
-def _rounded(matrix: FloatArray) -> FloatArray:
+def _round_significant(matrix: FloatArray) -> FloatArray:
     texts = [[f"{value:.{DECIMALS}g}" for value in row] for row in matrix]
     return np.array(texts, dtype=np.float64)

@@ -1,7 +1,7 @@
-"""How the bench is read: accelerometer, position sensor, and the clock and line that carry both.
+"""Sensors of the bench: accelerometer, position sensor, and the clock and line that carry both.
 
-Order: pole of the accelerometer, direction, gain, curve, drift, hum; the clock; noise;
-range; steps; lost samples. A clock that drifts and a line that loses samples touch acceleration and position alike.
+Order: accelerometer pole, orientation, gain, nonlinearity, drift, hum; clock; noise; range; quantization; lost samples.
+Clock drift and lost samples affect acceleration and position alike.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.sensor_kernel import lagging, one_pole
+from study.evaluation.challenge.sensor_kernel import one_pole, play_hysteresis
 
 BANDWIDTH_HZ, RANGE_MPS2 = 500.0, 29.43
 NOISE_MPS2 = (0.042, 0.042, 0.083)
@@ -29,7 +29,7 @@ class Sensor:
     offset: FloatArray = field(default_factory=lambda: np.zeros(3))
     """m/s^2"""
     late_s: float = 0.0
-    """By which the acceleration's record is behind the commands'."""
+    """Delay of the acceleration's record behind the commands."""
     hum: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
     """m/s^2 of sine and cosine."""
     hum_hz: float = 50.0
@@ -37,21 +37,21 @@ class Sensor:
     step: float = 0.0
     ppm: float = 0.0
     lost: float = 0.0
-    """Part of the samples that repeat the one before."""
+    """Fraction of the samples that repeat the one before."""
     bend: float = 0.0
-    """1/(m/s^2): how soon a saturating curve bends."""
+    """1/(m/s^2): curvature of a saturating characteristic."""
     play: float = 0.0
     """m/s^2, half the width of a hysteresis."""
     law: Callable[[FloatArray], FloatArray] | None = None
-    """What becomes of the readings (samples, 3)."""
+    """Maps the readings (samples, 3)."""
 
 
 def read(
     sensor: Sensor, acceleration: FloatArray, position: FloatArray, rate_hz: float, random: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """Response and position as recorded, (samples, 3) each."""
+    """Measured acceleration and position, (samples, 3) each."""
     smoothed = one_pole(acceleration, 1.0 - np.exp(-2 * np.pi * sensor.bandwidth_hz / rate_hz))
-    felt = _distorted(sensor, smoothed @ sensor.orientation.T)
+    felt = _apply_nonlinearity(sensor, smoothed @ sensor.orientation.T)
     part = np.linspace(0.0, 1.0, len(felt))[:, None]
     turns = 2 * np.pi * sensor.hum_hz * np.arange(len(felt))[:, None] / rate_hz
     felt = felt + sensor.offset + sensor.drift * part + sensor.hum[0] * np.sin(turns) + sensor.hum[1] * np.cos(turns)
@@ -66,16 +66,17 @@ def read(
     return felt[kept], where[kept]
 
 
-def _distorted(sensor: Sensor, felt: FloatArray) -> FloatArray:
+def _apply_nonlinearity(sensor: Sensor, felt: FloatArray) -> FloatArray:
+    """Static law, gain, cubic term, soft saturation, then hysteresis."""
     felt = felt if sensor.law is None else sensor.law(felt)
     felt = sensor.gain * felt + sensor.cubic * felt**3
     if sensor.bend > 0.0:
         felt = np.tanh(sensor.bend * felt) / sensor.bend
-    return felt if sensor.play == 0.0 else lagging(felt, sensor.play)
+    return felt if sensor.play == 0.0 else play_hysteresis(felt, sensor.play)
 
 
 def _at_other_times(samples: FloatArray, ppm: float, late: float) -> FloatArray:
-    """Between samples on a straight line, as an acquisition that fills its own grid does. late: in samples."""
+    """Resample with linear interpolation for a clock error (ppm) and a delay. late: in samples."""
     if ppm == 0.0 and late == 0.0:
         return samples
     k = np.arange(len(samples), dtype=np.float64)
@@ -84,7 +85,7 @@ def _at_other_times(samples: FloatArray, ppm: float, late: float) -> FloatArray:
 
 
 def _last_kept(samples: int, lost: float, random: np.random.Generator) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """For every sample the one whose value is recorded for it."""
+    """For every sample the index of the last one that was not lost."""
     there = random.random(samples) >= lost
     there[0] = True
     kept: np.ndarray[tuple[int], np.dtype[np.int64]] = np.maximum.accumulate(np.where(there, np.arange(samples), 0))

@@ -1,4 +1,4 @@
-"""One pole, and hysteresis, of a sensor read at the sample rate, compiled."""
+"""First-order lag and play hysteresis of a sensor at the sample rate (compiled)."""
 
 import numpy as np
 from numba import njit
@@ -8,7 +8,7 @@ from equalizer.signals.signal import FloatArray
 
 @njit(cache=True, nogil=True)
 def one_pole(samples: FloatArray, share: float) -> FloatArray:
-    """y += share (x - y), from rest. (n, channels)"""
+    """First-order low-pass y += share (x - y) from rest. samples: (n, channels)."""
     smoothed = np.zeros(samples.shape)
     for j in range(samples.shape[1]):
         y = 0.0
@@ -19,8 +19,9 @@ def one_pole(samples: FloatArray, share: float) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)
-def lagging(samples: FloatArray, half_width: float) -> FloatArray:
-    """What follows its input with play: it moves only once the input has moved by `half_width` the other way."""
+def play_hysteresis(samples: FloatArray, half_width: float) -> FloatArray:
+    """Play operator: the output moves only once the input has moved by `half_width` beyond it. samples: (n,
+    channels)."""
     followed = np.zeros(samples.shape)
     for j in range(samples.shape[1]):
         y = 0.0

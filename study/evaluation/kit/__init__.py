@@ -1,3 +1,2 @@
-"""A laboratory's own blind test of the diagnosis: `lab_kit` draws and seals the changes, `score_kit` scores the
-answers.
-"""
+"""A laboratory's own blind test of the diagnosis: `lab_kit` draws and seals a table of changes, `score_kit` scores
+the answers."""

@@ -1,4 +1,4 @@
-"""A laboratory's own blind test: the order of changes is drawn, and the table of them sealed by its hash."""
+"""Blind test for a laboratory: draw the order of physical changes and seal the table by its SHA-256."""
 
 import secrets
 from pathlib import Path
@@ -18,8 +18,8 @@ CORRECT = "Correct it before it is sealed; from then on nothing in it may be cha
 
 
 def draw_labels(out: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
-    """Each change so many times, and nothing twice as often, in a drawn order. seed: None draws a secret one.
-    Raises AlreadyThereError, CannotWriteError."""
+    """Write a table with every change `repeats` times and no change twice as often, in random order. seed: None
+    draws a secret one. Raises AlreadyThereError, CannotWriteError."""
     every = [change.name for change in CHANGES for _ in range(repeats * (2 if change.name == NOTHING else 1))]
     order = np.random.default_rng(secrets.randbits(64) if seed is None else seed).permutation(len(every))
     labels = tuple(
@@ -31,7 +31,7 @@ def draw_labels(out: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
 
 
 def read_labels(path: Path) -> tuple[Label, ...]:
-    """Raises CannotReadError, UnusableFileError."""
+    """The rows of a table of labels. Raises CannotReadError, UnusableFileError."""
     try:
         labels = rows_from_csv(read_text(path), Label)
     except CsvError as error:
@@ -50,13 +50,13 @@ def read_labels(path: Path) -> tuple[Label, ...]:
 
 
 def seal_labels(path: Path) -> str:
-    """The SHA-256 of the table's bytes, also beside it as `sha256sum --check` reads it. A table that has its seal
-    keeps it. Raises StudyError where the table is none, or was sealed otherwise."""
+    """SHA-256 of the table's bytes, also written beside it in the format of `sha256sum --check`. A sealed table
+    keeps its seal. Raises StudyError where the table is invalid or was sealed with other content."""
     read_labels(path)
     digest, seal = sha256_of(path), seal_of(path)
     if not seal.exists():
         write_text(seal, f"{digest}  {path.name}\n")
-    elif (before := sealed_hash(path)) != digest:
+    elif (before := read_sealed_hash(path)) != digest:
         raise StudyError(
             "The table was sealed before, with another hash",
             f"{seal.name} says {before or 'no hash'}; {path.name} has {digest} now.",
@@ -68,11 +68,12 @@ def seal_labels(path: Path) -> str:
 
 
 def seal_of(path: Path) -> Path:
+    """Path of the seal file of a table."""
     return path.with_name(path.name + SEAL_SUFFIX)
 
 
-def sealed_hash(path: Path) -> str:
-    """What the file beside the table says; empty where there is none, or it says nothing. Raises CannotReadError."""
+def read_sealed_hash(path: Path) -> str:
+    """Hash in the seal file beside the table; empty where there is none. Raises CannotReadError."""
     seal = seal_of(path)
     said = read_text(seal).split() if seal.exists() else []
     return said[0].lower() if said else ""

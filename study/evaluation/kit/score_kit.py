@@ -1,4 +1,4 @@
-"""A laboratory's own blind test: the revealed table against the diagnoses."""
+"""Score a laboratory's blind test: the revealed table against the diagnoses."""
 
 import re
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from analysis.diagnosis.document import Diagnosis
 from analysis.evaluation.proof.lab_kit import MISSING, Label, Scored, kit_figures, not_answered, scored
 from analysis.evaluation.proof.share import Figure
 from study.errors import StudyError, WrongUseError
-from study.evaluation.kit.lab_kit import read_labels, seal_of, sealed_hash
+from study.evaluation.kit.lab_kit import read_labels, read_sealed_hash, seal_of
 from study.store.disk.csv_rows import rows_to_csv
 from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import write_text
@@ -23,9 +23,9 @@ class KitScore:
     """One for every label, also of recordings without a diagnosis."""
     figures: tuple[Figure, ...]
     sha256: str
-    """Of the table of labels."""
+    """SHA-256 of the table of labels."""
     compared_with: str
-    """What its hash was compared with."""
+    """With what that hash was compared, in words."""
 
 
 def score_kit(path: Path, diagnoses: Path, out: Path, seal: str | None = None) -> KitScore:
@@ -43,6 +43,7 @@ def score_kit(path: Path, diagnoses: Path, out: Path, seal: str | None = None) -
 
 
 def score_lines(score: KitScore) -> tuple[str, ...]:
+    """The score as terminal lines."""
     figures = (_figure_line(figure) for figure in score.figures)
     rows = (_row_line(row) for row in score.rows if not row.right)
     return (*figures, *rows, f"Labels: SHA-256 {score.sha256}, {score.compared_with}.")
@@ -64,7 +65,7 @@ def _row_line(each: Scored) -> str:
 
 
 def _diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | None, ...]:
-    """In the order of the labels; None where there is none."""
+    """Diagnosis of each label, in order; None where there is none."""
     if not folder.is_dir():
         raise StudyError(
             "There is no such folder",
@@ -100,10 +101,10 @@ def _diagnosis(folder: Path, recording: str) -> Diagnosis | None:
 
 
 def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
-    """What the hash was compared with, in words. Raises StudyError where it is another."""
+    """What the hash was compared with, in words. Raises StudyError where it differs."""
     beside = seal_of(path)
     if seal is None:
-        said, who = sealed_hash(path), f"{beside.name} says"
+        said, who = read_sealed_hash(path), f"{beside.name} says"
         how = (
             f"compared only with {beside.name} beside them, which can be written anew together with the table: give "
             "--seal the hash that was handed over before the diagnoses"
@@ -121,7 +122,7 @@ def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
 
 
 def _hash(typed: str) -> str:
-    """The line of the seal's file is taken, too."""
+    """The hash in typed text, which may be the whole line of the seal file."""
     said = (typed.split() or [""])[0].lower()
     if re.fullmatch("[0-9a-f]{64}", said):
         return said

@@ -1,5 +1,5 @@
-"""Folders of real recordings: each diagnosed, faults injected under a seal, one page about all.
+"""Folders of real recordings: diagnose each, inject faults under a seal, write a page about all.
 
-`real_folder` (what is there) -> `diagnose_real` -> `injected_halves`, `inject_real` -> `kept_answers` ->
-`write_real`, `real_summary`. Begin at `real_recordings.py`.
+`real_folder` (inventory) -> `diagnose_real` -> `injected_halves`, `inject_real` -> `kept_answers` -> `write_real`,
+`real_summary`. Begin at `real_recordings.py`.
 """

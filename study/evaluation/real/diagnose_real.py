@@ -1,4 +1,4 @@
-"""One real recording: imported, compared with its simple model, and tested further, as plain values."""
+"""Diagnose one real recording: import it, compare it with a simple model, test the result on further recordings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -42,6 +42,8 @@ class RealDiagnosis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Read:
+    """The imported recording and what its diagnosis needs."""
+
     recording: Recording
     model: MechanicalModel
     balances: tuple[Balance, ...] | None
@@ -49,14 +51,16 @@ class _Read:
     before: Recording | None
 
 
-def crashed(wanted: RealRecording, crash: Exception) -> RealDiagnosis:
+def report_crash(wanted: RealRecording, crash: Exception) -> RealDiagnosis:
+    """Result for a recording at which the program crashed."""
     said = f"{type(crash).__name__}: {crash}".rstrip(": .")
     broken = f"The program crashed at this recording ({said}). That is a fault of the program; the others are answered."
-    return RealDiagnosis(_refused(wanted, broken), None, wanted.parents)
+    return RealDiagnosis(_refusal(wanted, broken), None, wanted.parents)
 
 
 def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on_progress: Progress) -> RealDiagnosis:
-    """A recording that cannot be diagnosed comes back as refused, with the reason. Raises LeftError alone."""
+    """Diagnose one recording. One that cannot be diagnosed is returned as refused, with the reason. Raises only
+    LeftError."""
     parents = wanted.parents
     try:
         read = _read(wanted, (time_left, guard), on_progress)
@@ -74,9 +78,9 @@ def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on
         names = (wanted.folder.name, wanted.name, wanted.found.source.map.title)
         answer = answer_of_findings(found, read.recording, names, diagnosis.nominal)
     except StudyError as refusal:
-        return RealDiagnosis(_refused(wanted, f"{refusal.title}: {refusal.happened}"), None, parents)
+        return RealDiagnosis(_refusal(wanted, f"{refusal.title}: {refusal.happened}"), None, parents)
     except (NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
-        return RealDiagnosis(_refused(wanted, f"The fits broke down: {refusal}."), None, parents)
+        return RealDiagnosis(_refusal(wanted, f"The fits broke down: {refusal}."), None, parents)
     further = tuple(_further(each, wanted, found) for each in wanted.tests)
     pair = None if read.before is None else _pair(wanted, read, found)
     objections = (
@@ -88,8 +92,8 @@ def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on
 
 
 def _not_whole(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
-    """What was learned from the recording of before is wide, for one recording is little to learn from: what is more
-    than the model missed then is a remainder all the same."""
+    """Downgrade "explained" to "partly explained" where the recording made before the change shows a remainder
+    beyond what the model missed then: a single reference recording leaves wide uncertainty."""
     left, missed = pair.with_effects, pair.expected_left
     if answer.verdict != "explained" or left is None or missed is None or left <= EXPLAINED_ERROR * missed:
         return answer
@@ -100,23 +104,24 @@ def _not_whole(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
     return replace(answer, verdict="partly_explained", left=said, pair=replace(pair, verdict="partly_explained"))
 
 
-def imported(found: FoundMap) -> Recording:
-    """One recording of force-driven kind. Raises StudyError."""
+def import_real_recording(found: FoundMap) -> Recording:
+    """The one force-driven recording of a map. Raises StudyError."""
     recording = build_recording(found.source.map, found.files, lambda share: None).recording
     return all_as_force_driven([recording])[0]
 
 
 def _read(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: Progress) -> _Read:
-    """Raises StudyError where there is nothing to diagnose."""
+    """Import the recording, its model and the recording made before. Raises StudyError where there is nothing to
+    diagnose."""
     on_progress("importing", 0.0)
     if why := wanted.found.source.map.diagnosis.skip:
         raise nothing_to_diagnose((why,))
     # Of a real recording, for which there is no other, few cycles are a remark.
     try:
-        ready = prepared((imported(wanted.found),), (wanted.name,), _is_plain(wanted), short=True)
+        ready = prepared((import_real_recording(wanted.found),), (wanted.name,), _is_plain(wanted), short=True)
     except NothingToDiagnose as refusal:
         raise nothing_to_diagnose(refusal.problems) from refusal
-    before = () if wanted.before is None else (imported(wanted.before),)
+    before = () if wanted.before is None else (import_real_recording(wanted.before),)
     every = same_position((*ready.recordings, *before))
     recording = every.recordings[0]
     first = _model(wanted, recording, bounds, on_progress)
@@ -125,7 +130,7 @@ def _read(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: 
 
 
 def _is_plain(wanted: RealRecording) -> bool:
-    """Where no model says what its commands and responses are, in the form in which forces can be balanced."""
+    """Whether forces can be balanced directly: no model defines what its commands and responses are."""
     return wanted.before is None and wanted.model() is None
 
 
@@ -145,7 +150,8 @@ def _model(
     return FirstModel(given, ())
 
 
-def _refused(wanted: RealRecording, answer: str) -> RealAnswer:
+def _refusal(wanted: RealRecording, answer: str) -> RealAnswer:
+    """The answer for a recording that is not diagnosed."""
     diagnosis = wanted.found.source.map.diagnosis
     return RealAnswer(
         folder=wanted.folder.name,
@@ -175,14 +181,14 @@ def _refused(wanted: RealRecording, answer: str) -> RealAnswer:
 
 
 def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherTest:
-    """Nothing is fitted to it but, where the map says so, its volume. The models are as recorded, so that which way the
-    commands are counted was decided once, for all recordings of the device."""
+    """Test on a further recording; nothing is fitted to it except, where the map says so, its gain. The models are as
+    recorded, so that the direction in which commands are counted was decided once, for all recordings of the device."""
     title, free = test.source.map.title, test.source.map.diagnosis.volume_free
     try:
-        recording = imported(test)
+        recording = import_real_recording(test)
         if _is_plain(wanted):
             (recording,) = all_as_force_driven(plain_form((recording,), turns=False)[0])
-        retuned, after = (played_error(recording, model, "all") for model in (_retuned(found), found.improved))
+        retuned, after = (played_error(recording, model, "all") for model in (_require_retuned(found), found.improved))
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         said = problem.happened if isinstance(problem, StudyError) else f"{problem}."
         return FurtherTest(test.name, title, "", None, None, problem=said)
@@ -200,7 +206,7 @@ def _whole(name: str, recording: Recording, retuned: PlayedError, after: PlayedE
     )
 
 
-def _retuned(found: Findings) -> MechanicalModel:
+def _require_retuned(found: Findings) -> MechanicalModel:
     assert found.retuned is not None
     return found.retuned
 

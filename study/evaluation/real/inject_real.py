@@ -1,4 +1,4 @@
-"""Faults injected into real recordings under a seal, diagnosed by processes that know nothing of them, and counted."""
+"""Inject faults into real recordings under a seal, diagnose them in separate processes, and count the outcomes."""
 
 import json
 import secrets
@@ -15,11 +15,11 @@ from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.evaluation.bank.answer_cases import others_sha256
 from study.evaluation.bank.ask_engine import ask_engine, is_answered
-from study.evaluation.bank.proof_folder import CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, opened
-from study.evaluation.bank.proof_seals import answer_at, broken_seal, is_of, label_at, seal
+from study.evaluation.bank.proof_folder import CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
 from study.evaluation.bank.seal_cases import settings_text
-from study.evaluation.challenge.injection.injections import fitting_injections, inject, place_of
-from study.evaluation.real.diagnose_real import imported
+from study.evaluation.challenge.injection.injections import applicable_injections, inject, place_of
+from study.evaluation.real.diagnose_real import import_real_recording
 from study.evaluation.real.injected_halves import drawn_halves, held_out_change, without_lead
 from study.evaluation.real.real_folder import RealRecording
 from study.store.disk.provenance import sha256_of
@@ -28,32 +28,32 @@ from study.store.formats.mechanical_model_file import read_mechanical_model, wri
 from study.store.formats.recording_file import write_recording
 
 NOTHING = 0.5
-"""Share of draws into which nothing is injected: a name there is the worst answer."""
+"""Fraction of draws without a fault: naming an effect there is the worst answer."""
 TWO = 0.15
-"""Share of the others into which two faults are injected."""
+"""Fraction of the other draws with two faults."""
 PROCESSOR_S = 180.0
-"""For the search of one case: real recordings take longer than a bank's."""
+"""Processor time for the search in one case (s): real recordings take longer than those of a bank."""
 KEPT = ("feedback", "imposed", "parts")
-"""Notes that a diagnosis goes by."""
+"""Metadata that a diagnosis uses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carrier:
-    """A real recording that faults can be put into."""
+    """A real recording into which faults can be injected."""
 
     name: str
     model: MechanicalModel
-    """What the device is known to be by now, effects and all."""
+    """Best known model of the device, with its effects."""
     recording: Recording
 
 
 def carriers(out: Path, wanted: Sequence[RealRecording], answers: Sequence[RealAnswer]) -> tuple[Carrier, ...]:
-    """Of the recordings that were diagnosed into `out`."""
+    """The recordings that were diagnosed into `out`."""
     return tuple(
         Carrier(
             each.name,
             read_mechanical_model(out / each.folder.name / each.name / "improved.toml"),
-            imported(each.found),
+            import_real_recording(each.found),
         )
         for each, answer in zip(wanted, answers, strict=True)
         if answer.verdict != "refused"
@@ -61,7 +61,7 @@ def carriers(out: Path, wanted: Sequence[RealRecording], answers: Sequence[RealA
 
 
 def seal_injections(folder: ProofFolder, carried: Sequence[Carrier], count: int, seed: int) -> tuple[str, ...]:
-    """Draws and writes what is not there yet; names under `open`, in order. Raises StudyError."""
+    """Draw, write and seal the missing cases; returns the case names in order. Raises StudyError."""
     if not carried:
         raise StudyError(
             "There is nothing to inject faults into",
@@ -69,15 +69,16 @@ def seal_injections(folder: ProofFolder, carried: Sequence[Carrier], count: int,
             "Give recordings of open loops, or leave --inject out.",
             saved="The diagnoses are written.",
         )
-    names = [_sealed(folder, carried, number, seed) for number in range(count)]
+    names = [_seal_injection(folder, carried, number, seed) for number in range(count)]
     seal(folder)
     return tuple(names)
 
 
-def _sealed(folder: ProofFolder, carried: Sequence[Carrier], number: int, seed: int) -> str:
+def _seal_injection(folder: ProofFolder, carried: Sequence[Carrier], number: int, seed: int) -> str:
+    """Draw, write and seal one case; returns its name."""
     label = folder.label(number)
     if label.exists():
-        return str(label_at(label)["name"])
+        return str(read_label(label)["name"])
     random = np.random.default_rng([seed, number])
     carrier = carried[number % len(carried)]
     sound, rest = drawn_halves(carrier.recording, random)
@@ -116,7 +117,7 @@ def _sealed(folder: ProofFolder, carried: Sequence[Carrier], number: int, seed: 
 
 
 def _drawn_effects(recording: Recording, random: np.random.Generator) -> tuple[str, ...]:
-    known = fitting_injections(recording)
+    known = applicable_injections(recording)
     count = 2 if random.random() < TWO else 1
     drawn = [str(effect) for effect in random.choice(known, count, replace=False)]
     # What a sensor makes of a motion comes after it.
@@ -124,16 +125,16 @@ def _drawn_effects(recording: Recording, random: np.random.Generator) -> tuple[s
 
 
 def _nameless(recording: Recording) -> Recording:
-    """Without the notes that say where it is from."""
+    """The recording without metadata that reveals its origin."""
     return replace(recording, meta={key: recording.meta[key] for key in KEPT if key in recording.meta})
 
 
-def injected_outcomes(
+def run_injections(
     path: Path, carried: Sequence[Carrier], draws: tuple[int, int], on_done: Callable[[int, int], None]
 ) -> tuple[InjectedOutcome, ...]:
-    """draws: how many, and their seed. Interrupted, the same call goes on. Raises StudyError."""
+    """Seal, diagnose and reveal injected faults. draws: number of cases, and seed. Resumable. Raises StudyError."""
     count, seed = draws
-    folder = opened(path, seed, False)
+    folder = open_proof_folder(path, seed, False)
     names = seal_injections(folder, carried, count, seed)
     answered = sum(is_answered(folder.open / name) for name in names)
     on_done(answered, count)
@@ -144,8 +145,10 @@ def injected_outcomes(
         on_done(answered, count)
 
     ask_engine(folder, names, 2, one_more)
-    labels = [label_at(folder.label(number)) for number in range(len(names))]
-    answers = [answer_at(folder.open / name) for name in names]
-    if broken := [label["name"] for label, said in zip(labels, answers, strict=True) if not is_of(label, said)]:
-        raise broken_seal(broken, folder.path)
+    labels = [read_label(folder.label(number)) for number in range(len(names))]
+    answers = [read_answer(folder.open / name) for name in names]
+    if broken := [
+        label["name"] for label, said in zip(labels, answers, strict=True) if not answers_sealed_case(label, said)
+    ]:
+        raise broken_seal_error(broken, folder.path)
     return tuple(outcome_of(label, said) for label, said in zip(labels, answers, strict=True))

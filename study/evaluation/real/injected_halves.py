@@ -1,4 +1,4 @@
-"""A real recording in two: a half that stays as it is, and another that faults are put into; and how much they show."""
+"""Split a real recording into an intact half and one that carries a fault, and measure how visible the fault is."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,16 +14,16 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
 MOST_SAMPLES = 5_000
-"""Of each half of a recording, and of what is played before it."""
+"""Longest half, and longest lead before it (samples)."""
 SHORTEST = 0.6
-"""Of the longest half that a recording allows."""
+"""Shortest half as a fraction of the longest possible."""
 PARTS = 4
-"""From so many parts on, halves may also be made of parts by chance."""
+"""From this number of parts on, halves may also be drawn from parts."""
 
 
 def drawn_halves(recording: Recording, random: np.random.Generator) -> tuple[Recording, Recording]:
-    """Two stretches one after the other, of a length and at a place by chance, or parts by chance; which of them stays
-    clean is by chance, too. Both are without roles: which samples are fitted to is drawn anew in each."""
+    """Two random stretches of the recording, or random sets of its parts; which one stays intact is also random.
+    Both are without roles: the fit samples are drawn anew in each."""
     plain = replace(recording, segments=tuple(replace(segment, role="") for segment in recording.segments))
     parts = parts_of(plain)
     if len(parts) >= PARTS and random.random() < 0.5:
@@ -33,12 +33,15 @@ def drawn_halves(recording: Recording, random: np.random.Generator) -> tuple[Rec
     else:
         half = int(min(len(recording) // 2, MOST_SAMPLES) * random.uniform(SHORTEST, 1.0))
         start = int(random.integers(len(recording) - 2 * half + 1))
-        first, second = _led(plain, start, start + half), _led(plain, start + half, start + 2 * half)
+        first, second = (
+            _half_with_lead(plain, start, start + half),
+            _half_with_lead(plain, start + half, start + 2 * half),
+        )
     return (first, second) if random.random() < 0.5 else (second, first)
 
 
 def _of_parts(recording: Recording, parts: Sequence[tuple[int, int]]) -> Recording:
-    """Joined, up to as many samples as a half may have; a part that is longer by itself, as far as it may."""
+    """Concatenate parts up to the length of a half; the last one may be cut."""
     pieces: list[Recording] = []
     left = MOST_SAMPLES
     for start, stop in parts:
@@ -56,29 +59,29 @@ def _of_parts(recording: Recording, parts: Sequence[tuple[int, int]]) -> Recordi
     first = pieces[0]
     return replace(
         first,
-        command=_joined([piece.command for piece in pieces]),
-        response=_joined([piece.response for piece in pieces]),
-        position=_joined_if([piece.position for piece in pieces]),
-        excitation=_joined_if([piece.excitation for piece in pieces]),
-        condition=_joined_if([piece.condition for piece in pieces]),
+        command=_concatenate([piece.command for piece in pieces]),
+        response=_concatenate([piece.response for piece in pieces]),
+        position=_concatenate_known([piece.position for piece in pieces]),
+        excitation=_concatenate_known([piece.excitation for piece in pieces]),
+        condition=_concatenate_known([piece.condition for piece in pieces]),
         time_s=None,
         segments=tuple(segments) or (Segment(0, int(stops[-1]), "noise", 0.0),),
         meta={**recording.meta, "parts": named},
     )
 
 
-def _joined(signals: Sequence[Signal]) -> Signal:
+def _concatenate(signals: Sequence[Signal]) -> Signal:
     return replace(signals[0], samples=np.vstack([signal.samples for signal in signals]))
 
 
-def _joined_if(signals: Sequence[Signal | None]) -> Signal | None:
+def _concatenate_known(signals: Sequence[Signal | None]) -> Signal | None:
     known = [signal for signal in signals if signal is not None]
-    return _joined(known) if len(known) == len(signals) else None
+    return _concatenate(known) if len(known) == len(signals) else None
 
 
-def _led(recording: Recording, start: int, stop: int) -> Recording:
-    """A half begins in the middle of a motion. So that it can be played from rest all the same, what was there until
-    then goes before it, outside all segments."""
+def _half_with_lead(recording: Recording, start: int, stop: int) -> Recording:
+    """A half begins in the middle of a motion: what was recorded before it is put in front, outside all segments, so
+    that a simulation can start from rest."""
     lead = min(start, MOST_SAMPLES)
     whole = part_of(recording, start - lead, stop)
     own = [replace(segment, start=max(segment.start, lead)) for segment in whole.segments if segment.stop > lead]
@@ -96,24 +99,26 @@ def _led(recording: Recording, start: int, stop: int) -> Recording:
 
 
 def without_lead(recording: Recording) -> Recording:
-    """What was commanded is known there, and nothing else (NaN)."""
+    """The recording whose lead keeps only the command; the responses there are NaN."""
     lead = min((segment.start for segment in recording.segments), default=0)
-    position = None if recording.position is None else _unknown(recording.position, lead)
-    return replace(recording, response=_unknown(recording.response, lead), position=position)
+    position = None if recording.position is None else _blank_lead(recording.position, lead)
+    return replace(recording, response=_blank_lead(recording.response, lead), position=position)
 
 
-def _unknown(signal: Signal, lead: int) -> Signal:
+def _blank_lead(signal: Signal, lead: int) -> Signal:
+    """The signal with NaN in the lead."""
     samples = signal.samples.copy()
     samples[:lead] = np.nan
     return replace(signal, samples=samples)
 
 
 def held_out_change(sound: Recording, rest: Recording, spoiled: Recording) -> float | None:
-    """Error on the spoiled half over that on the same half as it was, of a model that is fitted to the sound half
-    alone; of the axis or channel where that is most. None where no model can be fitted.
+    """Visibility of a fault: ratio of the prediction error on the half with the fault to that on the same half without
+    it, for a model fitted to the intact half; in the axis or channel where it is largest. None where no model can be
+    fitted.
 
-    The model is the base that a comparison begins with: forces along the motion where they hold, else each reading from
-    its past. Nothing in it knows of faults.
+    The model is the baseline of a comparison: forces along the motion where they balance, otherwise an autoregression
+    of each reading. It contains no faults.
     """
     before, after, clean = (split_into_parts([each]) for each in (rest, spoiled, sound))
     if not before or not after or not clean:
@@ -127,7 +132,7 @@ def held_out_change(sound: Recording, rest: Recording, spoiled: Recording) -> fl
 
 
 def _error(base: Base, clean: tuple[Part, ...], other: tuple[Part, ...]) -> float:
-    """Rms of what is told of the others by a base that was fitted to the clean ones."""
+    """Rms residual on the other parts of a base model fitted to the clean ones."""
     known, asked = _rows(base, clean), _rows(base, other)
     size = np.sqrt(np.mean(known**2, axis=0))
     size = np.where(size > 0, size, 1.0)

@@ -1,5 +1,4 @@
-"""Answers to real recordings that an earlier run left: taken where they were made from what is there now, else refused
-before anything is done."""
+"""Reuse answers of an earlier run: kept if inputs and settings are unchanged, refused before any work otherwise."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,22 +19,23 @@ class _Kept:
     place: Path
     answer: RealAnswer
     changes: tuple[str, ...]
-    """What is otherwise than when it was made."""
+    """What differs from when it was made."""
 
 
 def answer_place(out: Path, real_recording: RealRecording) -> Path:
-    """Folder of one recording's results."""
+    """Folder with the results of one recording."""
     return out / real_recording.folder.name / real_recording.name
 
 
 def origin_of_answer(real_recording: RealRecording, seconds: float | None) -> Provenance:
-    """Everything that an answer hangs on. Raises CannotReadError."""
+    """Provenance: all inputs on which an answer depends. Raises CannotReadError."""
     files = tuple(dict.fromkeys((*real_recording.parents, *real_recording.tested_on)))
     return gather_provenance(parents=files, settings={"seconds": seconds})
 
 
 def kept_answers(out: Path, wanted: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
-    """By their place; nothing is written. Raises StudyError where one is torn, or was made from something else."""
+    """Earlier answers by folder; nothing is written. Raises StudyError where one is damaged or was made from other
+    inputs."""
     there = [each for each in wanted if (answer_place(out, each) / ANSWER_NAME).is_file()]
     kept = [_kept(answer_place(out, each), each, seconds) for each in there]
     if outdated := [each for each in kept if each.changes]:

@@ -1,4 +1,4 @@
-"""What a folder of real recordings holds: sub-folders, each with recordings that a map tells how to read."""
+"""Inventory of a folder of real recordings: sub-folders of recordings with maps that say how to read them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,29 +14,29 @@ from study.store.formats.mechanical_model_file import read_mechanical_model
 
 @dataclass(frozen=True, slots=True)
 class RealRecording:
-    """One to diagnose."""
+    """One recording to diagnose."""
 
     folder: Path
     found: FoundMap
     tests: tuple[FoundMap, ...] = ()
     """Recordings of the same device that are only predicted."""
     before: FoundMap | None = None
-    """The same device before something was changed on it,"""
+    """Recording of the same device before something was changed on it."""
     changed: str = ""
-    """in words."""
+    """That change in words."""
 
     @property
     def name(self) -> str:
         return self.found.name
 
     def model(self) -> MechanicalModel | None:
-        """None where a linear one is to be fitted. Raises StudyError."""
+        """The given model; None where a linear one is to be fitted. Raises StudyError."""
         path = self._model_path()
         return None if path is None else read_mechanical_model(path)
 
     @property
     def parents(self) -> tuple[Path, ...]:
-        """Files that the diagnosis is made from: recordings, map, and the model where one is there."""
+        """Input files of the diagnosis: recordings, map, and the model if given."""
         before = () if self.before is None else self.before.files
         try:
             model = self._model_path()
@@ -61,8 +61,8 @@ class RealFolder:
 
 
 def read_real_folder(folder: Path) -> RealFolder:
-    """Sub-folders in order of their names; the folder itself where it has none. Raises StudyError where there is no
-    such folder."""
+    """Recordings of the sub-folders in alphabetical order; of the folder itself where it has none. Raises StudyError
+    where there is no such folder."""
     if not folder.is_dir():
         raise StudyError(
             "There is no such folder",
@@ -99,8 +99,8 @@ def _recordings(folder: Path, found: Sequence[FoundMap]) -> list[RealRecording]:
 
 
 def _tests(test: FoundMap, base: FoundMap) -> bool:
-    """Whether one only tests what was found in the other; of maps with a recording per file, in the file whose name
-    begins alike, up to the first underline."""
+    """Whether `test` only tests what was found in `base`. With one recording per file, the file names must agree up
+    to the first underscore."""
     wanted = test.source.map.diagnosis.tests
     if not wanted or base.source.map.diagnosis.tests:
         return False

@@ -1,4 +1,4 @@
-"""`hapteq real`: all recordings of a folder, one after the other. Answers that are there already are kept."""
+"""`hapteq real`: diagnose all recordings of a folder; existing answers are kept."""
 
 import errno
 import math
@@ -13,8 +13,8 @@ from analysis.diagnosis.types import TimeBudget
 from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import LeftError, StudyError, WrongUseError
-from study.evaluation.real.diagnose_real import RealDiagnosis, crashed, diagnose_real
-from study.evaluation.real.inject_real import carriers, injected_outcomes
+from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, report_crash
+from study.evaluation.real.inject_real import carriers, run_injections
 from study.evaluation.real.kept_answers import (
     ANSWER_NAME,
     INJECTED_NAME,
@@ -37,12 +37,12 @@ from study.workflows.forked_map import processor_s
 
 RETUNED_NAME = "retuned.toml"
 DIAGNOSED_OF_BOTH = 0.5
-"""Share of the work that is done when faults begin to be injected."""
+"""Progress at which the injection of faults begins."""
 EVALUATIONS = 4000
-"""Pieces of a search (a structure weighed, a law simulated or fitted) for one recording: one that is not done by then
-ends with what it has. Seconds would make answers hang on what else the machine does."""
+"""Limit of the search for one recording, counted in evaluations (a structure weighed, a law simulated or fitted); it
+then ends with its best result. A count, because seconds would make answers depend on the load of the machine."""
 BESIDE_S = 25.0
-"""What fitting a model, a page and figures take beside the search, where seconds are asked for."""
+"""Seconds for fitting a model, page and figures beside the search, where seconds are asked for."""
 
 Progress = Callable[[str, float], None]
 
@@ -52,22 +52,23 @@ class RealPlan:
     folder: Path
     out: Path
     seconds: float | None = None
-    """Of processor time, for a folder's recordings together; None = evaluations are counted."""
+    """Processor time for all recordings of a folder together; None = evaluations are counted."""
     inject: int = 0
-    """Faults to inject into what was diagnosed; 0 = none."""
+    """Number of faults to inject into the diagnosed recordings; 0 = none."""
     seed: int = 1
-    """Of their draws."""
+    """Seed of these draws."""
 
 
 def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None = None) -> WrittenReal:
-    """`on_progress(what is being done, share)`. Interrupted (LeftError), the same call goes on. Raises StudyError."""
+    """Diagnose a folder and write page and table. `on_progress(step, share)`. Resumable after LeftError. Raises
+    StudyError."""
     found = _found(plan)
     time = clock or RealClock()
     kept = kept_answers(plan.out, found.recordings, plan.seconds)
     _make_writable(plan.out)
     try:
         answers = _answers(plan, found, kept, on_progress, time)
-        injected = _injected(plan, found, answers, on_progress)
+        injected = _inject_faults(plan, found, answers, on_progress)
         on_progress("writing the page", 0.98)
         return write_real(
             plan.out, RealResults(answers, found.troubles, injected), local_time(time.utc(), machine_zone)
@@ -82,7 +83,7 @@ def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None =
 
 
 def _found(plan: RealPlan) -> RealFolder:
-    """Raises StudyError where there is nothing to diagnose, or no time for it."""
+    """The inventory. Raises StudyError where there is nothing to diagnose, or no time for it."""
     if plan.seconds is not None and not math.isfinite(plan.seconds):
         raise WrongUseError(
             "That is no number of seconds",
@@ -102,7 +103,7 @@ def _found(plan: RealPlan) -> RealFolder:
 
 
 def _make_writable(out: Path) -> None:
-    """What cannot be written is said before the work, not after it. Raises CannotWriteError."""
+    """Create the output folder before the work. Raises CannotWriteError."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
@@ -111,7 +112,7 @@ def _make_writable(out: Path) -> None:
         raise CannotWriteError(out / PAGE_NAME, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
 
 
-def _injected(
+def _inject_faults(
     plan: RealPlan, found: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress
 ) -> tuple[InjectedOutcome, ...]:
     if plan.inject == 0:
@@ -123,7 +124,7 @@ def _injected(
     def show(done: int, of: int) -> None:
         on_progress(f"injected faults, {done} of {of}", begun + (0.98 - begun) * done / max(of, 1))
 
-    return injected_outcomes(plan.out / INJECTED_NAME, carried, (plan.inject, plan.seed), show)
+    return run_injections(plan.out / INJECTED_NAME, carried, (plan.inject, plan.seed), show)
 
 
 def _answers(
@@ -151,7 +152,7 @@ def _answers(
 def _answer(
     plan: RealPlan, real_recording: RealRecording, budget_s: float, on_progress: Progress, clock: Clock
 ) -> RealAnswer:
-    """budget_s: of processor time, that the search may take."""
+    """Diagnose one recording and write its results. budget_s: processor time for the search."""
     begun_s, worked, guard = clock.now_s(), processor_s(), crash_guard()
     timed: TimeBudget = lambda: processor_s() - worked < budget_s  # noqa: E731
     time_left = Counted(EVALUATIONS) if plan.seconds is None else timed
@@ -172,11 +173,11 @@ def _answer(
     except Exception as crash:
         if not guard.on:
             raise
-        return kept(crashed(real_recording, crash))
+        return kept(report_crash(real_recording, crash))
 
 
 def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:
-    """Whole or not at all."""
+    """Write the results of one recording atomically."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:

@@ -1,4 +1,4 @@
-"""What is said of a folder of real recordings at the end, in lines."""
+"""Summary of a folder of real recordings for the terminal."""
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.unit_wording import error_text

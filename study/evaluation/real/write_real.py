@@ -1,4 +1,4 @@
-"""The page, the table and the figures of a folder of real recordings."""
+"""Write page, table and figures for a folder of real recordings."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ PAGE_NAME, TABLE_NAME, INJECTED_NAME, FIGURES_NAME = "report.html", "recordings.
 
 @dataclass(frozen=True, slots=True)
 class RealRow:
-    """Errors are shares of the signal on held-out data."""
+    """One row of the table. Errors are normalised by the signal, on held-out data."""
 
     folder: str
     recording: str
@@ -31,12 +31,13 @@ class RealRow:
     noise: float | None
     seconds: float
     candidates: str
-    """Not confirmed, the best first."""
+    """Unconfirmed candidates, best first."""
 
 
 @dataclass(frozen=True, slots=True)
 class InjectedRow:
-    """`change`: held-out error with the fault over that without it, of a base model fitted to the clean half."""
+    """One row per injected fault. `change`: held-out error with the fault over that without it, of a base model
+    fitted to the intact half."""
 
     recording: str
     injected: str
@@ -66,7 +67,7 @@ class WrittenReal:
 
 
 def write_real(out: Path, results: RealResults, generated: str) -> WrittenReal:
-    """What is there from an earlier run is replaced. Raises CannotWriteError."""
+    """Write page, table and figures, replacing earlier ones. Raises CannotWriteError."""
     answers = results.answers
     pictures = {(answer.folder, answer.recording): real_picture(answer) for answer in answers}
     write_pictures(out / FIGURES_NAME, tuple(pictures.values()))
@@ -79,7 +80,7 @@ def write_real(out: Path, results: RealResults, generated: str) -> WrittenReal:
     if results.injected:
         write_text(
             out / INJECTED_NAME,
-            rows_to_csv([_injected(each) for each in results.injected], InjectedRow),
+            rows_to_csv([_injection_row(each) for each in results.injected], InjectedRow),
             overwrite=True,
         )
     page = render_real_report(results.answers, results.troubles, results.injected, pictures, shown, generated)
@@ -100,7 +101,7 @@ def _row(real_answer: RealAnswer) -> RealRow:
     )  # fmt: skip
 
 
-def _injected(outcome: InjectedOutcome) -> InjectedRow:
+def _injection_row(outcome: InjectedOutcome) -> InjectedRow:
     values = " ".join(f"{name}={value:.6g}" for name, value in outcome.values.items())
     return InjectedRow(
         outcome.recording, outcome.injected or "nothing", outcome.strength, values, outcome.change,

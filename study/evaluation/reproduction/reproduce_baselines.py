@@ -1,4 +1,4 @@
-"""Other ways of driving the device, played on it: at the centre, at the edge, in a simulated hand."""
+"""Baseline methods of driving the device, played on it at the centre, at the edge, and in a simulated hand."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.baselines import Inverse
 from equalizer.tracking.feedforward.comparison import baseline_inverses
 from equalizer.tracking.workspace.blended_inverse import blended_at
-from study.evaluation.reproduction.reproduce_equalized import PlacedModels, only, through
+from study.evaluation.reproduction.reproduce_equalized import PlacedModels, blending_driver, single_model_driver
 from study.evaluation.reproduction.reproduce_playback import Driver, Playing, play_row
 from study.evaluation.reproduction.reproduction_plan import CENTRE, EDGE, Place, ReproductionPlan
 
@@ -29,9 +29,10 @@ _WHERE = (_Where("centre", CENTRE, False), _Where("edge", EDGE, False), _Where("
 def play_baselines(
     plan: ReproductionPlan, models: PlacedModels, estimate: FrequencyResponse, on_share: Callable[[float], None]
 ) -> tuple[PlayedResponse, ...]:
-    """All from what was identified at the centre, without a hand; at the end of each place ours for that place.
+    """Play all baselines, designed from what was identified at the centre without a hand; last, our equalizer for each
+    place.
 
-    estimate: of the centre, its spring a part of the device.
+    estimate: frequency response at the centre, including the spring.
     """
     inverses = baseline_inverses(models.centre, estimate, _lines_hz(plan, models.centre.sample_rate_hz))
     wanted = len(_WHERE) * len(inverses) + 2
@@ -49,9 +50,11 @@ def play_baselines(
 
 def _for_the_place(where: _Where, models: PlacedModels) -> tuple[Playing, ...]:
     if where.hand:
-        return (Playing("model identified in the hand", only(models.hand), hand=True),)
+        return (Playing("model identified in the hand", single_model_driver(models.hand), hand=True),)
     if where.place_m == EDGE:
-        return (Playing("models of other places, blended, edge", through(blended_at(models.workspace, EDGE)), EDGE),)
+        return (
+            Playing("models of other places, blended, edge", blending_driver(blended_at(models.workspace, EDGE)), EDGE),
+        )
     return ()
 
 

@@ -1,4 +1,4 @@
-"""The rows of figure 5: which models drive the device where."""
+"""Rows of figure 5: which model drives the device at which place."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,15 +20,15 @@ from study.evaluation.reproduction.reproduction_plan import EDGE, ReproductionPl
 
 @dataclass(frozen=True, slots=True)
 class PlacedModels:
-    """All hold the spring that acts while they play."""
+    """Identified models by place; all include the spring that acts during playback."""
 
     centre: IdentifiedModel
     between: tuple[IdentifiedModel, ...]
     """Identified beside the centre, not at the edge."""
     frictionless: IdentifiedModel
-    """Of the centre of the device without friction."""
+    """At the centre, of the device without friction."""
     hand: IdentifiedModel
-    """Of the centre, in a hand."""
+    """At the centre, in a hand."""
 
     @property
     def workspace(self) -> WorkspaceModels:
@@ -39,13 +39,14 @@ class PlacedModels:
 class Played:
     rows: EqualizedRows
     others: tuple[PlayedResponse, ...]
-    """For the table alone."""
+    """Rows of the table only."""
     remarks: tuple[str, ...]
 
 
 def play_equalized(plan: ReproductionPlan, models: PlacedModels, on_share: Callable[[float], None]) -> Played:
+    """Play all rows. on_share: progress, 0 to 1."""
     blended = blended_at(models.workspace, EDGE)
-    interpolated, remarks = _interpolated(models.workspace)
+    interpolated, remarks = _interpolate_modes(models.workspace)
     playings = _playings(models, blended) | interpolated
     found: dict[str, PlayedResponse] = {}
     for number, (key, playing) in enumerate(playings.items(), start=1):
@@ -53,11 +54,11 @@ def play_equalized(plan: ReproductionPlan, models: PlacedModels, on_share: Calla
         plain = playing.driver is not_equalized
         found[key] = replace(played, response=scaled(played.response)) if plain else played
         on_share(number / len(playings))
-    return _sorted(found, (*blended.remarks, *remarks, *_clipped(found)))
+    return _sort_rows(found, (*blended.remarks, *remarks, *_clipping_remarks(found)))
 
 
-def through(models: ModelsAtPlace) -> Driver:
-    """Every model computes its forces, and the forces are blended."""
+def blending_driver(models: ModelsAtPlace) -> Driver:
+    """Driver that lets every model compute its forces and blends them."""
 
     def drive(wanted: Signal) -> FloatArray:
         return models.forces(lambda model: periodic_command(model, wanted).samples)
@@ -66,18 +67,18 @@ def through(models: ModelsAtPlace) -> Driver:
 
 
 def _playings(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Playing]:
-    centre = only(models.centre)
-    slick = only(models.frictionless)
+    centre = single_model_driver(models.centre)
+    slick = single_model_driver(models.frictionless)
     return {
         "plain": Playing("Not equalized, centre", not_equalized),
         "equalized": Playing("Equalized, centre", centre),
         "edge_plain": Playing("Not equalized, edge", not_equalized, EDGE),
         "edge": Playing("Edge, model of the centre", centre, EDGE),
-        "edge_blended": Playing("Edge, models blended (ours)", through(blended), EDGE),
+        "edge_blended": Playing("Edge, models blended (ours)", blending_driver(blended), EDGE),
         "broad_plain": Playing("Not equalized, centre, all frequencies", not_equalized, signal="multisine"),
         "broad": Playing("Equalized, centre, all frequencies", centre, signal="multisine"),
         "edge_broad": Playing(
-            "Edge, models blended (ours), all frequencies", through(blended), EDGE, signal="multisine"
+            "Edge, models blended (ours), all frequencies", blending_driver(blended), EDGE, signal="multisine"
         ),
         "slick_plain": Playing("Not equalized, centre, without friction", not_equalized, device=FRICTIONLESS),
         "slick": Playing("Equalized, centre, without friction", slick, device=FRICTIONLESS),
@@ -87,20 +88,22 @@ def _playings(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Playing
     }
 
 
-def only(model: IdentifiedModel) -> Driver:
+def single_model_driver(model: IdentifiedModel) -> Driver:
+    """Driver that tracks with one model."""
     return lambda wanted: periodic_command(model, wanted).samples
 
 
-def _interpolated(workspace: WorkspaceModels) -> tuple[dict[str, Playing], tuple[str, ...]]:
+def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, Playing], tuple[str, ...]]:
+    """The row with modal interpolation, or a remark where the modes do not match."""
     try:
         at_edge = modal_interpolation(workspace).at(EDGE)
     except ModesDoNotMatchError as doubt:
         return {}, (f"No modes were interpolated: {doubt}.",)
-    playing = Playing("Edge, modes interpolated (ours)", through(at_edge), EDGE)
+    playing = Playing("Edge, modes interpolated (ours)", blending_driver(at_edge), EDGE)
     return {"edge_modal": playing}, at_edge.remarks
 
 
-def _clipped(found: Mapping[str, PlayedResponse]) -> Sequence[str]:
+def _clipping_remarks(found: Mapping[str, PlayedResponse]) -> Sequence[str]:
     return [
         f"{row.name} ({row.signal}): a cap cut the force off at {row.clipped_ticks} ticks."
         for row in found.values()
@@ -108,7 +111,7 @@ def _clipped(found: Mapping[str, PlayedResponse]) -> Sequence[str]:
     ]
 
 
-def _sorted(found: Mapping[str, PlayedResponse], remarks: tuple[str, ...]) -> Played:
+def _sort_rows(found: Mapping[str, PlayedResponse], remarks: tuple[str, ...]) -> Played:
     named = EqualizedRows.__dataclass_fields__
     rows = EqualizedRows(**{name: found[name] for name in named})
     return Played(rows, tuple(row for name, row in found.items() if name not in named), remarks)

@@ -1,4 +1,4 @@
-"""The published figures 1 to 5 on the simulated omega.3: everything that takes long is kept, and used again."""
+"""Reproduce the published figures 1 to 5 on the simulated omega.3; recordings and models are cached."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from study.devices.opening import FRICTIONLESS
 from study.errors import LeftError, StudyError
 from study.evaluation.reproduction.reproduce_baselines import play_baselines
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, play_equalized
-from study.evaluation.reproduction.reproduce_recordings import Recorded, Wanted, recorded
+from study.evaluation.reproduction.reproduce_recordings import Recorded, Wanted, record_or_load
 from study.evaluation.reproduction.reproduction_plan import BETWEEN, ReproductionPlan, Steps
 from study.evaluation.reproduction.reproduction_results import Results
 from study.evaluation.reproduction.write_reproduction import WrittenReproduction, write_reproduction_folder
@@ -35,21 +35,22 @@ from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReproducedModel:
-    """The models behind figure 5: identified once from each recording, and used again by the next run."""
+    """A model behind figure 5: identified once from its recording and reused by the next run."""
 
     model: IdentifiedModel
-    """It holds the spring: what is played under the same spring needs no other account of it."""
+    """It includes the spring, so that playback under the same spring needs no other account of it."""
     tested: HeldOut | None
 
-    def used(self, name: str) -> UsedModel:
-        """name: of its recording."""
+    def as_used_model(self, name: str) -> UsedModel:
+        """Summary for the report. name: of its recording."""
         quality = self.model.quality
         assert quality is not None, "every model that is kept or made here has one"
         return UsedModel(name.replace("_", " "), quality.expected_error, quality.held_out_error, quality.held_out_noise)
 
 
-def modelled(plan: ReproductionPlan, recorded: Recorded, on_share: Callable[[float], None]) -> ReproducedModel:
-    """A file in the way that is not of this recording, order and band, or without its quality, is made again."""
+def identify_or_load(plan: ReproductionPlan, recorded: Recorded, on_share: Callable[[float], None]) -> ReproducedModel:
+    """Load the cached model, or identify it; a cached file of another recording, order or band, or without its
+    quality, is replaced."""
     path = plan.models / recorded.path.name
     model = _kept(path, plan, recorded.path)
     if model is None:
@@ -72,26 +73,26 @@ def _kept(path: Path, plan: ReproductionPlan, source: Path) -> IdentifiedModel |
 
 
 def from_excitation(recording: Recording) -> Recording:
-    """As the model sees it, the spring a part of the device."""
+    """The recording from excitation to response, so that the spring is part of the device."""
     return replace(recording, command=recording.excitation or recording.command)
 
 
 SUBJECT_S, RECORDING_S, MODEL_S, PLAYING_S, BASELINES_S, WRITING_S = 5.0, 2.0, 12.0, 8.0, 12.0, 8.0
-"""About what each takes: for the progress alone."""
+"""Approximate duration of each step (s), for the progress only."""
 
 CENTRE_NAME, SLICK_NAME, HAND_NAME = "centre", "frictionless", "hand"
 
 
 def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]) -> WrittenReproduction:
-    """`on_progress(share)`, 0 to 1. Interrupted (LeftError), the same call goes on. Raises StudyError."""
-    wanted = _wanted(plan)
-    models = _modelled_names()
+    """Make all figures. `on_progress(share)`, 0 to 1. Resumable after LeftError. Raises StudyError."""
+    wanted = _recordings_to_make(plan)
+    models = _model_names()
     steps = Steps(_weights(plan, wanted, models), on_progress)
     try:
         _make_folders(plan)
-        recordings = {name: recorded(plan, each, steps.of(f"recording {name}")) for name, each in wanted.items()}
+        recordings = {name: record_or_load(plan, each, steps.of(f"recording {name}")) for name, each in wanted.items()}
         collected = _sit(plan, steps)
-        identified = {name: modelled(plan, recordings[name], steps.of(f"model {name}")) for name in models}
+        identified = {name: identify_or_load(plan, recordings[name], steps.of(f"model {name}")) for name in models}
         results = _results(plan, recordings, identified, collected, steps)
         return write_reproduction_folder(plan, results, steps.of("writing"))
     except (KeyboardInterrupt, LeftError) as interruption:
@@ -103,7 +104,7 @@ def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]
         ) from interruption
 
 
-def _wanted(plan: ReproductionPlan) -> Mapping[str, Wanted]:
+def _recordings_to_make(plan: ReproductionPlan) -> Mapping[str, Wanted]:
     asked = plan.protocols
     wanted = (
         Wanted("ellipsoid", asked.ellipsoid),
@@ -120,7 +121,7 @@ def _between_names() -> tuple[str, ...]:
     return tuple(f"between_{number}" for number in range(1, len(BETWEEN) + 1))
 
 
-def _modelled_names() -> tuple[str, ...]:
+def _model_names() -> tuple[str, ...]:
     return (CENTRE_NAME, *_between_names(), SLICK_NAME, HAND_NAME)
 
 
@@ -166,7 +167,7 @@ def _results(
     )
     centre = recordings[CENTRE_NAME].recording
     try:
-        device = _measured(recordings["sweep"].recording)
+        device = _measure_device(recordings["sweep"].recording)
         shapes = _ellipsoids(recordings["ellipsoid"].recording)
         estimate = transfer_estimate((from_excitation(centre),))
     except (TransferEstimateError, ValueError) as problem:
@@ -183,7 +184,7 @@ def _results(
         device_name=centre.device,
         played=play_equalized(plan, models, steps.of("playing")),
         baselines=play_baselines(plan, models, estimate, steps.of("baselines")),
-        models=tuple(each.used(name) for name, each in identified.items()),
+        models=tuple(each.as_used_model(name) for name, each in identified.items()),
         tested=identified[CENTRE_NAME].tested,
         tested_frictionless=identified[SLICK_NAME].tested,
         remarks=tuple(f"{name}: {said}" for name, recording in recordings.items() for said in recording.warnings),
@@ -192,7 +193,7 @@ def _results(
     )
 
 
-def _measured(recording: Recording) -> MeasuredDevice:
+def _measure_device(recording: Recording) -> MeasuredDevice:
     response = transfer_estimate((recording,))
     return MeasuredDevice(response, find_resonances(response), coupling_onset(response))
 

@@ -1,4 +1,4 @@
-"""What the simulated device plays of what is wanted, axis by axis, measured on its true acceleration (figure 5)."""
+"""Play wanted accelerations axis by axis on the simulated device and measure its true acceleration (figure 5)."""
 
 import contextlib
 from collections.abc import Callable
@@ -24,19 +24,19 @@ from study.store.formats.protocol_files import read_recording_protocol
 
 AXES = ("ax", "ay", "az")
 OF_CAP = 0.93
-"""Peak force of everything that is played: far above friction, and below the cap."""
+"""Peak force of everything that is played, as a fraction of the cap: far above friction, below the cap."""
 PERIODS = 2
-"""The first for the transient."""
+"""Periods played; the first lets the transient decay."""
 FADE_S = 0.5
 WAVE_SEED = 5
 
 Driver = Callable[[Signal], FloatArray]
-"""From one loop of wanted accelerations (period, 3) to one of forces."""
+"""Maps one period of wanted accelerations (period, 3) to forces."""
 
 
 @dataclass(frozen=True, slots=True)
 class Playing:
-    """One row: where, on what, and what is done to the wanted signal."""
+    """One row: place, device, and how the wanted signal is turned into forces."""
 
     name: str
     driver: Driver
@@ -47,12 +47,12 @@ class Playing:
 
 
 def not_equalized(wanted: Signal) -> FloatArray:
-    """The force follows the wanted acceleration."""
+    """Forces proportional to the wanted acceleration."""
     return wanted.samples
 
 
 def play_row(plan: ReproductionPlan, playing: Playing) -> PlayedResponse:
-    """Raises DeviceError, or StudyError where the device does not tell its true acceleration."""
+    """Play one row. Raises DeviceError, or StudyError where the device does not report its true acceleration."""
     protocol = read_recording_protocol(plan.protocols.band).protocol
     settings = DeviceSettings(
         limits=limits_of_recording(protocol),
@@ -95,7 +95,8 @@ def _play_axes(plan: ReproductionPlan, playing: Playing, device: Device, peak_n:
 
 
 def _steady(device: Device, loop: FloatArray) -> tuple[FloatArray, int]:
-    """The last period of the handle's true acceleration, (period, 3), and the ticks at which a cap cut in."""
+    """Last period of the handle's true acceleration, (period, 3), and the number of ticks at which a cap cut the
+    force."""
     rate_hz = device.info.sample_rate_hz
     forces = apply_fades(np.tile(loop, (PERIODS, 1)), round(FADE_S * rate_hz), 0)
     played = device.play(Signal(forces, rate_hz, "force", "N", ("fx", "fy", "fz")))

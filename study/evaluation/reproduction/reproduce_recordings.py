@@ -1,4 +1,4 @@
-"""The recordings behind the figures: made once, and used again by the next run."""
+"""Recordings behind the figures: made once and reused by the next run."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from study.workflows.recording.record_device import RecordingPlan, record_device
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """name: of the file, without its ending."""
+    """A recording to make. name: of the file, without its ending."""
 
     name: str
     protocol: str
@@ -34,8 +34,8 @@ class Recorded:
     warnings: tuple[str, ...]
 
 
-def recorded(plan: ReproductionPlan, wanted: Wanted, on_share: Callable[[float], None]) -> Recorded:
-    """Raises StudyError where the folder holds a recording of another run."""
+def record_or_load(plan: ReproductionPlan, wanted: Wanted, on_share: Callable[[float], None]) -> Recorded:
+    """Load the cached recording, or make it. Raises StudyError where the folder holds a recording of another run."""
     path = plan.recordings / f"{wanted.name}.h5"
     protocol = read_recording_protocol(wanted.protocol).protocol
     found = _kept(path, plan, wanted, protocol)
@@ -45,11 +45,11 @@ def recorded(plan: ReproductionPlan, wanted: Wanted, on_share: Callable[[float],
         record_device(recording, lambda seconds: on_share(seconds / total_s))
         found = read_recording(path)
     on_share(1.0)
-    return Recorded(path, found, _lowered(found))
+    return Recorded(path, found, _reduced_amplitude_warnings(found))
 
 
 def _kept(path: Path, plan: ReproductionPlan, wanted: Wanted, protocol: RecordingProtocol) -> Recording | None:
-    """None where there is none yet, or only a part of one, which is then removed."""
+    """The cached recording; None where there is none or only an unfinished one, which is removed."""
     if not path.exists():
         return None
     try:
@@ -70,8 +70,8 @@ def _kept(path: Path, plan: ReproductionPlan, wanted: Wanted, protocol: Recordin
     return found
 
 
-def _lowered(recording: Recording) -> tuple[str, ...]:
-    """What was played with less than the protocol asks for: said again on every run."""
+def _reduced_amplitude_warnings(recording: Recording) -> tuple[str, ...]:
+    """Warnings where the amplitude was lower than the protocol asks for; repeated on every run."""
     return tuple(
         f"Played at {about['played_amplitude_n']:.3g} N instead of {about['requested_amplitude_n']:.3g} N along "
         f"{about['along']}, because something was at its limit."

@@ -1,4 +1,4 @@
-"""What `hapteq reproduce` is asked for, where it keeps what is done, and how far it is."""
+"""Settings of `hapteq reproduce`, its folders, and its progress."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ Place = tuple[float, float, float]
 
 CENTRE: Place = (0.0, 0.0, 0.0)
 EDGE: Place = (0.0, 0.05, 0.0)
-"""Towards the edge of a workspace whose soft stops begin at 75 mm."""
+"""Near the edge of a workspace whose soft stops begin at 75 mm."""
 BETWEEN: tuple[Place, ...] = ((0.0, 0.03, 0.0), (0.0, 0.065, 0.0))
-"""Where models for interpolation are identified beside the centre's: never at the edge place itself, so that what is
-played there is a test of the interpolation."""
+"""Places where models for interpolation are identified beside the centre: never the edge place itself, so that
+playback there tests the interpolation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,9 +23,9 @@ class ReproducedProtocols:
     sweep: str = "sweep"
     """Over the whole range, for figures 1 and 4."""
     band: str = "sweep_band"
-    """Of the band that is equalized, for figure 5."""
+    """Over the equalized band, for figure 5."""
     hand: str = "sweep_hand"
-    """The same in a hand, for the table of other ways."""
+    """The same in a hand, for the table of baselines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class ReproductionPlan:
     order: int = 26
     band_hz: tuple[float, float] = (5.0, 35.0)
     period_s: float = 10.0
-    """Of what is played through the equalizer: lines are its inverse apart."""
+    """Period of what is played through the equalizer; its inverse is the line spacing."""
 
     @property
     def study(self) -> Path:
@@ -58,7 +58,7 @@ class ReproductionPlan:
 
 
 class Steps:
-    """Turns the shares of steps of different length into one."""
+    """Combines the progress of steps of different length."""
 
     def __init__(self, weights: Mapping[str, float], on_progress: Callable[[float], None]) -> None:
         self._weights = weights
@@ -66,7 +66,7 @@ class Steps:
         self._done: dict[str, float] = {}
 
     def of(self, step: str) -> Callable[[float], None]:
-        """For the step: takes its own share, 0 to 1."""
+        """Progress callback for one step: takes its own share, 0 to 1."""
         return lambda share: self._tell(step, share)
 
     def _tell(self, step: str, share: float) -> None:

@@ -1,4 +1,4 @@
-"""Everything that the five figures are made from, once it is there."""
+"""All results from which the five figures are made."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,11 +22,11 @@ class Results:
     baselines: tuple[PlayedResponse, ...]
     models: tuple[UsedModel, ...]
     tested: HeldOut | None
-    """The centre's model on what was kept from it."""
+    """Held-out test of the centre's model."""
     tested_frictionless: HeldOut | None
     remarks: tuple[str, ...]
-    """Of recordings and models, in sentences."""
+    """On recordings and models, in sentences."""
     sources: tuple[Path, ...]
-    """Files that all this comes from."""
+    """Input files."""
     protocol_hash: str
-    """Of the study."""
+    """Of the study protocol."""

@@ -1,4 +1,4 @@
-"""The folder of a reproduction: figures, the document of numbers, the page."""
+"""Write the folder of a reproduction: figures, document of numbers, page."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class WrittenReproduction:
 def write_reproduction_folder(
     plan: ReproductionPlan, results: Results, on_share: Callable[[float], None]
 ) -> WrittenReproduction:
-    """What is there from an earlier run is replaced. Raises CannotWriteError."""
+    """Write everything, replacing an earlier run. Raises CannotWriteError."""
     limit_hz = direction_limit_hz(results.study)
     used_limit_hz = PUBLISHED_DIRECTION_LIMIT_HZ if limit_hz is None else limit_hz
     bands = frequency_bands(results.device.onset.frequency_hz, used_limit_hz)
@@ -81,7 +81,7 @@ def _document(
             study_findings(results.study),
             ellipsoid_findings(results.ellipsoids),
             response_findings(results.device.response, results.device.resonances, results.device.onset),
-            _equalized(results),
+            _equalization_findings(results),
         ),
         played=tuple(played_row(row) for row in (*played.rows.all, *played.others)),
         baselines=tuple(played_row(row) for row in results.baselines),
@@ -89,14 +89,14 @@ def _document(
     )
 
 
-def _equalized(results: Results) -> FigureFindings:
+def _equalization_findings(results: Results) -> FigureFindings:
     with_it, without = results.tested, results.tested_frictionless
     tested = (with_it.error, without.error) if with_it and without else None
     return equalized_findings(results.played.rows, tested, (*results.remarks, *results.played.remarks))
 
 
 def _shown(origin: Provenance) -> dict[str, str]:
-    """What the page's last section shows."""
+    """Entries of the page's last section."""
     return {
         "recordings": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in origin.parents),
         "study protocol": f"hash {origin.protocol_hash}",

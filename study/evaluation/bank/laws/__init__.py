@@ -1,1 +1,2 @@
-"""A bank of concealed laws: `seal_laws`, `prove_laws` (answered as any bank, revealed), `write_laws`."""
+"""A bank of concealed laws (terms outside the effect catalogue): `seal_laws`, `prove_laws` (answer and reveal),
+`write_laws`."""

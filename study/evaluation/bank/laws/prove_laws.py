@@ -1,4 +1,4 @@
-"""A bank of concealed laws from start to end: sealed, answered by processes that know nothing, revealed, scored."""
+"""Run a bank of concealed laws: seal, diagnose in separate processes, reveal, score."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,8 +11,8 @@ from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
 from analysis.evaluation.laws.law_score import LawScore, law_score
 from study.evaluation.bank.ask_engine import is_answered
 from study.evaluation.bank.laws.seal_laws import fresh_file, fresh_motions, seal_laws
-from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, opened
-from study.evaluation.bank.seal_cases import BankPlan, sealed_names
+from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
+from study.evaluation.bank.seal_cases import BankPlan, read_case_names
 from study.evaluation.bank.sealed_bank import Progress, Wishes, answer_bank, engines, resumable, reveal_bank
 from study.store.disk.provenance import sha256_of
 
@@ -31,11 +31,11 @@ class LawProof:
 
 
 def prove_laws(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> LawProof:
-    """Interrupted, the same call goes on. Raises StudyError."""
-    folder = opened(path, plan.seed, plan.brief, LAWS)
+    """Run or continue a bank of laws in the folder `path`. Resumable. Raises StudyError."""
+    folder = open_proof_folder(path, plan.seed, plan.brief, LAWS)
     with resumable(path):
         seal = seal_laws(folder, plan, wishes.workers, lambda done: on_progress("sealing", done, plan.cases))
-        names = sealed_names(folder, range(plan.cases))
+        names = read_case_names(folder, range(plan.cases))
         there = [name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING).exists()]
         answer_bank(folder, names, there, wishes, on_progress)
     outcomes = reveal_laws(folder, plan.cases)
@@ -43,7 +43,7 @@ def prove_laws(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress
 
 
 def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
-    """Of the first so many numbers, all that are answered. Raises StudyError where a seal is broken."""
+    """Outcomes of the answered cases among the first `cases` numbers. Raises StudyError where a seal is broken."""
 
     def is_whole(label: Mapping[str, Any]) -> bool:
         return sha256_of(fresh_file(folder, label["number"])) == str(label["fresh_sha256"])

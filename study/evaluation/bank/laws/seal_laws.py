@@ -1,4 +1,5 @@
-"""Devices with laws of no catalogue as files: what a diagnosis gets, and sealed apart the truth and a fresh motion."""
+"""Write devices with laws outside the catalogue as files: open inputs for the diagnosis; sealed, the truth and a
+fresh test motion."""
 
 import json
 import secrets
@@ -24,7 +25,8 @@ from study.workflows.worker_processes import worker_processes
 
 
 def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
-    """As `seal_cases`. Returns the SHA-256 of labels.sha256. Raises StudyError."""
+    """Draw, write and seal the missing cases, calling `on_sealed(count)`. Returns the SHA-256 of labels.sha256.
+    Raises StudyError."""
     drawn = [draw_law(plan.seed, number, plan.brief) for number in range(plan.cases)]
     left = [each for each in drawn if not folder.label(each.number).exists()]
     done = len(drawn) - len(left)
@@ -38,11 +40,13 @@ def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Call
 
 
 def fresh_file(folder: ProofFolder, number: int) -> Path:
+    """Path of the sealed fresh motion of a case."""
     return folder.label(number).with_suffix(".npz")
 
 
 def fresh_motions(path: Path, axes: Sequence[str], pushed: Sequence[str], response: bool) -> tuple[FreshMotion, ...]:
-    """Of a sealed file. axes: as driven; pushed: those that the laws push."""
+    """Read a sealed file of fresh motions. axes: driven axes; pushed: axes on which the laws act; response: whether
+    the law acts on the sensor reading."""
     with np.load(path) as kept:
         count = len({name.split("_")[1] for name in kept.files})
         return tuple(
@@ -64,7 +68,7 @@ def _fresh_motion(of: dict[str, Any], axes: Sequence[str], pushed: Sequence[str]
 
 
 def _seal_law(folder: ProofFolder, each: LawDraw) -> None:
-    """The label comes last: a case without one is drawn again."""
+    """Write one case; the label is written last, so that a missing label means an unfinished case."""
     name = secrets.token_hex(6)
     found, place = law_case(each, name), folder.open / name
     place.mkdir()
@@ -87,7 +91,7 @@ def _arrays(fresh: Sequence[Fresh]) -> dict[str, Any]:
 
 
 def _label(folder: ProofFolder, each: LawDraw, found: LawCase, place: Path) -> dict[str, Any]:
-    """All that is concealed. The salt keeps a hash from being guessed."""
+    """Everything that is concealed. A random salt keeps the content from being guessed from its hash."""
     return {
         "name": place.name,
         **{key: getattr(each, key) for key in ("number", "seed", "kind", "concealed", "strength", "model")},

@@ -1,4 +1,4 @@
-"""What a proof of laws leaves behind: a document, a table with one row per case, and lines for the terminal."""
+"""Write the results of a proof of laws: a JSON document, a table with one row per case, and lines for the terminal."""
 
 import json
 import sys
@@ -44,7 +44,7 @@ class LawRow:
 
 
 def write_laws(proof: LawProof) -> None:
-    """Anew each time. Raises StudyError."""
+    """Write document and table, replacing earlier ones. Raises StudyError."""
     document = {
         **_facts(proof),
         "commit": commit(),
@@ -56,7 +56,7 @@ def write_laws(proof: LawProof) -> None:
 
 
 def write_law_table(path: Path, proof: LawProof) -> None:
-    """Figures and misses, small enough to be kept beside the code. Raises StudyError."""
+    """Write figures and misses as a small table that can be kept beside the code. Raises StudyError."""
     figures = [FigureRow(each.name, each.value, each.low, each.high, each.of) for each in proof.score.figures]
     lines = [
         f"# {len(proof.outcomes)} cases of laws, seeds {proof.plan.seed} to {proof.plan.seed + proof.plan.cases - 1}",
@@ -69,7 +69,7 @@ def write_law_table(path: Path, proof: LawProof) -> None:
 
 
 def law_lines(proof: LawProof) -> Iterator[str]:
-    """Misses first."""
+    """Result as terminal lines, misses first."""
     yield f"{len(proof.score.misses)} misses in {len(proof.outcomes)} cases"
     for miss in proof.score.misses:
         truth = miss.kind if miss.truth is None else miss.truth.formula
@@ -84,7 +84,7 @@ def law_lines(proof: LawProof) -> Iterator[str]:
 
 
 def law_summary(proof: LawProof) -> str:
-    """JSON."""
+    """Result as JSON text."""
     return json.dumps({"folder": str(proof.folder.path), **_facts(proof)}, indent=2)
 
 
@@ -102,14 +102,14 @@ def _facts(proof: LawProof) -> dict[str, Any]:
 
 
 def _said(of: LawOutcome) -> str:
-    laws = " and ".join(_written(law) for law in of.laws)
+    laws = " and ".join(_law_text(law) for law in of.laws)
     how = "" if of.named or not of.candidates else "candidate "
     names = ", ".join(of.names)
     near = f", {100 * of.errors[0]:.3g} % off" if of.errors else ""
     return f"{of.verdict}: {names}{' and ' if names and laws else ''}{how}{laws or ('' if names else 'no law')}{near}"
 
 
-def _written(law: Law) -> str:
+def _law_text(law: Law) -> str:
     return f"{law.acts_on} {law.axis} = {law.text}"
 
 
@@ -119,7 +119,7 @@ def _row(of: LawOutcome) -> LawRow:
     return LawRow(
         of.number, of.seed, of.kind, of.concealed, " ".join(of.axes if of.truth is None else of.truth.axes),
         " ".join(f"{name}={value:.4g}" for name, value in numbers.items()), of.shows, of.verdict,
-        " and ".join(map(_written, of.named)), " ".join(of.names), " and ".join(map(_written, of.candidates)),
+        " and ".join(map(_law_text, of.named)), " ".join(of.names), " and ".join(map(_law_text, of.candidates)),
         of.structured, _short(error), _short(louder), _short(of.left("retuned")), _short(of.left("after")),
         _short(of.seconds), of.missed,
     )  # fmt: skip

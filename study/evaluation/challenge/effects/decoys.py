@@ -1,10 +1,10 @@
-"""Physics that no catalogue of ours names: what an honest diagnosis must leave unexplained.
+"""Decoys: physics outside the catalogue, which an honest diagnosis must leave unexplained.
 
-creep: the ground's spring remembers, over three decades of time, as plastics and cables do. damping_of_place: damping
-grows with the square of the distance from the centre. stiffness_in_time: the ground's stiffness on one axis jumps to
-and fro. bending_sensor: all channels saturate softly and with hysteresis. crossed_axes: a potential c x^2 y / 2.
-skipped_commands: one command of every so many is not written. tired_motor: the force constant falls while it warms.
-force_hysteresis: the motor's force follows its command with play, as iron does.
+creep: viscoelastic ground with three relaxation times over two decades, as in plastics and cables. damping_of_place:
+damping grows with the square of the distance from the centre. stiffness_in_time: the ground stiffness of one axis
+switches periodically. bending_sensor: soft saturation with hysteresis in all channels. crossed_axes: a potential c x^2
+y / 2. skipped_commands: every n-th command is not written. tired_motor: the force constant falls with heating.
+force_hysteresis: play between command and motor force, as in iron.
 """
 
 from dataclasses import replace
@@ -20,28 +20,28 @@ CREEP_TIMES_S = (0.02, 0.2, 2.0)
 
 
 def _draw_creep(at: Circumstances) -> dict[str, float]:
-    return {"stiffness": at.between(0.05, 1.0) * at.bench.stiffness[at.axis, at.axis]}
+    return {"stiffness": at.log_between(0.05, 1.0) * at.bench.stiffness[at.axis, at.axis]}
 
 
-def _creep(device: Device, axis: int, values: Values) -> Device:
+def _build_creep(device: Device, axis: int, values: Values) -> Device:
     stiffness = np.zeros((3, len(CREEP_TIMES_S)))
     stiffness[axis] = values["stiffness"]
     return replace(device, creep_stiffness=stiffness, creep_time_s=np.array(CREEP_TIMES_S))
 
 
 def _draw_damping(at: Circumstances) -> dict[str, float]:
-    return {"damping_per_m2": at.between(0.5, 12.0) / at.travel_m[at.axis] ** 2}
+    return {"damping_per_m2": at.log_between(0.5, 12.0) / at.travel_m[at.axis] ** 2}
 
 
-def _damping(device: Device, axis: int, values: Values) -> Device:
+def _build_damping(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {DAMPING_SQUARE: values["damping_per_m2"]})
 
 
 def _draw_swing(at: Circumstances) -> dict[str, float]:
-    return {"rate_hz": at.some(0.7, 9.0), "depth": at.between(0.05, 0.7)}
+    return {"rate_hz": at.draw_log_uniform(0.7, 9.0), "depth": at.log_between(0.05, 0.7)}
 
 
-def _swing(device: Device, axis: int, values: Values) -> Device:
+def _build_swing(device: Device, axis: int, values: Values) -> Device:
     varying = device.varying.copy()
     stiffness = values["depth"] * device.bench.stiffness[axis, axis]
     varying[axis] = (values["rate_hz"], 0.0, stiffness, 0.0, 1.0)
@@ -49,52 +49,52 @@ def _swing(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_bending(at: Circumstances) -> dict[str, float]:
-    return {"bend": at.between(0.3, 1.5) / at.peak_mps2.max(), "play": at.between(0.03, 0.8)}
+    return {"bend": at.log_between(0.3, 1.5) / at.peak_mps2.max(), "play": at.log_between(0.03, 0.8)}
 
 
-def _bending(device: Device, axis: int, values: Values) -> Device:
+def _build_bending(device: Device, axis: int, values: Values) -> Device:
     return replace(device, sensor=replace(device.sensor, bend=values["bend"], play=values["play"]))
 
 
 def _draw_crossed(at: Circumstances) -> dict[str, float]:
-    return {"coupling": at.sign() * at.between(0.02, 0.3) * at.bench.stiffness[0, 0] / at.travel_m.max()}
+    return {"coupling": at.sign() * at.log_between(0.02, 0.3) * at.bench.stiffness[0, 0] / at.travel_m.max()}
 
 
-def _crossed(device: Device, axis: int, values: Values) -> Device:
+def _build_crossed(device: Device, axis: int, values: Values) -> Device:
     return replace(device, coupling=values["coupling"])
 
 
 def _draw_skipped(at: Circumstances) -> dict[str, float]:
-    return {"every": float(round(at.between(2000.0, 8.0)))}
+    return {"every": float(round(at.log_between(2000.0, 8.0)))}
 
 
-def _skipped(device: Device, axis: int, values: Values) -> Device:
+def _build_skipped(device: Device, axis: int, values: Values) -> Device:
     return replace(device, skipped=int(values["every"]))
 
 
 def _draw_tired(at: Circumstances) -> dict[str, float]:
-    return {"loss_per_n2": at.between(0.02, 0.3), "seconds": at.some(2.0, 8.0)}
+    return {"loss_per_n2": at.log_between(0.02, 0.3), "seconds": at.draw_log_uniform(2.0, 8.0)}
 
 
-def _tired(device: Device, axis: int, values: Values) -> Device:
+def _build_tired(device: Device, axis: int, values: Values) -> Device:
     return with_amplifier(device, axis, {FADE: values["loss_per_n2"], FADE_S: values["seconds"]})
 
 
 def _draw_iron(at: Circumstances) -> dict[str, float]:
-    return {"half_width": at.between(0.01, 0.3)}
+    return {"half_width": at.log_between(0.01, 0.3)}
 
 
-def _iron(device: Device, axis: int, values: Values) -> Device:
+def _build_iron(device: Device, axis: int, values: Values) -> Device:
     return with_amplifier(device, axis, {HELD: values["half_width"]})
 
 
 DECOYS = (
-    HiddenEffect("creep", "mechanism", True, _draw_creep, _creep),
-    HiddenEffect("damping_of_place", "mechanism", True, _draw_damping, _damping),
-    HiddenEffect("stiffness_in_time", "mechanism", True, _draw_swing, _swing),
-    HiddenEffect("bending_sensor", "sensor", False, _draw_bending, _bending),
-    HiddenEffect("crossed_axes", "mechanism", False, _draw_crossed, _crossed),
-    HiddenEffect("skipped_commands", "actuator", False, _draw_skipped, _skipped),
-    HiddenEffect("tired_motor", "actuator", True, _draw_tired, _tired),
-    HiddenEffect("force_hysteresis", "actuator", True, _draw_iron, _iron),
+    HiddenEffect("creep", "mechanism", True, _draw_creep, _build_creep),
+    HiddenEffect("damping_of_place", "mechanism", True, _draw_damping, _build_damping),
+    HiddenEffect("stiffness_in_time", "mechanism", True, _draw_swing, _build_swing),
+    HiddenEffect("bending_sensor", "sensor", False, _draw_bending, _build_bending),
+    HiddenEffect("crossed_axes", "mechanism", False, _draw_crossed, _build_crossed),
+    HiddenEffect("skipped_commands", "actuator", False, _draw_skipped, _build_skipped),
+    HiddenEffect("tired_motor", "actuator", True, _draw_tired, _build_tired),
+    HiddenEffect("force_hysteresis", "actuator", True, _draw_iron, _build_iron),
 )

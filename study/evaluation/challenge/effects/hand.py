@@ -1,7 +1,7 @@
-"""A hand on the handle: mass, damping and stiffness on every axis, those of y and z in another proportion.
+"""Impedance of a hand on the handle: mass, damping and stiffness on every axis, in other proportions for y and z.
 
-A grip that varies swings the damping between the handle and the ground by 1 + depth sin(2 pi rate t + phase); whether
-the stiffness swings with it is drawn.
+A time-varying grip modulates the damping between handle and ground by 1 + depth sin(2 pi rate t + phase); whether the
+stiffness varies with it is drawn.
 """
 
 from dataclasses import replace
@@ -15,17 +15,17 @@ from study.evaluation.challenge.mechanism_kernel import DAMPING_DEPTH, RATE, STI
 
 
 def _draw_hand(at: Circumstances) -> dict[str, float]:
-    tight = at.between(0.01, 1.0)
+    tight = at.log_between(0.01, 1.0)
     drawn = {
-        "mass": tight * at.some(0.04, 0.09),
-        "damping": tight * at.some(2.5, 6.0),
-        "stiffness": tight * at.some(100.0, 300.0),
+        "mass": tight * at.draw_log_uniform(0.04, 0.09),
+        "damping": tight * at.draw_log_uniform(2.5, 6.0),
+        "stiffness": tight * at.draw_log_uniform(100.0, 300.0),
     }
     parts = {f"{name}_{axis}": float(at.random.uniform(0.3, 1.2)) for name in drawn for axis in "yz"}
     return drawn | parts
 
 
-def _hand(device: Device, axis: int, values: Values) -> Device:
+def _build_hand(device: Device, axis: int, values: Values) -> Device:
     def on_handle(name: str, ground: FloatArray) -> FloatArray:
         return ground + values[name] * np.diag((1.0, values[f"{name}_y"], values[f"{name}_z"]))
 
@@ -40,14 +40,14 @@ def _hand(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_grip(at: Circumstances) -> dict[str, float]:
     return {
-        "rate_hz": at.some(0.03, 0.5),
-        "depth": at.between(0.02, 0.8),
+        "rate_hz": at.draw_log_uniform(0.03, 0.5),
+        "depth": at.log_between(0.02, 0.8),
         "phase": at.random.uniform(0, 2 * np.pi),
         "stiffness_share": float(at.random.integers(2)),
     }
 
 
-def _grip(device: Device, axis: int, values: Values) -> Device:
+def _build_grip(device: Device, axis: int, values: Values) -> Device:
     varying = np.zeros((3, 5))
     varying[:, RATE], varying[:, TURN] = values["rate_hz"], values["phase"]
     varying[:, DAMPING_DEPTH] = values["depth"] * np.diag(device.bench.damping)
@@ -56,6 +56,6 @@ def _grip(device: Device, axis: int, values: Values) -> Device:
 
 
 EFFECTS = (
-    HiddenEffect("hand_impedance", "hand", False, _draw_hand, _hand),
-    HiddenEffect("time_varying_grip", "hand", False, _draw_grip, _grip),
+    HiddenEffect("hand_impedance", "hand", False, _draw_hand, _build_hand),
+    HiddenEffect("time_varying_grip", "hand", False, _draw_grip, _build_grip),
 )

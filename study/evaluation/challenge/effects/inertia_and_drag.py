@@ -1,11 +1,11 @@
-"""What the mechanism's masses and dampers do beyond the model.
+"""Inertia and damping of the mechanism beyond the model.
 
 Viscous damping and an added mass act on one axis of the handle. Quadratic damping is -c v |v|. Pose-dependent inertia
-multiplies the mass by 1 + per_m x, x along the named axis, with no force of its own from the change: that of the whole
-handle, or of this axis's motion alone; which of the two is drawn. An extra mode is a mass on a spring attached to the
-handle; it moves mostly along the named axis, tilted by up to 0.25 of that towards either other. Backlash lies between
-the motor, a part of the axis's mass that the force drives, and the handle; in contact they are joined by a stiff spring
-with little damping.
+multiplies the mass by 1 + per_m x, with x along the named axis and without the force from its derivative; it is drawn
+whether this holds for the whole handle or only for this axis's motion. An extra mode is a mass on a spring attached to
+the handle; its direction deviates from the named axis by up to 0.25 towards each other axis. Backlash lies between the
+motor (a part of the axis's mass, on which the force acts) and the handle; in contact a stiff spring with little damping
+joins them.
 """
 
 from dataclasses import replace
@@ -25,35 +25,35 @@ def _at_handle(device: Device, axis: int, mass_kg: float, damping: float) -> Dev
 
 
 def _draw_viscous(at: Circumstances) -> dict[str, float]:
-    return {"damping": at.between(0.2, 6.0)}
+    return {"damping": at.log_between(0.2, 6.0)}
 
 
-def _viscous(device: Device, axis: int, values: Values) -> Device:
+def _build_viscous(device: Device, axis: int, values: Values) -> Device:
     return _at_handle(device, axis, 0.0, values["damping"])
 
 
 def _draw_added(at: Circumstances) -> dict[str, float]:
-    return {"mass": at.between(0.003, 0.08)}
+    return {"mass": at.log_between(0.003, 0.08)}
 
 
-def _added(device: Device, axis: int, values: Values) -> Device:
+def _build_added(device: Device, axis: int, values: Values) -> Device:
     return _at_handle(device, axis, values["mass"], 0.0)
 
 
 def _draw_quadratic(at: Circumstances) -> dict[str, float]:
-    return {"coefficient": at.between(1.0, 60.0)}
+    return {"coefficient": at.log_between(1.0, 60.0)}
 
 
-def _quadratic(device: Device, axis: int, values: Values) -> Device:
+def _build_quadratic(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {DRAG: values["coefficient"]})
 
 
 def _draw_pose(at: Circumstances) -> dict[str, float]:
     whole = float(at.random.integers(2))
-    return {"per_m": at.sign() * at.between(0.01, 0.5) / at.travel_m[at.axis], "whole_handle": whole}
+    return {"per_m": at.sign() * at.log_between(0.01, 0.5) / at.travel_m[at.axis], "whole_handle": whole}
 
 
-def _pose(device: Device, axis: int, values: Values) -> Device:
+def _build_pose(device: Device, axis: int, values: Values) -> Device:
     along = np.zeros(3)
     along[axis] = values["per_m"]
     if values["whole_handle"]:
@@ -64,15 +64,15 @@ def _pose(device: Device, axis: int, values: Values) -> Device:
 def _draw_mode(at: Circumstances) -> dict[str, float]:
     tilts = at.random.uniform(-0.25, 0.25, 2)
     return {
-        "frequency": at.some(18.0, 190.0),
-        "mass": at.between(0.0005, 0.025),
-        "damping_ratio": at.some(0.02, 0.06),
+        "frequency": at.draw_log_uniform(18.0, 190.0),
+        "mass": at.log_between(0.0005, 0.025),
+        "damping_ratio": at.draw_log_uniform(0.02, 0.06),
         "tilt_next": float(tilts[0]),
         "tilt_after_next": float(tilts[1]),
     }
 
 
-def _mode(device: Device, axis: int, values: Values) -> Device:
+def _build_mode(device: Device, axis: int, values: Values) -> Device:
     direction = np.roll((1.0, values["tilt_next"], values["tilt_after_next"]), axis)
     direction /= np.linalg.norm(direction)
     if values["mass"] == 0.0:
@@ -85,25 +85,25 @@ def _mode(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_backlash(at: Circumstances) -> dict[str, float]:
     mass = at.bench.mass[at.axis, at.axis] * at.random.uniform(0.2, 0.4)
-    spring = mass * (2 * np.pi * at.some(220.0, 400.0)) ** 2
+    spring = mass * (2 * np.pi * at.draw_log_uniform(220.0, 400.0)) ** 2
     return {
-        "gap": at.between(3e-6, 1.5e-4),
+        "gap": at.log_between(3e-6, 1.5e-4),
         "motor_mass": float(mass),
         "contact_stiffness": float(spring),
-        "contact_damping": float(2 * at.some(0.015, 0.06) * np.sqrt(spring * mass)),
+        "contact_damping": float(2 * at.draw_log_uniform(0.015, 0.06) * np.sqrt(spring * mass)),
     }
 
 
-def _backlash(device: Device, axis: int, values: Values) -> Device:
+def _build_backlash(device: Device, axis: int, values: Values) -> Device:
     names = ("motor_mass", "gap", "contact_stiffness", "contact_damping")
     return replace(device, play=np.array([axis, *(values[name] for name in names)]))
 
 
 EFFECTS = (
-    HiddenEffect("viscous_damping", "mechanism", True, _draw_viscous, _viscous),
-    HiddenEffect("added_mass", "mechanism", True, _draw_added, _added),
-    HiddenEffect("quadratic_damping", "mechanism", True, _draw_quadratic, _quadratic),
-    HiddenEffect("pose_dependent_inertia", "mechanism", True, _draw_pose, _pose),
-    HiddenEffect("extra_mode", "mechanism", True, _draw_mode, _mode),
-    HiddenEffect("backlash", "mechanism", True, _draw_backlash, _backlash),
+    HiddenEffect("viscous_damping", "mechanism", True, _draw_viscous, _build_viscous),
+    HiddenEffect("added_mass", "mechanism", True, _draw_added, _build_added),
+    HiddenEffect("quadratic_damping", "mechanism", True, _draw_quadratic, _build_quadratic),
+    HiddenEffect("pose_dependent_inertia", "mechanism", True, _draw_pose, _build_pose),
+    HiddenEffect("extra_mode", "mechanism", True, _draw_mode, _build_mode),
+    HiddenEffect("backlash", "mechanism", True, _draw_backlash, _build_backlash),
 )

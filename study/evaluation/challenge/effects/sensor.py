@@ -1,9 +1,9 @@
-"""What happens between the handle's motion and the record of it.
+"""Sensor effects between the handle's motion and its record.
 
-Gain, curve (a + cubic a^3), limit, offset and what a channel reads of the others sit in one channel; all else touches
-all. A lagging sensor's pole stands in the place of its 500 Hz. Misalignment turns the accelerometer about any axis.
-Drift grows evenly from start to end; drift and hum reach each channel by a part of their own, the largest by `total`
-and `amplitude`. A logger's offset above zero makes the acceleration late, not the position.
+Gain, nonlinearity (a + cubic a^3), limit, offset and cross-axis sensitivity act in one channel; the others in all.
+Sensor lag replaces the accelerometer's pole at 500 Hz. Misalignment rotates the accelerometer about a random axis.
+Drift grows linearly from start to end; drift and hum have a share of their own in each channel, the largest given by
+`total` and `amplitude`. A positive logger offset delays the acceleration, not the position.
 """
 
 from dataclasses import replace
@@ -17,7 +17,7 @@ from study.evaluation.challenge.hidden import Circumstances, HiddenEffect, Value
 from study.evaluation.challenge.sensor import Sensor
 
 
-def _sensed(device: Device, sensor: Sensor) -> Device:
+def _with_sensor(device: Device, sensor: Sensor) -> Device:
     return replace(device, sensor=sensor)
 
 
@@ -28,50 +28,52 @@ def _in_channel(table: FloatArray, axis: int, value: float) -> FloatArray:
 
 
 def _draw_lag(at: Circumstances) -> dict[str, float]:
-    return {"bandwidth": at.between(420.0, 30.0)}
+    return {"bandwidth": at.log_between(420.0, 30.0)}
 
 
-def _lag(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, replace(device.sensor, bandwidth_hz=values["bandwidth"]))
+def _build_lag(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(device, replace(device.sensor, bandwidth_hz=values["bandwidth"]))
 
 
 def _draw_clipping(at: Circumstances) -> dict[str, float]:
-    return {"limit": at.peak_mps2[at.axis] * (1.0 - at.between(0.02, 0.7))}
+    return {"limit": at.peak_mps2[at.axis] * (1.0 - at.log_between(0.02, 0.7))}
 
 
-def _clipping(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, replace(device.sensor, limit=_in_channel(device.sensor.limit, axis, values["limit"])))
+def _build_clipping(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(device, replace(device.sensor, limit=_in_channel(device.sensor.limit, axis, values["limit"])))
 
 
 def _draw_misalignment(at: Circumstances) -> dict[str, float]:
-    degrees = at.between(0.1, 15.0)
+    degrees = at.log_between(0.1, 15.0)
     about = degrees * at.direction()
     return {"degrees": degrees} | dict(zip(("about_x", "about_y", "about_z"), map(float, about), strict=True))
 
 
-def _misalignment(device: Device, axis: int, values: Values) -> Device:
+def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
     about = np.array([values["about_x"], values["about_y"], values["about_z"]])
-    return _sensed(device, replace(device.sensor, orientation=Rotation.from_rotvec(about, degrees=True).as_matrix()))
+    return _with_sensor(
+        device, replace(device.sensor, orientation=Rotation.from_rotvec(about, degrees=True).as_matrix())
+    )
 
 
 def _draw_gain(at: Circumstances) -> dict[str, float]:
-    return {"gain": 1.0 + at.sign() * at.between(0.005, 0.3)}
+    return {"gain": 1.0 + at.sign() * at.log_between(0.005, 0.3)}
 
 
-def _gain(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, replace(device.sensor, gain=_in_channel(device.sensor.gain, axis, values["gain"])))
+def _build_gain(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(device, replace(device.sensor, gain=_in_channel(device.sensor.gain, axis, values["gain"])))
 
 
 def _draw_curve(at: Circumstances) -> dict[str, float]:
-    return {"cubic": at.sign() * at.between(0.005, 0.25) / at.peak_mps2[at.axis] ** 2}
+    return {"cubic": at.sign() * at.log_between(0.005, 0.25) / at.peak_mps2[at.axis] ** 2}
 
 
-def _curve(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, replace(device.sensor, cubic=_in_channel(device.sensor.cubic, axis, values["cubic"])))
+def _build_curve(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(device, replace(device.sensor, cubic=_in_channel(device.sensor.cubic, axis, values["cubic"])))
 
 
 def _shares(at: Circumstances) -> dict[str, float]:
-    """Of the three channels, the largest that is read 1."""
+    """Shares of the three channels; the largest among those that are read is 1."""
     drawn = at.direction()
     read = drawn[list(at.axes)]
     drawn /= read[np.argmax(np.abs(read))]
@@ -83,30 +85,30 @@ def _in_shares(values: Values) -> FloatArray:
 
 
 def _draw_drift(at: Circumstances) -> dict[str, float]:
-    return {"total": at.sign() * at.between(0.01, 2.0)} | _shares(at)
+    return {"total": at.sign() * at.log_between(0.01, 2.0)} | _shares(at)
 
 
-def _drift(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, replace(device.sensor, drift=values["total"] * _in_shares(values)))
+def _build_drift(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(device, replace(device.sensor, drift=values["total"] * _in_shares(values)))
 
 
 def _draw_steps(at: Circumstances) -> dict[str, float]:
-    return {"step": at.between(0.02, 1.5)}
+    return {"step": at.log_between(0.02, 1.5)}
 
 
-def _steps(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, replace(device.sensor, step=values["step"]))
+def _build_steps(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(device, replace(device.sensor, step=values["step"]))
 
 
 def _draw_hum(at: Circumstances) -> dict[str, float]:
     mains_hz = float(at.random.choice((50.0, 60.0))) + at.random.uniform(-0.05, 0.05)
     turn = at.random.uniform(0.0, 2 * np.pi)
-    return {"amplitude": at.between(0.01, 1.0), "frequency": mains_hz, "phase": turn} | _shares(at)
+    return {"amplitude": at.log_between(0.01, 1.0), "frequency": mains_hz, "phase": turn} | _shares(at)
 
 
-def _hum(device: Device, axis: int, values: Values) -> Device:
+def _build_hum(device: Device, axis: int, values: Values) -> Device:
     size = values["amplitude"] * _in_shares(values)
-    return _sensed(
+    return _with_sensor(
         device,
         replace(
             device.sensor,
@@ -117,62 +119,64 @@ def _hum(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_clock(at: Circumstances) -> dict[str, float]:
-    return {"ppm": at.sign() * at.between(0.5, 100.0)}
+    return {"ppm": at.sign() * at.log_between(0.5, 100.0)}
 
 
-def _clock(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, replace(device.sensor, ppm=values["ppm"]))
+def _build_clock(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(device, replace(device.sensor, ppm=values["ppm"]))
 
 
 def _draw_lost(at: Circumstances) -> dict[str, float]:
-    return {"fraction": at.between(1e-4, 0.04)}
+    return {"fraction": at.log_between(1e-4, 0.04)}
 
 
-def _lost(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, replace(device.sensor, lost=values["fraction"]))
+def _build_lost(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(device, replace(device.sensor, lost=values["fraction"]))
 
 
 def _draw_crossed(at: Circumstances) -> dict[str, float]:
     turn = at.random.uniform(0.0, 2 * np.pi)
-    size = at.between(0.003, 0.15)
+    size = at.log_between(0.003, 0.15)
     return {"from_next": float(size * np.cos(turn)), "from_after_next": float(size * np.sin(turn))}
 
 
-def _crossed(device: Device, axis: int, values: Values) -> Device:
+def _build_crossed(device: Device, axis: int, values: Values) -> Device:
     mixing = device.sensor.orientation.copy()
     mixing[axis, (axis + 1) % 3] += values["from_next"]
     mixing[axis, (axis + 2) % 3] += values["from_after_next"]
-    return _sensed(device, replace(device.sensor, orientation=mixing))
+    return _with_sensor(device, replace(device.sensor, orientation=mixing))
 
 
 def _draw_offset(at: Circumstances) -> dict[str, float]:
-    return {"offset": at.sign() * at.between(5e-4, 0.5)}
+    return {"offset": at.sign() * at.log_between(5e-4, 0.5)}
 
 
-def _offset(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, replace(device.sensor, offset=_in_channel(device.sensor.offset, axis, values["offset"])))
+def _build_offset(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(
+        device, replace(device.sensor, offset=_in_channel(device.sensor.offset, axis, values["offset"]))
+    )
 
 
 def _draw_logger(at: Circumstances) -> dict[str, float]:
-    return {"offset": at.sign() * at.between(1e-5, 5e-3)}
+    return {"offset": at.sign() * at.log_between(1e-5, 5e-3)}
 
 
-def _logger(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, replace(device.sensor, late_s=values["offset"]))
+def _build_logger(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(device, replace(device.sensor, late_s=values["offset"]))
 
 
 EFFECTS = (
-    HiddenEffect("sensor_lag", "sensor", False, _draw_lag, _lag),
-    HiddenEffect("sensor_clipping", "sensor", True, _draw_clipping, _clipping),
-    HiddenEffect("sensor_misalignment", "sensor", False, _draw_misalignment, _misalignment),
-    HiddenEffect("sensor_gain", "sensor", True, _draw_gain, _gain),
-    HiddenEffect("sensor_nonlinearity", "sensor", True, _draw_curve, _curve),
-    HiddenEffect("sensor_drift", "sensor", False, _draw_drift, _drift),
-    HiddenEffect("quantization", "sensor", False, _draw_steps, _steps),
-    HiddenEffect("mains_hum", "sensor", False, _draw_hum, _hum),
-    HiddenEffect("clock_drift", "sensor", False, _draw_clock, _clock),
-    HiddenEffect("lost_samples", "sensor", False, _draw_lost, _lost),
-    HiddenEffect("cross_axis_sensitivity", "sensor", True, _draw_crossed, _crossed),
-    HiddenEffect("sensor_offset", "sensor", True, _draw_offset, _offset),
-    HiddenEffect("logger_offset", "sensor", False, _draw_logger, _logger),
+    HiddenEffect("sensor_lag", "sensor", False, _draw_lag, _build_lag),
+    HiddenEffect("sensor_clipping", "sensor", True, _draw_clipping, _build_clipping),
+    HiddenEffect("sensor_misalignment", "sensor", False, _draw_misalignment, _build_misalignment),
+    HiddenEffect("sensor_gain", "sensor", True, _draw_gain, _build_gain),
+    HiddenEffect("sensor_nonlinearity", "sensor", True, _draw_curve, _build_curve),
+    HiddenEffect("sensor_drift", "sensor", False, _draw_drift, _build_drift),
+    HiddenEffect("quantization", "sensor", False, _draw_steps, _build_steps),
+    HiddenEffect("mains_hum", "sensor", False, _draw_hum, _build_hum),
+    HiddenEffect("clock_drift", "sensor", False, _draw_clock, _build_clock),
+    HiddenEffect("lost_samples", "sensor", False, _draw_lost, _build_lost),
+    HiddenEffect("cross_axis_sensitivity", "sensor", True, _draw_crossed, _build_crossed),
+    HiddenEffect("sensor_offset", "sensor", True, _draw_offset, _build_offset),
+    HiddenEffect("logger_offset", "sensor", False, _draw_logger, _build_logger),
 )

@@ -1,4 +1,5 @@
-"""Faults of a drive, put into a recording by way of its recorded command; see `force_injections`."""
+"""Faults of the drive (amplifier, motor), injected by altering the recorded command; the principle is in
+`force_injections`."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -6,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.injection.moved_axis import Moved
+from study.evaluation.challenge.injection.axis_motion import AxisMotion
 
 Numbers = Mapping[str, float]
 
@@ -14,58 +15,58 @@ Numbers = Mapping[str, float]
 @dataclass(frozen=True, slots=True)
 class ForceInjection:
     effect: str
-    """As the vocabulary calls it, or a new name written like it."""
-    draw: Callable[[Moved, float, np.random.Generator], dict[str, float]]
-    """Numbers from the strength, 0 (weakest) to 1."""
-    command: Callable[[Moved, Numbers], FloatArray]
-    """(n,): what had to be commanded."""
+    """Name in the vocabulary, or a new name in its style."""
+    draw: Callable[[AxisMotion, float, np.random.Generator], dict[str, float]]
+    """Parameters from the strength, 0 (weakest) to 1."""
+    command: Callable[[AxisMotion, Numbers], FloatArray]
+    """(n,): the command that would have been needed with the fault."""
     actuator: bool = False
-    """It sits in the drive: where a motion is imposed, there is none."""
+    """A fault of the drive: it does not exist where the motion is imposed."""
     turns: bool = True
-    """It has a meaning where a shaft goes round and round."""
+    """Also meaningful for an axis that rotates continuously."""
 
 
 def rms(samples: FloatArray) -> float:
     return float(np.sqrt(np.mean((samples - samples.mean()) ** 2)))
 
 
-def level_of(moved: Moved, strength: float) -> float:
-    """Rms of a force: from a fiftieth of the command's to all of it."""
+def level_of(moved: AxisMotion, strength: float) -> float:
+    """Rms of the injected force: log-uniform from a fiftieth of the command's rms to all of it."""
     return rms(moved.command) * float(0.02 * 50.0**strength)
 
 
-def _later(samples: FloatArray, by: float) -> FloatArray:
+def _shift_later(samples: FloatArray, by: float) -> FloatArray:
     at = np.arange(len(samples), dtype=np.float64)
     return np.asarray(np.interp(at - by, at, samples))
 
 
-def _cubed(moved: Moved, of: Numbers) -> FloatArray:
-    """The command whose own and cubed share are the force: Newton's steps from the force itself."""
+def _undo_cubic_gain(moved: AxisMotion, of: Numbers) -> FloatArray:
+    """Command u' with u' + cubic u'^3 = u (Newton iteration)."""
     found = moved.command.copy()
     for _ in range(60):
         found -= (found + of["cubic"] * found**3 - moved.command) / (1 + 3 * of["cubic"] * found**2)
     return found
 
 
-def _draw_limit(moved: Moved, strength: float, random: np.random.Generator) -> dict[str, float]:
+def _draw_limit(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     limit = float(np.quantile(np.abs(moved.command), 0.98))
     return {"limit": limit, "more": float(0.05 * 20.0**strength)}
 
 
-def _beyond_limit(moved: Moved, of: Numbers) -> FloatArray:
-    """More was commanded wherever the force was at its largest."""
+def _undo_saturation(moved: AxisMotion, of: Numbers) -> FloatArray:
+    """A larger command wherever the force was at its limit."""
     over = np.abs(moved.command) >= 0.97 * of["limit"]
     return np.asarray(np.where(over, moved.command * (1 + of["more"]), moved.command))
 
 
-def _draw_rate(moved: Moved, strength: float, random: np.random.Generator) -> dict[str, float]:
+def _draw_rate(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     steps = np.abs(np.diff(moved.command))
     top = float(np.quantile(steps[steps > 0], 0.98)) if steps.any() else 0.0
     return {"rate": top * moved.rate_hz, "from": 1.0 - 0.05 * 14.0**strength}
 
 
-def _hurried(moved: Moved, of: Numbers) -> FloatArray:
-    """Wherever the force changed about as fast as it ever did, the command had got there at once."""
+def _undo_slew_limit(moved: AxisMotion, of: Numbers) -> FloatArray:
+    """A command that arrives at once wherever the force changed at about its highest rate."""
     steps = np.diff(moved.command)
     fast = np.abs(steps) * moved.rate_hz >= of["from"] * of["rate"]
     goes_on = fast[1:] & fast[:-1] & (steps[1:] * steps[:-1] > 0)
@@ -75,12 +76,12 @@ def _hurried(moved: Moved, of: Numbers) -> FloatArray:
     return found
 
 
-def _gain(moved: Moved, strength: float, random: np.random.Generator) -> dict[str, float]:
+def _gain(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     return {"gain": float(1 + random.choice((-0.5, 1.0)) * 0.02 * 40.0**strength)}
 
 
 def _middle_turn(samples: FloatArray, rate_hz: float) -> float:
-    """rad/s, below which half of the rate of change's power lies."""
+    """Median angular frequency (rad/s) of the power."""
     power = np.abs(np.fft.rfft(samples - samples.mean())) ** 2
     middle = int(np.searchsorted(np.cumsum(power), power.sum() / 2))
     return 2 * np.pi * max(middle, 1) * rate_hz / len(samples)
@@ -97,7 +98,7 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
     ForceInjection(
         "transport_delay",
         lambda moved, s, r: {"delay": max(0.3 * 0.02 * 50.0**s / _middle_turn(moved.command, moved.rate_hz), 1e-9)},
-        lambda moved, of: _later(moved.command, -of["delay"] * moved.rate_hz),
+        lambda moved, of: _shift_later(moved.command, -of["delay"] * moved.rate_hz),
         actuator=True,
     ),
     ForceInjection(
@@ -106,8 +107,8 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
         lambda moved, of: moved.command + of["time_constant"] * np.gradient(moved.command) * moved.rate_hz,
         actuator=True,
     ),
-    ForceInjection("force_saturation", _draw_limit, _beyond_limit, actuator=True),
-    ForceInjection("slew_limit", _draw_rate, _hurried, actuator=True),
+    ForceInjection("force_saturation", _draw_limit, _undo_saturation, actuator=True),
+    ForceInjection("slew_limit", _draw_rate, _undo_slew_limit, actuator=True),
     ForceInjection(
         "force_quantization",
         lambda moved, s, r: {"step": level_of(moved, 0.3 + 0.7 * s)},
@@ -123,7 +124,7 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
     ForceInjection(
         "actuator_cubic",
         lambda moved, s, r: {"cubic": 0.02 * 30.0**s / float(np.abs(moved.command).max()) ** 2},
-        _cubed,
+        _undo_cubic_gain,
         actuator=True,
     ),
     ForceInjection(

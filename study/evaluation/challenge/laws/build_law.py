@@ -1,4 +1,5 @@
-"""A law built into a device, at a size that shows as much on every bench: its force over the commands', both rms."""
+"""Build a law into a device, scaled so that the ratio of its rms force to that of the commands is the same on every
+bench."""
 
 from dataclasses import dataclass, replace
 
@@ -9,33 +10,34 @@ from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 from study.evaluation.challenge.law_kernel import law_force, law_memory
 from study.evaluation.challenge.laws.hidden_laws import LawKind, Random, Sizes
-from study.evaluation.challenge.mechanism_kernel import Moved
+from study.evaluation.challenge.mechanism_kernel import Motion
 
 WEAKEST, STRONGEST = 0.015, 0.25
-"""Parts of the commands' rms, or of the readings'."""
+"""Size of a law relative to the rms of the commands, or of the readings."""
 OF_SOFT = 1.0
-"""A curve that bends by its own number alone has this size."""
+"""Size of a saturating curve, whose own parameter sets how far it bends."""
 
 
 @dataclass(frozen=True, slots=True)
 class LawTruth:
-    """One law that the device has and the model lacks, as a reader would tell it."""
+    """The label of one law that the device has and the model lacks."""
 
     law: str
     formula: str
     axes: tuple[str, ...]
     acts_on: tuple[str, ...]
     variables: tuple[tuple[str, ...], ...]
-    """Per axis of `axes`, all readings of it, each sorted and joined by spaces."""
+    """Per axis of `axes`: equivalent sets of variables, each sorted and joined by spaces."""
     memory: bool
     numbers: dict[str, float]
 
 
-def built(
-    device: Device, kind: LawKind, free: tuple[Moved, FloatArray], places: tuple[int, int], strength: float,
+def build_law(
+    device: Device, kind: LawKind, free: tuple[Motion, FloatArray], places: tuple[int, int], strength: float,
     random: Random,
 ) -> tuple[Device, LawTruth]:  # fmt: skip
-    """free: how the device moves without it, and the commands. places: its axis, and another."""
+    """The device with the law, and its label. free: motion and commands without it. places: its axis, and another
+    axis."""
     moved, command = free
     axis, other = places
     sizes = Sizes(
@@ -45,7 +47,7 @@ def built(
     side = float(random.choice((-1.0, 1.0)))
     share = WEAKEST * (STRONGEST / WEAKEST) ** strength
     if kind.change is not None:
-        device, size = _changed(device, kind, (moved, command), places, (first, second, side, share))
+        device, size = _build_change(device, kind, (moved, command), places, (first, second, side, share))
     else:
         row = np.array([kind.code, axis, other, 1.0, first, second, side])
         size = share * _rms(command[:, axis]) / _rms(_along(row, moved, command))
@@ -59,27 +61,30 @@ def built(
 
 def _truth(kind: LawKind, places: tuple[int, int], numbers: dict[str, float]) -> LawTruth:
     turned = (places, places[::-1]) if kind.both else (places,)
-    readings = tuple(tuple(_named(reading, own, other) for reading in kind.variables) for own, other in turned)
+    readings = tuple(
+        tuple(_with_axis_names(reading, own, other) for reading in kind.variables) for own, other in turned
+    )
     return LawTruth(
         kind.name, kind.formula, tuple(AXES[own] for own, _ in turned), kind.acts_on, readings, kind.memory, numbers
     )
 
 
-def _named(reading: str, own: int, other: int) -> str:
-    """ "vx vy" with the axes' own letters."""
+def _with_axis_names(reading: str, own: int, other: int) -> str:
+    """Variables such as "vx vy" with the letters of the actual axes."""
     letters = {"x": AXES[own], "y": AXES[other]}
     names = [name if name == "t" else name[:-1] + letters[name[-1]] for name in reading.split()]
     return " ".join(sorted(names))
 
 
-def _changed(
+def _build_change(
     device: Device,
     kind: LawKind,
-    free: tuple[Moved, FloatArray],
+    free: tuple[Motion, FloatArray],
     places: tuple[int, int],
     numbers: tuple[float, float, float, float],
 ) -> tuple[Device, float]:
-    """Its commands or readings. numbers: a, b, side, share."""
+    """Build a law that alters commands or readings; returns the device and the law's size. numbers: a, b, side,
+    share."""
     change, (axis, other), (moved, command) = kind.change, places, free
     first, second, side, share = numbers
     assert change is not None
@@ -97,8 +102,8 @@ def _changed(
     return replace(device, drive_law=become), size
 
 
-def _along(row: FloatArray, moved: Moved, command: FloatArray) -> FloatArray:
-    """(samples,): the law's force along the motion."""
+def _along(row: FloatArray, moved: Motion, command: FloatArray) -> FloatArray:
+    """(samples,): force of the law along the given motion."""
     kept, force = 0.0, np.zeros(len(command))
     for k in range(len(command)):
         q, v, drive = moved.position[k], moved.velocity[k], command[k]

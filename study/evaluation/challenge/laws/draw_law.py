@@ -1,7 +1,7 @@
-"""A bank of devices with laws of no catalogue, nulls and decoys: what is drawn for which number.
+"""Draw a bank of devices with laws outside the catalogue, nulls and decoys.
 
 Of every twenty: twelve with a law, four with nothing missing, three with an effect of the catalogue, one with a linear
-mode. Laws take their turns.
+mode. Laws take turns.
 """
 
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.bench import draw_bench
 from study.evaluation.challenge.device import Device, whole_motion
 from study.evaluation.challenge.draw_bank import ALL_AXES, STEPS
-from study.evaluation.challenge.draw_case import EFFECTS, Case, Concealed, added, draw_case, recording_of
+from study.evaluation.challenge.draw_case import EFFECTS, Case, Concealed, draw_case, make_recording, visibility
 from study.evaluation.challenge.drive_plan import RATE_HZ, DrivePlan, draw_plan, multisine
 from study.evaluation.challenge.extras import with_extras
-from study.evaluation.challenge.laws.build_law import LawTruth, built
+from study.evaluation.challenge.laws.build_law import LawTruth, build_law
 from study.evaluation.challenge.laws.hidden_laws import LAW_KINDS, LAW_OF_NAME
-from study.evaluation.challenge.mechanism_kernel import Moved
-from study.evaluation.challenge.nominal import as_model, calibrated, retuned
+from study.evaluation.challenge.mechanism_kernel import Motion
+from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.sensor import read
 
@@ -28,13 +28,13 @@ LawBankKind = Literal["law", "nothing", "decoy", "mode"]
 COUNTS: dict[LawBankKind, int] = {"law": 12, "nothing": 4, "decoy": 3, "mode": 1}
 TURN: tuple[LawBankKind, ...] = tuple(kind for kind, count in COUNTS.items() for _ in range(count))
 LOWEST = 0.35
-"""Strength of what is concealed."""
+"""Lowest strength of what is concealed."""
 MODE = "extra_mode"
 CATALOGUED = tuple(name for name in EFFECTS if name not in (*ALL_AXES, MODE, "hand_impedance"))
 ONE_AXIS = 0.75
-"""Part of the laws of one axis that are put into a device of one."""
+"""Fraction of single-axis laws that are built into a device of one axis."""
 LOUD_N = 4.5
-"""Of a stretch that is kept for the test: half as much again as what laws are found in."""
+"""Level (N) of a stretch kept for the test: 1.5 times the highest level used to find laws."""
 FRESH_N, FRESH_PERIOD, FRESH_PERIODS = 2.0, 2000, 2
 
 
@@ -44,7 +44,7 @@ class LawDraw:
     seed: int
     kind: LawBankKind
     concealed: str
-    """A law's name, an effect's, or none."""
+    """Name of a law or an effect, or empty."""
     strength: float
     model: Concealed
     rig: Rig
@@ -52,16 +52,16 @@ class LawDraw:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fresh:
-    """The device along commands that no recording has, without noise: what a found law is held against."""
+    """Noise-free motion under commands that no recording contains: the test of a found law."""
 
     level_n: float
     command: FloatArray
-    """(samples, axes), N; and so the rest, SI:"""
-    moved: Moved
+    """(samples, axes), N."""
+    moved: Motion
     reading: FloatArray
-    """m/s^2, by its sensor's law alone,"""
+    """m/s^2, with the sensor's law but no other sensor effect."""
     lawful: FloatArray
-    """N: what its laws add to the forces."""
+    """N: force of the laws."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,11 +69,11 @@ class LawCase:
     case: Case
     truth: LawTruth | None
     fresh: tuple[Fresh, ...]
-    """Of devices with a law: in the range that was visited, then louder."""
+    """For devices with a law: in the visited range, then at a higher level."""
 
 
 def draw_law(seed: int, number: int, brief: bool = False) -> LawDraw:
-    """The same for the same seed and number. brief: short periods."""
+    """Draw the case of one number: the same for the same seed and number. brief: short periods."""
     turn, place = divmod(number, len(TURN))
     order = np.random.default_rng([seed, 41, turn]).permutation(len(TURN))
     kind = TURN[order[place]]
@@ -90,7 +90,7 @@ def draw_law(seed: int, number: int, brief: bool = False) -> LawDraw:
 
 
 def law_case(each: LawDraw, name: str) -> LawCase:
-    """name: what recording and model call the device."""
+    """Generate the drawn case. name: device name in recording and model."""
     if each.kind != "law":
         effects = (each.concealed,) if each.concealed else ()
         strengths = each.strength if effects else None
@@ -102,27 +102,27 @@ def law_case(each: LawDraw, name: str) -> LawCase:
     device, moved, truth = _lawful(each, bare, (free, plan), random)
     response, position = read(device.sensor, moved.acceleration, moved.position, RATE_HZ, random)
     if each.model == "calibrated":
-        known, tolerance = calibrated(bench, random, rig.axes)
+        known, tolerance = draw_calibration(bench, random, rig.axes)
     else:
-        known, tolerance = retuned(bench, response, plan, rig.axes)
+        known, tolerance = retune(bench, response, plan, rig.axes)
     model = as_model(name, known, tolerance, rig.axes)
-    recording = recording_of(name, plan, response, position, rig)
+    recording = make_recording(name, plan, response, position, rig)
     both = tuple((part.acceleration, part.position) for part in (free, moved))
-    case = Case(recording, model, (), _never, added(bare, device, (both[0], both[1]), rig))
+    case = Case(recording, model, (), _never, visibility(bare, device, (both[0], both[1]), rig))
     return LawCase(case, truth, tuple(_fresh(device, rig, random, level) for level in (FRESH_N, LOUD_N)))
 
 
 def _lawful(
-    each: LawDraw, bare: Device, free: tuple[Moved, DrivePlan], random: np.random.Generator
-) -> tuple[Device, Moved, LawTruth]:
-    """As strong as drawn, or weaker by halves where the device would not stay in place."""
+    each: LawDraw, bare: Device, free: tuple[Motion, DrivePlan], random: np.random.Generator
+) -> tuple[Device, Motion, LawTruth]:
+    """Build in a law at the drawn strength, halved as long as the motion would diverge."""
     (moved, plan), axes = free, each.rig.axes
     own = int(random.integers(len(axes)))
     places = (axes[own], axes[(own + 1) % len(axes)])
     state = random.bit_generator.state
     for strength in (each.strength, each.strength / 2, each.strength / 4):
         random.bit_generator.state = state
-        device, truth = built(bare, LAW_OF_NAME[each.concealed], (moved, plan.command), places, strength, random)
+        device, truth = build_law(bare, LAW_OF_NAME[each.concealed], (moved, plan.command), places, strength, random)
         try:
             there = whole_motion(device, plan.command)
         except (ValueError, ZeroDivisionError):
@@ -144,6 +144,6 @@ def _fresh(device: Device, rig: Rig, random: np.random.Generator, level_n: float
     driven = command if device.drive_law is None else device.drive_law(command)
     read_as = moved.acceleration if device.sensor.law is None else device.sensor.law(moved.acceleration)
     return Fresh(
-        level_n, command[:, axes], Moved(*(part[:, axes] for part in moved)), read_as[:, axes],
+        level_n, command[:, axes], Motion(*(part[:, axes] for part in moved)), read_as[:, axes],
         (moved.lawful + driven - command)[:, axes],
     )  # fmt: skip

@@ -1,7 +1,7 @@
-"""Which laws are concealed: formulas that no catalogue of ours names, with numbers drawn anew for each device.
+"""The concealed laws: formulas outside the catalogue, with parameters drawn anew for each device.
 
-They share no code with the grammar of the diagnosis, and some have shapes that it does not hold. What a law is like is
-known as its reader would tell it: what it pushes, which variables it needs, whether it remembers.
+They share no code with the grammar of the diagnosis, and some have shapes that the grammar cannot express. The label
+describes a law as a reader would: on what it acts, which variables it needs, whether it has a memory.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ ActsOn = Literal["force", "command", "response"]
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """How far, how fast and how hard an axis moves where nothing is concealed: the largest."""
+    """Largest travel, speed, reading and force of an axis without the law."""
 
     travel_m: float
     speed_mps: float
@@ -31,25 +31,25 @@ class Sizes:
 class LawKind:
     name: str
     formula: str
-    """For a reader; k is its size, a and b its numbers, s a sign, x along its axis, y along another."""
+    """For a reader; k is the size, a and b parameters, s a sign, x along its axis, y along another."""
     draw: Callable[[Random, Sizes], tuple[float, float]]
-    """a and b."""
+    """Draws a and b."""
     variables: tuple[str, ...]
-    """Each a reading of it: variables, by spaces."""
+    """Equivalent sets of variables, each separated by spaces."""
     code: int = -1
-    """In `law_kernel`; of forces."""
+    """Code in `law_kernel`, for forces."""
     acts_on: tuple[ActsOn, ...] = ("force",)
-    """In these ways it can be said."""
+    """Equivalent places where it can be said to act."""
     memory: bool = False
     axes: int = 1
     both: bool = False
-    """It pushes the other axis as well."""
+    """It acts on the other axis as well."""
     change: Callable[[FloatArray, FloatArray, float, float], FloatArray] | None = None
-    """Of commands or readings: what k = 1 adds, from the axis's own and another's, a and b."""
+    """For commands or readings: change for k = 1, from own axis, other axis, a and b."""
 
 
 def _either(random: Random, simple: tuple[float, ...], low: float, high: float) -> float:
-    """A simple number or any, half of the time each."""
+    """With equal probability one of the simple numbers, or any number in the range."""
     return float(random.choice(simple)) if random.random() < 0.5 else float(random.uniform(low, high))
 
 

@@ -1,8 +1,8 @@
-"""The bench as MuJoCo moves it: a handle on three slides, masses on springs that ride on it, and what is concealed.
+"""The bench as MuJoCo simulates it: a handle on three slides, oscillators that ride on it, and the concealed effects.
 
 Dry friction is the engine's own friction loss (a constraint, no bristle); an end stop is a tendon whose spring has a
 dead band; play is a motor body behind a tendon with limits; a hand and added masses are armature, damping and stiffness
-of the slides; saturation, gain and lag are those of its actuators. Runge-Kutta of fourth order.
+of the slides; saturation, gain and lag are those of its actuators. Integrator: Runge-Kutta of fourth order.
 """
 
 from collections.abc import Mapping
@@ -17,19 +17,19 @@ from study.evaluation.challenge.bench import Bench, Oscillators
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 
 STEPS = 10
-"""Of the integrator in a sample."""
+"""Integration steps per sample."""
 STEP_S = 1.0 / (RATE_HZ * STEPS)
 HANDLE_SHARE = 0.4
-"""Of the lightest axis: the handle's body. The rest of an axis's mass moves along with that axis alone."""
+"""Mass of the handle's body over that of the lightest axis. The rest of an axis's mass moves with that axis alone."""
 CONTACT = 0.01
-"""Impedance of a contact: small, so that its spring and damper are what they are called."""
+"""Impedance of a contact: small, so that spring and damper have their nominal values."""
 
 Values = Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MujocoBench:
-    """Each array (3,), of the driven axes."""
+    """Parameters; each array (3,), of the driven axes."""
 
     mass_kg: FloatArray
     damping: FloatArray
@@ -45,30 +45,30 @@ class MujocoBench:
     stop: tuple[int, float, float, float] | None = None
     """Axis, lower and upper end (m), N/m."""
     play: tuple[int, Values] | None = None
-    """Axis, and the numbers of `backlash`."""
+    """Axis, and the parameters of `backlash`."""
 
 
 def bare(bench: Bench) -> MujocoBench:
-    """As near to a bench as bodies on slides come: without its off-diagonals."""
+    """The closest MuJoCo equivalent of a bench: without its off-diagonals."""
     mass, damping, stiffness = (np.diag(part).copy() for part in (bench.mass, bench.damping, bench.stiffness))
     none = np.zeros(3)
     return MujocoBench(mass, damping, stiffness, bench.oscillators, none, none, np.ones(3), none)
 
 
 def linear(bench: MujocoBench) -> Bench:
-    """The linear part. A rider is carried across its direction, which adds to the handle's mass there."""
+    """The linear part as a bench. A rider is carried across its direction, which adds to the handle's mass there."""
     mass = np.diag(bench.mass_kg)
     for kg, along in zip(bench.riders.mass_kg, bench.riders.direction, strict=True):
         mass += kg * (np.eye(3) - np.outer(along, along))
     return Bench(mass, np.diag(bench.damping), np.diag(bench.stiffness), bench.riders)
 
 
-def moved(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray, FloatArray]:
+def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Acceleration and position of the handle at the samples, (samples, 3) each, just before each command is written.
 
-    Raises ValueError where it does not stay in one place.
+    Raises ValueError where the motion diverges.
     """
-    model = mujoco.MjModel.from_xml_string(_described(bench))
+    model = mujoco.MjModel.from_xml_string(_model_xml(bench))
     data = mujoco.MjData(model)
     handle = [model.joint(axis).dofadr[0] for axis in AXES]
     data.qfrc_applied[handle] = bench.force_n
@@ -89,7 +89,7 @@ def moved(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def with_delay(bench: MujocoBench, delay_s: float) -> MujocoBench:
-    """In whole steps: what is said is what is done."""
+    """The bench with a delay rounded to whole steps, so that the label is exact."""
     return replace(bench, delay_s=max(round(delay_s / STEP_S), 1) * STEP_S)
 
 
@@ -97,7 +97,7 @@ def _at(command: FloatArray, sample: int) -> FloatArray:
     return command[sample] if sample >= 0 else np.zeros(3)
 
 
-def _described(bench: MujocoBench) -> str:
+def _model_xml(bench: MujocoBench) -> str:
     root = Xml.Element("mujoco")
     _add(root, "compiler", {"autolimits": "true"})
     exact = {"integrator": "RK4", "tolerance": "1e-12", "iterations": "50"}
@@ -127,7 +127,7 @@ def _described(bench: MujocoBench) -> str:
         held = _add(tendons, "fixed", {"name": "stop", "stiffness": stiffness, "springlength": ends})
         _add(held, "joint", {"joint": AXES[axis], "coef": 1.0})
     if bench.play is not None:
-        _joined(tendons, bench, *bench.play)
+        _add_play(tendons, bench, *bench.play)
     _actuators(_add(root, "actuator"), bench)
     return Xml.tostring(root, encoding="unicode")
 
@@ -142,8 +142,8 @@ def _riders(handle: Xml.Element, riders: Oscillators) -> None:
         _body(body, float(kg))
 
 
-def _joined(tendons: Xml.Element, bench: MujocoBench, axis: int, values: Values) -> None:
-    """Motor and handle, as far apart as the play lets them: a contact at either end, which can only push."""
+def _add_play(tendons: Xml.Element, bench: MujocoBench, axis: int, values: Values) -> None:
+    """Tendon between motor and handle that limits their distance: a one-sided contact at either end of the gap."""
     motor_kg = values["motor_mass"]
     mass, _, _ = linear(bench).matrices()
     mass[axis, axis] -= motor_kg

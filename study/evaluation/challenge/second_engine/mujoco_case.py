@@ -1,4 +1,5 @@
-"""Concealed-physics cases that MuJoCo moves. Numbers are drawn as for the other bench; what they do is the engine's."""
+"""Concealed-physics cases simulated by MuJoCo. Parameters are drawn as for the other bench; the physics is the
+engine's."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -13,17 +14,17 @@ from study.evaluation.challenge.draw_case import (
     EFFECTS,
     Case,
     Concealed,
-    added,
-    carried,
+    added_mass_meta,
     further_plan,
-    recording_of,
+    make_recording,
     truth_of,
+    visibility,
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
 from study.evaluation.challenge.hidden import Circumstances, Values
-from study.evaluation.challenge.nominal import as_model, calibrated, retuned
+from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.rig import Rig
-from study.evaluation.challenge.second_engine.mujoco_bench import MujocoBench, bare, linear, moved, with_delay
+from study.evaluation.challenge.second_engine.mujoco_bench import MujocoBench, bare, linear, simulate_motion, with_delay
 from study.evaluation.challenge.sensor import RANGE_MPS2, read
 
 Build = Callable[[MujocoBench, int, Values], MujocoBench]
@@ -32,14 +33,14 @@ Build = Callable[[MujocoBench, int, Values], MujocoBench]
 def draw_mujoco_case(
     seed: int, effects: Sequence[str], concealed: Concealed, strength: Sequence[float], name: str, rig: Rig
 ) -> Case:
-    """As `draw_case`. Raises ValueError for an effect that the engine does not express."""
+    """As `draw_case`. Raises ValueError for an effect that the engine cannot express."""
     if unknown := set(effects) - set(BUILDERS) - set(IN_THE_SENSOR):
         raise ValueError(f"the second engine cannot conceal {', '.join(sorted(unknown))}")
     random = np.random.default_rng([seed, len(effects), 2])
     drawn, plan = draw_bench(random), draw_plan(random, rig)
     free = bare(drawn)
     bench = linear(free)
-    still = moved(free, plan.command)
+    still = simulate_motion(free, plan.command)
     device, sensing, truth = free, Device(bench), []
     peak = np.minimum(np.abs(still[0]).max(axis=0), RANGE_MPS2)
     for effect, strong in zip((EFFECTS[each] for each in effects), strength, strict=True):
@@ -53,22 +54,22 @@ def draw_mujoco_case(
         if effect.name == "transport_delay":
             values = {"delay": device.delay_s}
         truth.append(truth_of(effect, axis, values))
-    motion = moved(device, plan.command) if device is not free else still
+    motion = simulate_motion(device, plan.command) if device is not free else still
     response, position = read(sensing.sensor, *motion, RATE_HZ, random)
     if concealed == "calibrated":
-        known, tolerance = calibrated(bench, random, rig.axes)
+        known, tolerance = draw_calibration(bench, random, rig.axes)
     else:
-        known, tolerance = retuned(bench, response, plan, rig.axes)
-    recording = recording_of(name, plan, response, position, rig)
+        known, tolerance = retune(bench, response, plan, rig.axes)
+    recording = make_recording(name, plan, response, position, rig)
 
     def again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
         further = further_plan(command, kind, rig)
         heavier = replace(device, mass_kg=device.mass_kg + added_kg)
-        felt = moved(heavier, further.command)
+        felt = simulate_motion(heavier, further.command)
         seen = read(sensing.sensor, *felt, RATE_HZ, np.random.default_rng([seed, noise]))
-        return replace(recording_of(name, further, *seen, rig), meta=carried(added_kg))
+        return replace(make_recording(name, further, *seen, rig), meta=added_mass_meta(added_kg))
 
-    adds = added(Device(bench), sensing, (still, motion), rig) if effects else 0.0
+    adds = visibility(Device(bench), sensing, (still, motion), rig) if effects else 0.0
     return Case(recording, as_model(name, known, tolerance, rig.axes), tuple(truth), again, adds)
 
 
@@ -122,4 +123,4 @@ BUILDERS: dict[str, Build] = {
     "transport_delay": lambda b, axis, v: with_delay(b, v["delay"]),
 }
 IN_THE_SENSOR = ("sensor_lag", "sensor_gain")
-"""Behind the engine: the same chain of reading."""
+"""Effects after the engine, in the same sensor chain."""

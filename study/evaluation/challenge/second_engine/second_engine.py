@@ -1,4 +1,4 @@
-"""Cases from a second physics engine, MuJoCo: other integrator, other friction, other contacts than the bench's own."""
+"""Access to the second physics engine, MuJoCo, which is optional: its own integrator, friction and contacts."""
 
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -13,11 +13,11 @@ EFFECTS = (
     "coulomb_friction", "viscous_damping", "added_mass", "constant_force", "end_stop", "backlash", "extra_mode",
     "hand_impedance", "force_gain", "force_saturation", "amplifier_lag", "transport_delay", "sensor_lag", "sensor_gain",
 )  # fmt: skip
-"""What it expresses in its own terms, and what happens before and behind it."""
+"""Effects that the engine expresses in its own terms, and those of actuator and sensor."""
 
 
 def is_installed() -> bool:
-    """It is an extra: `prove`."""
+    """Whether MuJoCo is there; it comes with the extra `prove`."""
     return find_spec("mujoco") is not None
 
 

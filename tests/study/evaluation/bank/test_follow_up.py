@@ -12,7 +12,7 @@ from analysis.evaluation.proof.follow_up import FollowUp, follow_up_figures
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from study.errors import StudyError
 from study.evaluation.bank.follow_up import DRAWN, FURTHER, NEXT, PROPOSED, follow_up
-from study.evaluation.bank.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS, ProofFolder, opened
+from study.evaluation.bank.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
 from study.evaluation.bank.prove import outcome_of
 from study.evaluation.bank.seal_cases import BankPlan, seal_one, settings_text
 from study.evaluation.challenge.draw_bank import draw
@@ -49,7 +49,7 @@ def answer(place, effect="sensor_gain", rival="force_gain", best=""):
 
 
 def started(path, best):
-    folder = opened(path, SEED, True)
+    folder = open_proof_folder(path, SEED, True)
     seal_one(folder, draw(SEED, NUMBER, True))
     label = json.loads(folder.label(NUMBER).read_text())
     place = folder.open / label["name"]

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from study.errors import LeftError, StudyError
-from study.evaluation.bank.proof_folder import ANSWER, RECORDING, ProofFolder, opened
-from study.evaluation.bank.proof_seals import answer_at
+from study.evaluation.bank.proof_folder import ANSWER, RECORDING, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.bank.proof_summary import proof_lines, summary
 from study.evaluation.bank.prove import prove, reveal_cases
-from study.evaluation.bank.seal_cases import BankPlan, to_draw
+from study.evaluation.bank.seal_cases import BankPlan, drawable_cases
 from study.evaluation.bank.sealed_bank import Wishes
 from study.evaluation.bank.write_proof import commit, write_proof, write_table
 from study.evaluation.challenge.draw_bank import draw
@@ -34,7 +34,7 @@ def proof(tmp_path_factory):
 
 def test_a_bank_is_sealed_answered_and_revealed(proof):
     done, seen = proof
-    assert len(done.outcomes) == len(to_draw(PLAN))
+    assert len(done.outcomes) == len(drawable_cases(PLAN))
     assert seen[-1] == ("diagnosing", len(done.outcomes), len(done.outcomes))
     assert [outcome.verdict for outcome in done.outcomes if outcome.verdict == "failed"] == []
     assert len(done.engines) == 1
@@ -161,7 +161,7 @@ def test_an_error_that_is_not_known_is_read(copied):
     said = json.loads(path.read_text())
     path.write_text(json.dumps(said | {"channel_errors": {"retuned": {"ax": float("nan")}}}))
     assert "NaN" in path.read_text()
-    assert len(reveal_cases(copied, 100)) == len(to_draw(PLAN))
+    assert len(reveal_cases(copied, 100)) == len(drawable_cases(PLAN))
 
 
 def test_an_answer_that_was_removed_is_given_again(copied):
@@ -169,16 +169,16 @@ def test_an_answer_that_was_removed_is_given_again(copied):
     before = json.loads(path.read_text())
     path.unlink()
     again = prove(copied.path, PLAN, Wishes(workers=1), lambda *_: None)
-    assert len(again.outcomes) == len(to_draw(PLAN))
+    assert len(again.outcomes) == len(drawable_cases(PLAN))
     assert json.loads(path.read_text())["diagnosis"] == before["diagnosis"]
 
 
 def test_a_folder_of_another_bank_is_refused(proof, tmp_path):
     with pytest.raises(StudyError, match="another bank"):
-        opened(proof[0].folder.path, SEED + 1, True)
+        open_proof_folder(proof[0].folder.path, SEED + 1, True)
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(StudyError, match="a folder of its own"):
-        opened(tmp_path, SEED, True)
+        open_proof_folder(tmp_path, SEED, True)
 
 
 def test_ctrl_c_keeps_what_is_sealed(tmp_path):
@@ -188,7 +188,7 @@ def test_ctrl_c_keeps_what_is_sealed(tmp_path):
 
     with pytest.raises(LeftError, match="Interrupted"):
         prove(tmp_path / "bank", BankPlan(SEED, 1, brief=True), Wishes(workers=1), interrupt)
-    assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(to_draw(BankPlan(SEED, 1, brief=True)))
+    assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(drawable_cases(BankPlan(SEED, 1, brief=True)))
 
 
 def test_the_short_bank_is_of_this_kind():
@@ -198,6 +198,6 @@ def test_the_short_bank_is_of_this_kind():
 def test_an_answer_that_is_nested_without_end_is_named(tmp_path):
     (tmp_path / ANSWER).write_text("[" * 100_000)
     with pytest.raises(UnusableFileError, match="nested"):
-        answer_at(tmp_path)
+        read_answer(tmp_path)
     (tmp_path / ANSWER).write_text('{"error": NaN}')
-    assert math.isnan(answer_at(tmp_path)["error"])
+    assert math.isnan(read_answer(tmp_path)["error"])

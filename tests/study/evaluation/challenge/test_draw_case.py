@@ -10,7 +10,7 @@ from study.evaluation.challenge.bench import draw_bench
 from study.evaluation.challenge.device import Device, motion
 from study.evaluation.challenge.draw_case import draw_case
 from study.evaluation.challenge.drive_plan import DrivePlan, draw_plan
-from study.evaluation.challenge.nominal import WIDE, calibrated, retuned, shifted
+from study.evaluation.challenge.nominal import WIDE, draw_calibration, retune, shift_diagonals
 from study.evaluation.challenge.sensor_kernel import one_pole
 
 
@@ -65,7 +65,7 @@ def test_a_calibrated_model_is_off_by_its_tolerances_at_the_driven_axes_alone():
     bench = draw_bench(random)
     offsets = []
     for _ in range(200):
-        known, tolerance = calibrated(bench, random)
+        known, tolerance = draw_calibration(bench, random)
         offsets.append(np.diag(known.mass - bench.mass) / tolerance.mass_kg)
         assert np.triu(known.mass - bench.mass, 1).max() == 0.0
     assert np.std(offsets) == pytest.approx(1.0, abs=0.1)
@@ -74,10 +74,10 @@ def test_a_calibrated_model_is_off_by_its_tolerances_at_the_driven_axes_alone():
 def test_retuning_finds_the_bench_when_nothing_hides():
     random = np.random.default_rng(4)
     bench, plan = draw_bench(random), first_seconds(draw_plan(random))
-    start = shifted(bench, np.repeat((0.02, 0.5, 15.0), 3))
+    start = shift_diagonals(bench, np.repeat((0.02, 0.5, 15.0), 3))
     each = [motion(Device(bench), plan.command[s.start : s.stop])[0] for s in plan.segments]
     response = np.vstack([one_pole(part, 1.0 - np.exp(-np.pi)) for part in each])
-    found, tolerance = retuned(start, response, plan)
+    found, tolerance = retune(start, response, plan)
     assert tolerance == WIDE
     np.testing.assert_allclose(found.mass, bench.mass, atol=2e-4)
     np.testing.assert_allclose(found.stiffness, bench.stiffness, atol=0.3)

@@ -10,7 +10,7 @@ from study.evaluation.challenge.bench import Bench, Oscillators
 from study.evaluation.challenge.device import Device, motion
 from study.evaluation.challenge.drive_plan import DrivePlan
 from study.evaluation.challenge.effects.actuator import EFFECTS as ACTUATOR
-from study.evaluation.challenge.nominal import retuned
+from study.evaluation.challenge.nominal import retune
 from study.evaluation.challenge.sensor import NOISE_MPS2
 from study.evaluation.challenge.sensor_kernel import one_pole
 from study.store.formats.mechanical_model_file import read_mechanical_model
@@ -50,7 +50,7 @@ def misfit(device, recording):
 def test_where_nothing_is_missing_only_noise_is_left():
     recording, model, _ = opened("open-00")
     plan = DrivePlan(recording.command.samples, recording.segments)
-    bench, _ = retuned(model, recording.response.samples, plan)
+    bench, _ = retune(model, recording.response.samples, plan)
     assert misfit(Device(bench), recording) < 1.03
 
 
@@ -58,7 +58,7 @@ def test_the_labelled_saturation_explains_its_case():
     recording, model, (truth,) = opened("open-07")
     (effect,) = (each for each in ACTUATOR if each.name == truth["effect"])
     plan = DrivePlan(recording.command.samples, recording.segments)
-    bench, _ = retuned(model, recording.response.samples, plan)
+    bench, _ = retune(model, recording.response.samples, plan)
     axis = "xyz".index(truth["axis"])
     assert misfit(Device(bench), recording) > 1.5
     assert misfit(effect.build(Device(bench), axis, truth["values"]), recording) < 1.1

@@ -14,7 +14,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from study.errors import StudyError
-from study.evaluation.bank.proof_folder import opened
+from study.evaluation.bank.proof_folder import open_proof_folder
 from study.evaluation.real.inject_real import PROCESSOR_S, Carrier, seal_injections
 from study.evaluation.real.injected_halves import drawn_halves, held_out_change, without_lead
 from study.store.disk.provenance import sha256_of
@@ -116,7 +116,7 @@ def test_what_a_fault_changes_is_what_a_base_of_the_clean_half_misses(split):
 
 
 def test_the_labels_say_what_was_put_in_and_the_clean_half_stays(carrier, tmp_path: Path):
-    folder = opened(tmp_path / "bank", 4, False)
+    folder = open_proof_folder(tmp_path / "bank", 4, False)
     names = seal_injections(folder, (carrier,), 8, 4)
     labels = [json.loads(folder.label(number).read_text()) for number in range(8)]
     assert [each["name"] for each in labels] == list(names)
@@ -135,7 +135,7 @@ def test_the_labels_say_what_was_put_in_and_the_clean_half_stays(carrier, tmp_pa
 
 
 def test_labels_bind_recording_model_and_clean_half_and_the_search_has_its_time(carrier, tmp_path: Path):
-    folder = opened(tmp_path / "bank", 4, False)
+    folder = open_proof_folder(tmp_path / "bank", 4, False)
     (name,) = seal_injections(folder, (carrier,), 1, 4)
     label, place = json.loads(folder.label(0).read_text()), folder.open / name
     assert label["model_sha256"] == sha256_of(place / "model.toml")
@@ -144,7 +144,7 @@ def test_labels_bind_recording_model_and_clean_half_and_the_search_has_its_time(
 
 
 def test_a_label_that_was_changed_breaks_its_seal(carrier, tmp_path: Path):
-    folder = opened(tmp_path / "bank", 4, False)
+    folder = open_proof_folder(tmp_path / "bank", 4, False)
     seal_injections(folder, (carrier,), 1, 4)
     folder.label(0).write_text(folder.label(0).read_text().replace('"strength"', '"strength" '))
     with pytest.raises(StudyError, match="A seal is broken"):

@@ -8,8 +8,8 @@ from study.errors import StudyError
 from study.evaluation.bank.laws.prove_laws import prove_laws, reveal_laws
 from study.evaluation.bank.laws.seal_laws import fresh_file, fresh_motions, seal_laws
 from study.evaluation.bank.laws.write_laws import law_lines, write_laws
-from study.evaluation.bank.proof_folder import SETTINGS, opened
-from study.evaluation.bank.proof_seals import label_at
+from study.evaluation.bank.proof_folder import SETTINGS, open_proof_folder
+from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.seal_cases import BankPlan
 from study.evaluation.bank.sealed_bank import Wishes
 
@@ -19,7 +19,7 @@ SEED = 30_313
 
 @pytest.fixture(scope="module")
 def sealed(tmp_path_factory):
-    folder = opened(tmp_path_factory.mktemp("laws") / "bank", SEED, True, "laws")
+    folder = open_proof_folder(tmp_path_factory.mktemp("laws") / "bank", SEED, True, "laws")
     seal_laws(folder, BankPlan(SEED, 1, brief=True), 1, lambda done: None)
     return folder
 
@@ -33,7 +33,7 @@ def test_the_diagnosis_is_told_to_look_for_laws_and_not_for_which(sealed):
 
 
 def test_fresh_motion_lies_with_the_label(sealed):
-    label = label_at(sealed.label(0))
+    label = read_label(sealed.label(0))
     truth = label["truth"]
     found = fresh_motions(fresh_file(sealed, 0), label["axes"], truth["axes"], truth["acts_on"] == ["response"])
     assert len(found) == 2
@@ -42,7 +42,7 @@ def test_fresh_motion_lies_with_the_label(sealed):
 
 
 def test_another_fresh_motion_breaks_the_seal(sealed, tmp_path):
-    copy = opened(tmp_path / "copy", SEED, True, "laws")
+    copy = open_proof_folder(tmp_path / "copy", SEED, True, "laws")
     for name in ("labels.sha256", "sealed/00000.json"):
         (copy.path / name).write_bytes((sealed.path / name).read_bytes())
     fresh_file(copy, 0).write_bytes(b"other")
@@ -52,7 +52,7 @@ def test_another_fresh_motion_breaks_the_seal(sealed, tmp_path):
 
 def test_a_folder_of_effects_is_no_folder_of_laws(sealed):
     with pytest.raises(StudyError, match="another bank"):
-        opened(sealed.path, SEED, True)
+        open_proof_folder(sealed.path, SEED, True)
 
 
 @pytest.mark.slow

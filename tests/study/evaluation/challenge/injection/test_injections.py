@@ -7,9 +7,9 @@ import pytest
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
+from study.evaluation.challenge.injection.axis_motion import axis_motion
 from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
-from study.evaluation.challenge.injection.injections import INJECTIONS, fitting_injections, inject, reading_of
-from study.evaluation.challenge.injection.moved_axis import moved_axis
+from study.evaluation.challenge.injection.injections import INJECTIONS, applicable_injections, describe_reading, inject
 
 RATE_HZ = 1000.0
 
@@ -98,7 +98,7 @@ def test_an_added_mass_asks_for_its_force_and_a_weaker_drive_for_a_larger_comman
 
 
 def test_a_delayed_drive_was_commanded_earlier():
-    plain, moved = swinging(), moved_axis(swinging(), 0)
+    plain, moved = swinging(), axis_motion(swinging(), 0)
     assert moved is not None
     late = inject(plain, "transport_delay", 0.9, np.random.default_rng(2))
     shift = late.values["delay"] * RATE_HZ
@@ -122,14 +122,14 @@ def test_a_lag_delays_a_slow_tone_by_its_time_constant():
 
 
 def test_only_faults_that_a_recording_can_carry_are_drawn():
-    assert "sensor_misalignment" in fitting_injections(recording(3))
-    assert "sensor_misalignment" not in fitting_injections(recording(1))
+    assert "sensor_misalignment" in applicable_injections(recording(3))
+    assert "sensor_misalignment" not in applicable_injections(recording(1))
     places = replace(recording(3).response, channels=("shaker", "wing tip", "payload"))
-    assert "sensor_misalignment" not in fitting_injections(replace(recording(3), response=places))
+    assert "sensor_misalignment" not in applicable_injections(replace(recording(3), response=places))
     imposed = replace(swinging(), meta={"imposed": "position"})
-    assert {"added_mass", "force_gain"} <= set(fitting_injections(swinging()))
-    assert "added_mass" in fitting_injections(imposed) and "force_gain" not in fitting_injections(imposed)
-    assert reading_of(recording(1)).middle_hz == pytest.approx(7, abs=0.5)
+    assert {"added_mass", "force_gain"} <= set(applicable_injections(swinging()))
+    assert "added_mass" in applicable_injections(imposed) and "force_gain" not in applicable_injections(imposed)
+    assert describe_reading(recording(1)).middle_hz == pytest.approx(7, abs=0.5)
 
 
 def test_what_cannot_be_injected_is_refused():

@@ -43,26 +43,26 @@ def apart(one, other):
 
 @pytest.mark.parametrize("name", ALONG_X)
 def test_both_engines_know_the_same_physics(name, bench, command):
-    from study.evaluation.challenge.second_engine.mujoco_bench import linear, moved
+    from study.evaluation.challenge.second_engine.mujoco_bench import linear, simulate_motion
     from study.evaluation.challenge.second_engine.mujoco_case import BUILDERS
 
-    free, first = moved(bench, command), Device(linear(bench))
+    free, first = simulate_motion(bench, command), Device(linear(bench))
     travel, peak = np.abs(free[1]).max(axis=0), np.abs(free[0]).max(axis=0)
     values = EFFECTS[name].draw(Circumstances(np.random.default_rng(5), 0.8, linear(bench), 0, travel, peak, (0,)))
     with_it = BUILDERS[name](bench, 0, values)
     if name == "transport_delay":
         values = {"delay": with_it.delay_s}
-    seen = moved(with_it, command)
+    seen = simulate_motion(with_it, command)
     assert apart(seen, motion(EFFECTS[name].build(first, 0, values), command)) < ALONG_X[name]
     assert apart(seen, free) > 2 * ALONG_X[name]
 
 
 def test_a_contact_gives_way_as_much_as_its_spring_says(bench):
-    from study.evaluation.challenge.second_engine.mujoco_bench import moved
+    from study.evaluation.challenge.second_engine.mujoco_bench import simulate_motion
 
     play = {"gap": 1e-4, "motor_mass": 0.06, "contact_stiffness": 3e5, "contact_damping": 20.0}
     pushed = np.tile([1.0, 0.0, 0.0], (3000, 1))
-    held = moved(replace(bench, play=(0, play)), pushed)[1][-1, 0]
+    held = simulate_motion(replace(bench, play=(0, play)), pushed)[1][-1, 0]
     assert held == pytest.approx(1.0 / bench.stiffness[0], rel=2e-3)
 
 

@@ -1,4 +1,4 @@
-"""The motion along a command of a recording, as position, velocity and acceleration."""
+"""Motion along one command of a recording: position, velocity and acceleration."""
 
 from dataclasses import dataclass
 
@@ -13,12 +13,13 @@ DERIVATIVE = {
     "angular velocity": 1, "angular speed": 1, "angular acceleration": 2,
 }  # fmt: skip
 WIDEST, LOUD = 0.15, 30.0
-"""A motion is differentiated up to this share of the sample rate, and as far as its power is so often its noise's."""
+"""Upper limit of differentiation: this fraction of the sample rate, or the last frequency with this many times the
+noise power."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moved:
-    """One axis of a recording; all (n,)."""
+class AxisMotion:
+    """Generalised position, velocity, acceleration and command of one axis; all (n,)."""
 
     q: FloatArray
     v: FloatArray
@@ -32,31 +33,33 @@ class Moved:
 
     @property
     def share_of_time(self) -> FloatArray:
-        """From 0 to 1."""
+        """Time from 0 to 1, (n,)."""
         return np.linspace(0.0, 1.0, len(self.q))
 
 
 def _end_hz(samples: FloatArray, rate_hz: float) -> float:
+    """Highest frequency at which the power exceeds the noise floor."""
     frequency, power = welch(samples, rate_hz, nperseg=min(len(samples), 2048))
     loud = np.flatnonzero(power > LOUD * np.median(power[3 * len(power) // 4 :]))
     last = float(frequency[loud[-1]]) if len(loud) else 0.0
     return float(np.clip(last, 20 * rate_hz / len(samples), WIDEST * rate_hz))
 
 
-def moved_axis(recording: Recording, axis: int) -> Moved | None:
-    """None where the axis has no motion of its own."""
+def axis_motion(recording: Recording, axis: int) -> AxisMotion | None:
+    """Motion of one axis; None where no signal of the recording measures it."""
     signals = [each for each in (recording.position, recording.response) if each is not None]
     width = recording.command.samples.shape[1]
     for signal in sorted(signals, key=lambda each: DERIVATIVE.get(each.quantities[0], 9)):
         orders = {DERIVATIVE.get(quantity, 9) for quantity in signal.quantities}
         if (signal.samples.shape[1] == width or width == 1) and max(orders) < 9:
             order = DERIVATIVE[signal.quantities[axis]]
-            return _moved(signal.samples[:, axis], order, recording, axis)
+            return _differentiate(signal.samples[:, axis], order, recording, axis)
     return None
 
 
-def _moved(samples: FloatArray, order: int, recording: Recording, axis: int) -> Moved:
-    """Line by line of the spectrum, mirrored at both ends; what was not measured lies on a straight line."""
+def _differentiate(samples: FloatArray, order: int, recording: Recording, axis: int) -> AxisMotion:
+    """Differentiate or integrate in the frequency domain after odd mirroring at both ends; missing samples are
+    interpolated linearly. order: derivative that `samples` are."""
     rate_hz, places = recording.sample_rate_hz, np.arange(len(samples))
     known = np.isfinite(samples)
     filled = np.interp(places, places[known], samples[known])
@@ -75,4 +78,4 @@ def _moved(samples: FloatArray, order: int, recording: Recording, axis: int) -> 
             gain = np.where(frequency < 4 * rate_hz / len(filled), 0.0, gain)
         course = np.fft.irfft(gain * spectrum, len(whole))[: len(filled)]
         found.append(course + (line if times == 0 else slope if times == 1 else 0.0))
-    return Moved(found[0], found[1], found[2], recording.command.samples[:, axis], rate_hz)
+    return AxisMotion(found[0], found[1], found[2], recording.command.samples[:, axis], rate_hz)
