@@ -1,10 +1,12 @@
-"""The rows that everybody talks about: what was shown, what was said, what the device really did."""
+"""One trial of a study as a row of results: what was presented, what was answered, what the device delivered."""
 
 from dataclasses import dataclass
 from enum import Enum
 
 
 class Phase(Enum):
+    """Kind of a trial or run."""
+
     TRAINING = "training"
     DETECTION = "detection"
     TEST = "test"
@@ -12,7 +14,7 @@ class Phase(Enum):
 
 
 class TrialStatus(Enum):
-    """What became of one presentation."""
+    """Outcome of one presentation."""
 
     OK = "ok"
     FLAGGED = "flagged"
@@ -26,7 +28,7 @@ class TrialStatus(Enum):
 
 
 class VoidCause(Enum):
-    """Why a presentation is void, and so comes again."""
+    """Why a presentation is void and is repeated."""
 
     ASKED = "asked"
     """The participant asked for the same trial again."""
@@ -51,7 +53,7 @@ class VoidCause(Enum):
 
 
 AT_WILL = frozenset({VoidCause.ASKED, VoidCause.PAUSED, VoidCause.LEFT, VoidCause.LATE, VoidCause.EARLY})
-"""Causes that a participant can bring about while the stimulus is felt."""
+"""Causes that a participant can produce while feeling the stimulus."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ class StudyError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Errors cross from worker processes; a subclass with a constructor of its own must survive that too."""
-        return _restored, (type(self), self.__dict__)
+        return _restore_error, (type(self), self.__dict__)
 
     def __str__(self) -> str:
         return " ".join(part for part in (f"{self.title}.", self.happened, self.saved, self.do_now) if part)
@@ -55,7 +55,7 @@ class LeftError(StudyError):
     exit_code = ExitCode.INTERRUPTED
 
 
-def _restored(kind: type[StudyError], fields: dict[str, Any]) -> StudyError:
+def _restore_error(kind: type[StudyError], fields: dict[str, Any]) -> StudyError:
     error = kind.__new__(kind)
     error.__dict__.update(fields)
     error.args = (error.title,)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from protocols.definition.staircase_rule import StaircaseRule
-from protocols.procedure.staircase import StaircaseState, begin, finished, level_n, step
+from protocols.procedure.staircase import StaircaseState, begin, is_finished, level_n, step
 from protocols.trial import AT_WILL, Phase, Trial, TrialStatus
 
 LEVEL_TOLERANCE = 1e-4
@@ -78,7 +78,7 @@ def _recompute(rows: list[Trial], rule: StaircaseRule) -> Run:
 def _fold(counted: tuple[Trial, ...], rule: StaircaseRule) -> StaircaseState:
     state = begin(rule)
     for trial in counted:
-        if finished(rule, state):
+        if is_finished(rule, state):
             raise InconsistentTrialsError(
                 f"{_place(trial)}: an answer follows although the run was over after {state.trials} trials "
                 f"with {state.reversals} reversals"

@@ -9,7 +9,7 @@ from analysis.psychophysics.bias import response_bias
 from analysis.psychophysics.repeated_trials import is_often
 from analysis.psychophysics.runs import Run, recompute_runs
 from protocols.definition.staircase_rule import StaircaseRule
-from protocols.procedure.staircase import finished, to_newton
+from protocols.procedure.staircase import is_finished, to_newton
 from protocols.trial import Phase, Trial
 
 
@@ -134,7 +134,7 @@ def is_censored(cap_reversals: int) -> bool:
 def _end_of(run: Run, rule: StaircaseRule) -> RunEnd:
     if run.complete:
         return RunEnd.REVERSALS
-    return RunEnd.TRIAL_LIMIT if finished(rule, run.state) else RunEnd.UNFINISHED
+    return RunEnd.TRIAL_LIMIT if is_finished(rule, run.state) else RunEnd.UNFINISHED
 
 
 def _mean(values: Sequence[float | None]) -> float | None:

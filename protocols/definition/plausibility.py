@@ -1,4 +1,4 @@
-"""What a reading of the handle's position may be. What is beyond is no handle: the force is let go."""
+"""Plausible range of the handle's position readings. A reading beyond it is a sensor fault: the force is released."""
 
 from dataclasses import asdict
 from typing import Annotated

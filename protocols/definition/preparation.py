@@ -50,7 +50,7 @@ class ConsentSettings:
     ] = ()
 
     @model_validator(mode="after")
-    def _versioned(self) -> Self:
+    def _has_version(self) -> Self:
         if (self.statements or self.exclusions) and not self.version:
             refuse([Problem("version", "is empty, although something is asked", "the version of the wording")])
         return self

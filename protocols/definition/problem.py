@@ -17,12 +17,12 @@ class Problem:
         return f"{self.key} {self.problem}. Allowed: {self.allowed}."
 
     def below(self, parent: str) -> "Problem":
-        """The same problem seen from further up: its key under `parent`."""
+        """The same problem with its key below the table `parent`."""
         return Problem(".".join(part for part in (parent, self.key) if part), self.problem, self.allowed)
 
 
 class InconsistentError(ValueError):
-    """Values that are possible each on its own, but not together. Keys are relative to the place that says so."""
+    """Values that are valid individually but not together. Keys are relative to the table that raises it."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
         super().__init__(" ".join(str(problem) for problem in problems))

@@ -134,6 +134,7 @@ Segment = Annotated[SineSegment | SweepSegment | MultisineSegment, Field(discrim
 
 
 def highest_hz(segment: SineSegment | SweepSegment | MultisineSegment) -> float:
+    """Highest frequency of the excitation (Hz)."""
     return max(segment.frequencies_hz) if isinstance(segment, SineSegment) else segment.to_hz
 
 

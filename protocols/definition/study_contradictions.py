@@ -1,4 +1,4 @@
-"""What no single table of a study protocol can see: values that contradict each other across tables."""
+"""Checks of a study protocol across tables: values that contradict each other."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 
 def contradictions(protocol: StudyProtocol) -> list[Problem]:
+    """All contradictions between tables of the protocol; empty if it is consistent."""
     return [*_levels(protocol), *_times(protocol), *_names(protocol)]
 
 
@@ -33,7 +34,7 @@ def _levels(protocol: StudyProtocol) -> list[Problem]:
 
 
 def _highest_n(settings: DemoSettings | PracticeSettings) -> float:
-    """Half of the range lies above its middle."""
+    """Highest level of a roved stimulus (N): half of the range in dB lies above `level_n`."""
     return settings.level_n * float(10.0 ** (settings.rove_db / 40.0))
 
 

@@ -8,7 +8,7 @@ from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.dumping import protocol_values
 from protocols.document.refusals import key_path
-from protocols.document.schema import Node, Place, allowed, node_at, protocol_schema, resolved
+from protocols.document.schema import Node, Place, describe_allowed, node_at, protocol_schema, resolve_reference
 
 Plain = str | int | float | bool | list[Any]
 
@@ -32,7 +32,7 @@ def explain(protocol: StudyProtocol | RecordingProtocol) -> tuple[ExplainedField
 
 
 def _fields(root: Node, value: Any, place: Place) -> Iterator[ExplainedField]:
-    node = resolved(root, node_at(root, place) or {})
+    node = resolve_reference(root, node_at(root, place) or {})
     if isinstance(value, dict):
         # An entry of a mixed list: its kind picks the schema.
         tag = (value[node["discriminator"]["propertyName"]],) if "oneOf" in node else ()
@@ -47,5 +47,5 @@ def _fields(root: Node, value: Any, place: Place) -> Iterator[ExplainedField]:
             value=value,
             default=node.get("default"),
             description=node.get("description", ""),
-            allowed=allowed(root, node, str(place[-1])),
+            allowed=describe_allowed(root, node, str(place[-1])),
         )

@@ -1,4 +1,4 @@
-"""The fingerprint of a protocol: equal for equal values, whatever the file looks like."""
+"""Hash of a protocol: equal for equal values, independent of the file's formatting."""
 
 import hashlib
 import json
@@ -26,8 +26,8 @@ TABLES_SINCE = {
     "analysis": AnalysisSettings(),
     "debrief": (),
 }
-"""Tables that came after the first locks and sessions, as they are where no file writes them: then they do not count,
-or an old fingerprint would fit no more."""
+"""Tables added after the first locks and sessions, with their default values. A table at its defaults is left out of
+the hash, so that old hashes stay valid."""
 
 SAFETY_SINCE: dict[str, Untouched] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": UNTOUCHED}
 
@@ -37,7 +37,7 @@ FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
     "study": {"trial.device_buttons": [], "trial.repeats_per_run": 3, **ROVE_SINCE, **SAFETY_SINCE},
     "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
 }
-"""Likewise single fields, for each kind of protocol; `segments.role` is that of every segment."""
+"""The same for single fields, for each kind of protocol; `segments.role` is that of every segment."""
 
 
 def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
@@ -61,7 +61,7 @@ def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
 
 
 def _leave_out(values: Any, path: list[str], untouched: Untouched) -> None:
-    """Remove the field, in all entries of a list, where it is as it is without being written."""
+    """Remove the field, in all entries of a list, where it has its default value."""
     if isinstance(values, list):
         for entry in values:
             _leave_out(entry, path, untouched)

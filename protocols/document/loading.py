@@ -1,4 +1,4 @@
-"""A protocol file's text to a protocol, or to a list of everything that is wrong with it."""
+"""Parse the text of a protocol file into a protocol, or into a list of all its problems."""
 
 import datetime
 import json
@@ -50,7 +50,8 @@ def load_protocol(text: str, source: str) -> Protocol:
 
 
 def protocol_from_values(values: dict[str, Any], source: str) -> Protocol:
-    """Check plain values, as TOML or JSON gives them. Numbers must be numbers: no text, no truth value."""
+    """Check plain values from TOML or JSON and make the protocol. Numbers must be numbers, not text or booleans.
+    Raises ProtocolError."""
     if strange := tuple(_no_protocol_values(values, "")):
         raise ProtocolError(source, strange)
     kind = values.get("kind")
@@ -67,7 +68,7 @@ def protocol_from_values(values: dict[str, Any], source: str) -> Protocol:
 
 
 def _no_protocol_values(value: Any, path: str) -> list[Problem]:
-    """TOML knows dates, protocols do not; and its parser reads whole numbers of any length."""
+    """Values that TOML allows and protocols do not: dates, and integers of unlimited length."""
     match value:
         case dict():
             return [

@@ -1,4 +1,4 @@
-"""A protocol that is fixed before data come in: its fingerprint, and the check against it."""
+"""Lock of a protocol: its hash, fixed before data are collected, and the check against it."""
 
 import json
 from dataclasses import dataclass
@@ -28,13 +28,14 @@ class ProtocolLock:
 
 
 def lock_of(protocol: StudyProtocol | RecordingProtocol, locked_utc: str, hapteq: str) -> ProtocolLock:
+    """The lock of a protocol. locked_utc: ISO 8601; hapteq: version of the program."""
     return ProtocolLock(protocol.name, protocol_hash(protocol), locked_utc, hapteq)
 
 
 def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, locked: str) -> None:
-    """Raise LockError unless `protocol` is, value by value, the one that was locked.
+    """Raise LockError unless `protocol` equals, value by value, the one that was locked.
 
-    locked: when, as the reader's clock has it.
+    locked: time of the lock in words, for the message.
     """
     if protocol.name != lock.name:
         raise LockError(f"the lock is that of protocol {lock.name}, not of {protocol.name}")
@@ -47,6 +48,7 @@ def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, 
 
 
 def lock_to_json(lock: ProtocolLock) -> str:
+    """JSON text of a lock."""
     document = {
         "format": FORMAT,
         "version": VERSION,

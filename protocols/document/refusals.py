@@ -1,18 +1,18 @@
-"""Pydantic's errors in the words of a protocol file's author: key, what is wrong, what is allowed."""
+"""Pydantic's validation errors in the words of a protocol file's author: key, what is wrong, what is allowed."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Any
 
 from protocols.definition.problem import InconsistentError, Problem
-from protocols.document.schema import UNITS, Node, Place, allowed, keys_of, node_at, resolved
+from protocols.document.schema import UNITS, Node, Place, describe_allowed, keys_of, node_at, resolve_reference
 
 _LONGEST_WORD = 60
-"""Letters that are compared with known words; a million of them would take minutes."""
+"""Longest word (characters) that is compared with known keys: comparing longer ones would take minutes."""
 
 
 def problems_in(root: Node, errors: Sequence[Any]) -> tuple[Problem, ...]:
-    """Every problem once. root: schema of the protocol's kind; errors: those of pydantic's ValidationError."""
+    """Every problem once. root: schema of the protocol's kind; errors: from pydantic's ValidationError."""
     unknown = [error["loc"] for error in errors if error["type"] == "unexpected_keyword_argument"]
     meant = {(*place[:-1], nearest_key(str(place[-1]), _keys_beside(root, place))) for place in unknown}
     found: list[Problem] = []
@@ -21,7 +21,7 @@ def problems_in(root: Node, errors: Sequence[Any]) -> tuple[Problem, ...]:
         wrong_name = error["type"] == "missing" and error["loc"] in meant
         wrong_entries = error["type"] == "too_short" and len(error["input"]) > 0
         if not wrong_name and not wrong_entries:
-            found.extend(_translated(root, error))
+            found.extend(_translate_error(root, error))
     return tuple(found)
 
 
@@ -32,13 +32,14 @@ def key_path(root: Node, place: Place) -> str:
         node = node_at(root, place[:depth])
         if isinstance(part, int):
             path += f"[{part + 1}]"
-        elif node is None or "oneOf" not in resolved(root, node):
+        elif node is None or "oneOf" not in resolve_reference(root, node):
             path += f".{part}" if path else part
     return path
 
 
 def nearest_key(key: str, known: Sequence[str]) -> str | None:
-    """The key that was probably meant: first the same quantity with another unit, then a similar spelling."""
+    """The known key that was probably meant: first the same quantity with another unit, then a similar spelling;
+    None if there is none."""
     suffixes = tuple(f"_{unit}" for unit in UNITS)
     for candidate in known:
         if candidate.endswith(suffixes) and candidate.rsplit("_", 1)[0] in (key, key.rsplit("_", 1)[0]):
@@ -48,7 +49,7 @@ def nearest_key(key: str, known: Sequence[str]) -> str | None:
 
 
 def shown(value: Any) -> str:
-    """A value as the file would write it, with its type where that is the point."""
+    """A value as the file would write it, with its type where the type is the problem."""
     match value:
         case bool():
             return f"{str(value).lower()}, a truth value"
@@ -62,20 +63,20 @@ def shown(value: Any) -> str:
             return str(value)
 
 
-def _translated(root: Node, error: Any) -> tuple[Problem, ...]:
+def _translate_error(root: Node, error: Any) -> tuple[Problem, ...]:
     place: Place = error["loc"]
     if error["type"] == "json_invalid":  # nested too deeply
         return (Problem("The text", f"cannot be read: {error['msg']}", "numbers and nesting of ordinary size"),)
     key = key_path(root, place)
     if error["type"] == "unexpected_keyword_argument":
-        return (_unknown_key(root, place),)
+        return (_report_unknown_key(root, place),)
     if error["type"] == "value_error" and isinstance(error["ctx"]["error"], InconsistentError):
         return tuple(problem.below(key) for problem in error["ctx"]["error"].problems)
     if error["type"] in ("union_tag_not_found", "union_tag_invalid"):
         return (_wrong_kind_of_entry(root, place, error),)
     node = node_at(root, place)
     name = str(place[-1]) if isinstance(place[-1], str) else str(place[-2])
-    return (Problem(key, _wrong(error), allowed(root, node, name) if node else "something else"),)
+    return (Problem(key, _wrong(error), describe_allowed(root, node, name) if node else "something else"),)
 
 
 def _wrong(error: Any) -> str:
@@ -99,7 +100,7 @@ def _wrong(error: Any) -> str:
             return f"is {shown(value)}"
 
 
-def _unknown_key(root: Node, place: Place) -> Problem:
+def _report_unknown_key(root: Node, place: Place) -> Problem:
     key, known = str(place[-1]), _keys_beside(root, place)
     table = key_path(root, place[:-1])
     problem = f"is no key of {f'[{table}]' if table else 'a protocol'}"
@@ -114,7 +115,7 @@ def _unknown_key(root: Node, place: Place) -> Problem:
 
 
 def _wrong_kind_of_entry(root: Node, place: Place, error: Any) -> Problem:
-    node = resolved(root, node_at(root, place) or {})
+    node = resolve_reference(root, node_at(root, place) or {})
     tag, choices = node["discriminator"]["propertyName"], node["discriminator"]["mapping"]
     given = error["input"].get(tag)
     problem = "is missing" if given is None else f'is "{given}"'
@@ -129,6 +130,6 @@ def _keys_beside(root: Node, place: Place) -> tuple[str, ...]:
 
 
 def _homes_of(root: Node, key: str) -> list[str]:
-    """Tables right under the top that know this key."""
-    sections = {name: resolved(root, node) for name, node in root["properties"].items()}
+    """Top-level tables that have this key."""
+    sections = {name: resolve_reference(root, node) for name, node in root["properties"].items()}
     return [name for name, section in sections.items() if key in section.get("properties", {})]

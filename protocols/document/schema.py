@@ -1,4 +1,4 @@
-"""The published schema of protocol files, and what it allows at any place of one.
+"""JSON Schema of protocol files, and what it allows at any place of one.
 
 The schema is made from the code: key names, bounds, defaults and reasons are written once, in the dataclasses.
 """
@@ -14,7 +14,7 @@ from protocols.definition.study_protocol import StudyProtocol
 Node = dict[str, Any]
 """A JSON Schema, or a part of one."""
 Place = tuple[str | int, ...]
-"""The way from the top of a protocol to one value: names of keys and indexes of list entries, from 0."""
+"""Path from the top of a protocol to a value: key names and list indices, from 0."""
 
 ADAPTERS: dict[str, TypeAdapter[Any]] = {
     "study": TypeAdapter(StudyProtocol),
@@ -33,7 +33,7 @@ UNITS = {
     "m_per_s": "m/s",
     "mps2": "m/s²",
 }
-"""What the suffix of a key says about its value."""
+"""Unit by the suffix of a key."""
 
 
 @cache
@@ -43,7 +43,7 @@ def protocol_schema(kind: str) -> Node:
 
 
 def node_at(root: Node, place: Place) -> Node | None:
-    """The schema of one value; None where the schema knows nothing of the kind."""
+    """Schema of the value at this place; None where the schema has no such place."""
     node: Node | None = root
     for part in place:
         node = _below(root, node, part) if node is not None else None
@@ -52,20 +52,20 @@ def node_at(root: Node, place: Place) -> Node | None:
 
 def keys_of(root: Node, node: Node) -> tuple[str, ...]:
     """The keys of a table, in the order in which they are documented."""
-    return tuple(resolved(root, node).get("properties", {}))
+    return tuple(resolve_reference(root, node).get("properties", {}))
 
 
-def resolved(root: Node, node: Node) -> Node:
-    """The node, with what it refers to."""
+def resolve_reference(root: Node, node: Node) -> Node:
+    """The node with its "$ref" replaced by the definition."""
     if "$ref" not in node:
         return node
     target: Node = root["$defs"][node["$ref"].rsplit("/", 1)[-1]]
     return {**target, **{key: value for key, value in node.items() if key != "$ref"}}
 
 
-def allowed(root: Node, node: Node, key: str = "") -> str:
-    """In words, what a value may be. The key's suffix tells the unit."""
-    node = resolved(root, node)
+def describe_allowed(root: Node, node: Node, key: str = "") -> str:
+    """Allowed values in words. key: its suffix tells the unit."""
+    node = resolve_reference(root, node)
     if "oneOf" in node:
         return f"a table whose {node['discriminator']['propertyName']} is {_choices(node['discriminator']['mapping'])}"
     if "enum" in node or "const" in node:
@@ -92,7 +92,7 @@ def unit_of(key: str) -> str:
 
 
 def _below(root: Node, node: Node, part: str | int) -> Node | None:
-    node = resolved(root, node)
+    node = resolve_reference(root, node)
     if isinstance(part, int):
         return node.get("items")
     if "oneOf" in node:
@@ -127,4 +127,4 @@ def _text(node: Node) -> str:
 def _list(root: Node, node: Node, key: str) -> str:
     fewest, most = node.get("minItems", 0), node.get("maxItems")
     count = f"{fewest} to {most}" if most else f"{fewest} or more"
-    return f"a list of {count} entries, each {allowed(root, node['items'], key)}"
+    return f"a list of {count} entries, each {describe_allowed(root, node['items'], key)}"

@@ -1,4 +1,4 @@
-"""Which staircase rule a run of a study follows: training and detection differ from the test runs."""
+"""Staircase rule of a run: training and detection differ from the test runs."""
 
 from dataclasses import replace
 

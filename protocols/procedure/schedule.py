@@ -1,8 +1,8 @@
-"""Who gets what, when: the order of the runs and the draw of every trial, each from a key of its own.
+"""Order of the runs and random draw of every trial, each from its own key (counter-based random numbers).
 
-A draw depends on its key alone, (seed, run, trial, attempt), and on nothing drawn before it: a repeated trial, a
-resumed session or a replay never shifts a later one. The words come straight from numpy's SeedSequence, whose output
-is promised never to change, so that a session can be checked years later.
+A draw depends only on its key (seed, run, trial, attempt), not on earlier draws: a repeated trial, a resumed session or
+a replay shifts no later one. The words come directly from numpy's SeedSequence, whose output is guaranteed never to
+change, so that a session can be checked years later.
 """
 
 from dataclasses import dataclass
@@ -38,12 +38,12 @@ def williams_rows(conditions: int) -> tuple[tuple[int, ...], ...]:
 
 
 BLOCK = 8
-"""Trials within which balanced directions come equally often."""
+"""Block length (trials) within which balanced directions occur equally often."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One staircase."""
+    """One run: a staircase, or a practice."""
 
     index: int
     """From 0: training, practice, test, detection."""
@@ -56,13 +56,14 @@ class Run:
 @dataclass(frozen=True, slots=True)
 class Draw:
     direction: int
-    """1 or 2, as the device knows them; `label_of` gives the number on the screen."""
+    """1 or 2 as in the protocol; `label_of` gives the number on the screen."""
     polarity: int
     """Sign of the first half-wave, 1 or -1."""
 
 
 def runs(protocol: StudyProtocol, seed: int, participant_number: int) -> tuple[Run, ...]:
-    """All runs of a session: training and practice as listed, the test runs in the order of the schedule, detection."""
+    """All runs of a session: training and practice as listed, the test runs in the order of the schedule, then
+    detection."""
     order = frequency_order(protocol.schedule, protocol.stimulus.frequencies_hz, seed, participant_number)
     planned = [
         *((Phase.TRAINING, frequency_hz, False) for frequency_hz in protocol.training.frequencies_hz),
@@ -76,7 +77,7 @@ def runs(protocol: StudyProtocol, seed: int, participant_number: int) -> tuple[R
 def frequency_order(
     settings: ScheduleSettings, frequencies_hz: tuple[float, ...], seed: int, participant_number: int
 ) -> tuple[float, ...]:
-    """participant_number counts from 0; only the Williams design looks at it."""
+    """Order of the test frequencies. participant_number counts from 0; only the Williams design uses it."""
     match settings.order:
         case "as_listed":
             return frequencies_hz
@@ -91,7 +92,7 @@ def frequency_order(
 
 def draw_trial(settings: ScheduleSettings, onset_polarity: str, seed: int, run: int, trial: int, attempt: int) -> Draw:
     """Direction and polarity of one presentation. onset_polarity: "random" or "positive"."""
-    side, sign = (int(word) >> 63 for word in keyed_words(seed, (run, trial, attempt), 2))
+    side, sign = (int(word) >> 63 for word in draw_words(seed, (run, trial, attempt), 2))
     direction = 1 + side
     if settings.directions == "balanced" and attempt == 0:
         # First rules only (`study.session.state.rules`): a trial drawn again leaves the block's plan, or its first
@@ -102,45 +103,45 @@ def draw_trial(settings: ScheduleSettings, onset_polarity: str, seed: int, run: 
 
 
 def is_catch_trial(settings: CatchSettings, seed: int, run: int, trial: int) -> bool:
-    """Whether this trial of a test run is a catch trial: one in each block of `one_in`, its place drawn by lot."""
+    """Whether this trial of a test run is a catch trial: one in each block of `one_in` trials, at a random place."""
     if not settings.one_in:
         return False
     block, place = divmod(trial, settings.one_in)
-    return keyed_words(seed, (run, block, _CATCH, 0), 1)[0] % settings.one_in == place
+    return draw_words(seed, (run, block, _CATCH, 0), 1)[0] % settings.one_in == place
 
 
 def detection_direction(seed: int, run: int, trial: int, attempt: int) -> int:
-    """The direction, 1 or 2, of a detection trial's stimulus. Which interval holds it is a draw of its own."""
-    return 1 + (keyed_words(seed, (run, trial, attempt, _DETECTION), 1)[0] >> 63)
+    """Direction, 1 or 2, of a detection trial's stimulus. The interval that contains it is drawn separately."""
+    return 1 + (draw_words(seed, (run, trial, attempt, _DETECTION), 1)[0] >> 63)
 
 
 def practice_level_n(settings: PracticeSettings, seed: int, run: int, trial: int, attempt: int) -> float:
-    """The amplitude of a practice trial. A draw of its own: it tells nothing about the direction."""
-    return _roved_n(settings.level_n, settings.rove_db, seed, (run, trial, attempt, _ROVE))
+    """Amplitude (N) of a practice trial, drawn independently of the direction."""
+    return _draw_level_n(settings.level_n, settings.rove_db, seed, (run, trial, attempt, _ROVE))
 
 
 def demo_level_n(settings: DemoSettings, seed: int, played: int) -> float:
-    """The amplitude of a demonstration. played: how many came before in the session."""
-    return _roved_n(settings.level_n, settings.rove_db, seed, (played,))
+    """Amplitude (N) of a demonstration. played: number of earlier ones in the session."""
+    return _draw_level_n(settings.level_n, settings.rove_db, seed, (played,))
 
 
-def _roved_n(level_n: float, rove_db: float, seed: int, key: tuple[int, ...]) -> float:
-    """Even in dB over the range, level_n in its middle."""
+def _draw_level_n(level_n: float, rove_db: float, seed: int, key: tuple[int, ...]) -> float:
+    """Roved level (N): uniform in dB over `rove_db`, centred on `level_n`."""
     if rove_db == 0:
         return level_n
-    share = ((keyed_words(seed, key, 1)[0] >> 11) + 0.5) * 2.0**-53
+    share = ((draw_words(seed, key, 1)[0] >> 11) + 0.5) * 2.0**-53
     return to_newton(to_db(level_n) + rove_db * (share - 0.5))
 
 
 _CATCH, _DETECTION, _ROVE = 0, 1, 2
-"""Last part of keys that are one longer than a trial's."""
+"""Last element of keys that are one longer than a trial's."""
 
 
 def labels_swapped(settings: ScheduleSettings, frequencies: int, participant_number: int) -> bool:
-    """Whether the numbers 1 and 2 change places for this participant.
+    """Whether the numbers 1 and 2 are exchanged for this participant.
 
-    Every second participant, and the other half on the next pass through the Williams rows, so that each order of
-    the frequencies meets both labellings. frequencies: how many the stimulus has.
+    Every second participant, and the other half on the next pass through the Williams rows, so that each order of the
+    frequencies occurs with both labellings. frequencies: number of stimulus frequencies.
     """
     if settings.labels == "fixed":
         return False
@@ -151,17 +152,17 @@ def labels_swapped(settings: ScheduleSettings, frequencies: int, participant_num
 
 
 def label_of(direction: int, swapped: bool) -> int:
-    """The number on the screen for a direction; its own inverse."""
+    """Number on the screen for a direction; the mapping is its own inverse."""
     return 3 - direction if swapped else direction
 
 
-def keyed_words(seed: int, key: tuple[int, ...], count: int) -> tuple[int, ...]:
-    """64-bit words that belong to a key. Keys of different lengths never meet."""
+def draw_words(seed: int, key: tuple[int, ...], count: int) -> tuple[int, ...]:
+    """`count` pseudo-random 64-bit words for a key. Keys of different lengths never collide."""
     sequence = np.random.SeedSequence(entropy=seed, spawn_key=(len(key), *key))
     return tuple(int(word) for word in sequence.generate_state(count, np.uint64))
 
 
 def _permutation(seed: int, key: tuple[int, ...], size: int) -> tuple[int, ...]:
-    """Sorting independent words permutes fairly: ties have a chance of 1 in 10^17."""
-    words = keyed_words(seed, key, size)
+    """Random permutation by sorting independent words; ties have a probability of 1 in 10^17."""
+    words = draw_words(seed, key, size)
     return tuple(sorted(range(size), key=words.__getitem__))

@@ -1,7 +1,7 @@
-"""The transformed up-down staircase: which level comes next, and when a run is over.
+"""Transformed up-down staircase: the next level, and the end of a run.
 
-Read `step` first: it is the whole rule. A run is a value: `begin` makes it, `step` returns the next one.
-Levels are kept in dB re 1 N, because after the first contact with the cap they leave the 1 dB grid.
+Read `step` first: it is the whole rule. The state is a value: `begin` makes it, `step` returns the next one. Levels are
+kept in dB re 1 N, because after contact with the cap they leave the 1 dB grid.
 
 Source: H. Levitt, Transformed up-down methods in psychoacoustics, J. Acoust. Soc. Am. 49 (1971), 467-477.
 """
@@ -14,7 +14,7 @@ from protocols.definition.staircase_rule import StaircaseRule, StepChange
 
 
 class Heading(Enum):
-    """Which way the level moved last. The first movement of a run has nothing to turn from."""
+    """Direction of the last movement of the level; NONE before the first, which is therefore no reversal."""
 
     NONE = "none"
     UP = "up"
@@ -23,7 +23,7 @@ class Heading(Enum):
 
 @dataclass(frozen=True, slots=True)
 class StaircaseState:
-    """Where one run stands before its next trial."""
+    """State of one run before its next trial."""
 
     level_db: float
     right_in_a_row: int = 0
@@ -31,11 +31,11 @@ class StaircaseState:
     heading: Heading = Heading.NONE
     reversal_levels_db: tuple[float, ...] = ()
     reversal_trials: tuple[int, ...] = ()
-    """Index of the trial whose answer made each turn, from 0."""
+    """Index of the trial whose answer made each reversal, from 0."""
     trials: int = 0
     trials_at_cap: int = 0
     pushes_against_cap: int = 0
-    """How often the rule asked for more than the cap."""
+    """How often the rule asked for a level above the cap."""
     reversals_at_cap: int = 0
 
     @property
@@ -44,17 +44,18 @@ class StaircaseState:
 
 
 def begin(rule: StaircaseRule) -> StaircaseState:
-    """The state before the first answer of a run, at the rule's first level."""
+    """State before the first answer of a run, at the rule's start level."""
     return StaircaseState(level_db=to_db(rule.start_n))
 
 
 def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
-    """The state after one answer.
+    """State after one answer.
 
-    The level goes up after `up_after_wrong` wrong answers in a row and down after `down_after_right` right
-    ones; a turn of the level's direction is a reversal; the run ends with the last reversal at once.
+    The level rises after `up_after_wrong` consecutive wrong answers and falls after `down_after_right` consecutive
+    right ones; a change of direction is a reversal; the run ends with its last reversal. Raises ValueError if the run
+    is already finished.
     """
-    if finished(rule, state):
+    if is_finished(rule, state):
         raise ValueError("this run is finished: no answer can follow")
     counted = _count(rule, state, correct)
     if counted.wrong_in_a_row >= _wrong_needed(rule, state):
@@ -64,21 +65,24 @@ def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Staircase
     return counted
 
 
-def finished(rule: StaircaseRule, state: StaircaseState) -> bool:
+def is_finished(rule: StaircaseRule, state: StaircaseState) -> bool:
+    """Whether the run has all its reversals or has reached its trial limit."""
     out_of_trials = rule.trial_limit > 0 and state.trials >= rule.trial_limit
     return state.reversals >= rule.reversals or out_of_trials
 
 
 def level_n(rule: StaircaseRule, state: StaircaseState) -> float:
-    """The level to present, in newtons: never above the cap, also not by rounding of the dB."""
+    """Level to present (N); never above the cap, not even by rounding of the dB."""
     return min(to_newton(state.level_db), rule.cap_n)
 
 
 def to_db(level_n: float) -> float:
+    """Level in dB re 1 N."""
     return 20.0 * math.log10(level_n)
 
 
 def to_newton(level_db: float) -> float:
+    """Level in N from dB re 1 N."""
     return float(10.0 ** (level_db / 20.0))
 
 
@@ -93,7 +97,7 @@ def _count(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Stairca
 
 
 def _move(rule: StaircaseRule, state: StaircaseState, heading: Heading) -> StaircaseState:
-    """Move one step. Counters start afresh; a push against the cap moves nothing and turns nothing."""
+    """Move one step and reset the counters; at the cap an upward movement changes nothing and is no reversal."""
     fresh = replace(state, right_in_a_row=0, wrong_in_a_row=0)
     if heading is Heading.UP and _at_cap(rule, state.level_db):
         return replace(fresh, pushes_against_cap=state.pushes_against_cap + 1)
@@ -118,7 +122,7 @@ def _move(rule: StaircaseRule, state: StaircaseState, heading: Heading) -> Stair
 
 
 def _step_db(rule: StaircaseRule, reversals_before: int, turned: bool) -> float:
-    """Size of the step about to be taken, by how many reversals belong to the schedule's current phase."""
+    """Size of the next movement (dB): the phase of the schedule is found by the number of reversals."""
     reversals_now = reversals_before + turned
     match rule.step_change:
         case StepChange.AFTER_REVERSAL:
@@ -148,7 +152,7 @@ def _in_initial_phase(rule: StaircaseRule, state: StaircaseState) -> bool:
 
 
 _SAME_DB = 1e-9
-"""Levels closer than this are one level; below any step a protocol may ask for."""
+"""Tolerance (dB) within which two levels are equal; below any allowed step."""
 
 
 def _at_cap(rule: StaircaseRule, level_db: float) -> bool:

@@ -13,7 +13,7 @@ from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.opening import needs_real_time
 from study.errors import WrongUseError
-from study.store.disk.privacy import left_open
+from study.store.disk.privacy import data_folder_warning
 from study.store.sessions.archive import check_subject, find_session
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_mode.line_input import LineInput
@@ -57,7 +57,7 @@ def begin(
 
 def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS) -> None:
     folder = find_session(session, data)
-    if still_open := left_open(folder.path.parent):
+    if still_open := data_folder_warning(folder.path.parent):
         typer.echo(f"Note: {still_open}", err=True)
     folded = fold_session(folder)
     state, opened = folded.state, folded.state.opened

@@ -17,9 +17,9 @@ NameArgument = Annotated[str, typer.Argument(help="A shipped protocol's name, or
 @app.command("list")
 def list_protocols() -> None:
     """The shipped protocols, one line each."""
-    from study.store.formats.protocol_files import read_protocol, shipped_protocols
+    from study.store.formats.protocol_files import list_shipped_protocols, read_protocol
 
-    for name in shipped_protocols():
+    for name in list_shipped_protocols():
         protocol = read_protocol(name).protocol
         typer.echo(f"{name:22} {protocol.kind:10} {protocol.title}")
 

@@ -35,7 +35,7 @@ class Logger:
         return values
 
 
-def aligned(loggers: tuple[Logger, ...], say: Callable[[str], None]) -> tuple[Logger, ...]:
+def align_signals(loggers: tuple[Logger, ...], say: Callable[[str], None]) -> tuple[Logger, ...]:
     """The same loggers with their offsets; `say` gets a sentence for each offset. Raises ImportProblemError."""
     first, *others = loggers
     return (first, *(_with_offset(first, other, say) for other in others))
@@ -70,12 +70,12 @@ def _by_correlation(first: Logger, other: Logger) -> tuple[float, str]:
 
 def _by_trigger(first: Logger, other: Logger) -> tuple[float, str]:
     clock = other.clock
-    here_s = _crossing_s(other, clock.trigger, clock.trigger_level)
-    there_s = _crossing_s(first, clock.reference_trigger, clock.reference_level)
+    here_s = _find_crossing_s(other, clock.trigger, clock.trigger_level)
+    there_s = _find_crossing_s(first, clock.reference_trigger, clock.reference_level)
     return there_s - here_s, f"from the trigger in {clock.trigger} and {clock.reference_trigger}"
 
 
-def _crossing_s(logger: Logger, text: str, level: float) -> float:
+def _find_crossing_s(logger: Logger, text: str, level: float) -> float:
     """When it passes the level for the first time, along the straight line between samples."""
     values: Any = logger.line(text)
     times_s = logger.base.times_s(len(values))

@@ -13,7 +13,7 @@ from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.recording_checks import recording_problems
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit, quantity_of
-from study.importing.alignment import Logger, aligned
+from study.importing.alignment import Logger, align_signals
 from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.namespace import of_file
@@ -41,12 +41,12 @@ class Said:
     def sentences(self, every_part: Sequence[str]) -> tuple[str, ...]:
         """every_part: labels of all parts, to tell what holds for all of them."""
         return tuple(
-            sentence if len(parts) == len(every_part) else f"{_shortened(parts)}: {sentence}"
+            sentence if len(parts) == len(every_part) else f"{_abbreviate_list(parts)}: {sentence}"
             for sentence, parts in self._parts.items()
         )
 
 
-def _shortened(parts: Sequence[str]) -> str:
+def _abbreviate_list(parts: Sequence[str]) -> str:
     shown = ", ".join(parts[:_NAMED])
     return shown + (f" and {len(parts) - _NAMED} more" if len(parts) > _NAMED else "")
 
@@ -79,7 +79,7 @@ def build_recording(
         for number, part in enumerate(planned):
             counter = _Counter(number * steps / len(planned), steps, on_progress)
             parts.append(_part(wanted, part, said, counter, budget))
-        recording, repeats = find_segments(_joined(wanted, parts, units))
+        recording, repeats = find_segments(_concatenate(wanted, parts, units))
     except ImportProblemError as error:
         raise ImportRefusedError(what, str(error)) from error
     if problems := recording_problems(recording):
@@ -111,7 +111,7 @@ def _part(wanted: ImportMap, files: PartFiles, said: Said, counter: _Counter, bu
     def say(sentence: str) -> None:
         said.add(files.label, sentence)
 
-    ready = aligned(tuple(loggers), say)
+    ready = align_signals(tuple(loggers), say)
     signals = part_signals(wanted, files.part, ready, say, counter.step)
     numbers = {name: ready[0].names.number(text) for name, text in wanted.numbers.items()}
     facts = {"file": files.file.name, "prefix": files.part.prefix, "clock_start_s": signals.grid.start_s, **numbers}
@@ -154,7 +154,7 @@ def _said_of_units(wanted: ImportMap) -> Iterator[str]:
         yield f"No time is known: samples are numbered, at {NUMBERED_HZ:g} Hz."
 
 
-def _joined(wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Recording:
+def _concatenate(wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Recording:
     _require_one_rate(parts)
     command = _signal("command", wanted, parts, units)
     response = _signal("response", wanted, parts, units)

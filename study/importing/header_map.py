@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from study.importing.arrays.arrays import Arrays
 from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap
-from study.importing.map_format.signal_words import Named, named, open_roles, plain_names, roles_of
+from study.importing.map_format.signal_words import Named, name_signal, open_roles, plain_names, roles_of
 
 _TIME = re.compile(r"(t|time|zeit|temps)(_?(s|ms|us))?", re.IGNORECASE)
 
@@ -49,7 +49,7 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
 
 def _columns(arrays: Arrays) -> tuple[list[Named], list[Named]]:
     """Stamps with their unit, and all others."""
-    columns = [named(header) for header in arrays.by_name]
+    columns = [name_signal(header) for header in arrays.by_name]
     times = [column for column in columns if column.unit and _is_time(column) and column.quantity == "time"]
     return times, [column for column in columns if column not in times]
 

@@ -52,7 +52,7 @@ class FoundMap:
         return f"{self.source.name}_{self.files[0].stem}" if self.source.map.separate else self.source.name
 
 
-def shipped_maps() -> tuple[str, ...]:
+def list_shipped_maps() -> tuple[str, ...]:
     """Names of the maps that come with hapteq."""
     entries = resources("study.importing").joinpath("maps").iterdir()
     return tuple(sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml")))
@@ -60,7 +60,7 @@ def shipped_maps() -> tuple[str, ...]:
 
 def read_map(name: str) -> MapFile:
     """A shipped map by its name, or any by its path. Raises WrongUseError, CannotReadError, UnusableFileError."""
-    if name in shipped_maps():
+    if name in list_shipped_maps():
         shipped = resources("study.importing").joinpath("maps").joinpath(f"{name}.toml")
         text = shipped.read_text("utf-8")
         return MapFile(name, parse_map(text, Path(f"{name}.toml")), text, Path(str(shipped)))
@@ -68,8 +68,8 @@ def read_map(name: str) -> MapFile:
     if path.suffix != ".toml" and not path.exists():
         raise WrongUseError(
             "There is no such map",
-            f"'{name}' is neither a file nor a map that comes with hapteq{suggestion(name, shipped_maps())}; these are "
-            f"{', '.join(shipped_maps())}.",
+            f"'{name}' is neither a file nor a map that comes with hapteq{suggestion(name, list_shipped_maps())}; "
+            f"these are {', '.join(list_shipped_maps())}.",
             "Give the name of one of them, or the path of a map of yours.",
         )
     text = read_toml_text(path, KIND)
@@ -84,7 +84,7 @@ def find_map(folder: Path) -> tuple[FoundMap, ...]:
     if own:
         candidates = [read_map(str(path)) for path in own]
         return tuple(found for source in candidates for found in _recordings(source, paths))
-    shipped = (read_map(name) for name in shipped_maps())
+    shipped = (read_map(name) for name in list_shipped_maps())
     return tuple(found for source in shipped for found in _recordings(source, paths) if _fits(found))
 
 
@@ -92,7 +92,7 @@ def map_of_files(paths: Sequence[Path]) -> MapFile | None:
     """The one map of ours that makes one recording of just these files; None where there is none, or several."""
     found = [
         entry.source
-        for name in shipped_maps()
+        for name in list_shipped_maps()
         for entry in _recordings(read_map(name), paths)
         if set(entry.files) == set(paths) and _fits(entry)
     ]

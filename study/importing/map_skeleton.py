@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from study.importing.arrays.array_groups import groups_in
 from study.importing.arrays.arrays import Arrays
-from study.importing.map_format.signal_words import named, proposed_roles, unit_in
+from study.importing.map_format.signal_words import name_signal, propose_roles, unit_in
 
 _LEAST_SAMPLES = 16
 _CLOCK_WORDS = {"t", "time", "timestamp", "timestamps", "zeit", "temps"}
@@ -49,7 +49,7 @@ def _lines(whole: Arrays) -> Iterator[str]:
         elif array.ndim == 2:
             yield from _table(name, array.shape)
         else:
-            yield f"\n# {name}: {_shape(array.shape)}; a channel is one row of it, as in {_quoted(name)}[0, 0]"
+            yield f"\n# {name}: {_shape(array.shape)}; a channel is one row of it, as in {_quote(name)}[0, 0]"
     yield from _parts(groups.prefixes)
     yield ""
     yield "[[segment]]"
@@ -60,7 +60,7 @@ def _lines(whole: Arrays) -> Iterator[str]:
 def _roles(arrays: Arrays, clocks: list[str]) -> dict[str, str]:
     """By name, where names and units say them."""
     channels = [name for name, array in arrays.by_name.items() if array.size >= _LEAST_SAMPLES and name not in clocks]
-    return dict(zip(channels, proposed_roles([named(name) for name in channels]), strict=True))
+    return dict(zip(channels, propose_roles([name_signal(name) for name in channels]), strict=True))
 
 
 def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
@@ -96,13 +96,13 @@ def _table(name: str, shape: tuple[int, ...]) -> Iterator[str]:
     rows_are_channels = shape[0] < shape[1]
     for number in range(min(shape)):
         index = f"[{number}]" if rows_are_channels else f"[:, {number}]"
-        yield from _channel((f"{name}{number + 1}", f"{_quoted(name)}{index}", name), _shape(shape), "", "")
+        yield from _channel((f"{name}{number + 1}", f"{_quote(name)}{index}", name), _shape(shape), "", "")
 
 
 def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> Iterator[str]:
     """names: of the channel, its value, the array's own."""
     name, value, header = names
-    told = named(header)
+    told = name_signal(header)
     yield ""
     yield f"[[channel]]               # {header}: {shape}"
     yield f"role = {json.dumps(role):20s} # command, response, position, excitation, condition, helper"
@@ -114,7 +114,7 @@ def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> 
         yield f"clock = {json.dumps(clock)}"
 
 
-def _quoted(name: str) -> str:
+def _quote(name: str) -> str:
     return name if name.isidentifier() else f"array('{name}')"
 
 

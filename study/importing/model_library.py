@@ -7,7 +7,7 @@ from study.errors import WrongUseError
 from study.importing.map_format.map_errors import suggestion
 
 
-def shipped_models() -> tuple[str, ...]:
+def list_shipped_models() -> tuple[str, ...]:
     entries = resources("study.importing").joinpath("models").iterdir()
     return tuple(sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml")))
 
@@ -16,11 +16,11 @@ def model_for(name: str, folder: Path) -> Path:
     """A file beside a map, or one of ours by its name. Raises WrongUseError."""
     if (beside := folder / name).is_file():
         return beside
-    if name in shipped_models():
+    if name in list_shipped_models():
         return Path(str(resources("study.importing").joinpath("models").joinpath(f"{name}.toml")))
     raise WrongUseError(
         "There is no such model",
         f"'{name}' is neither a file in {folder.name} nor a model that comes with hapteq"
-        f"{suggestion(name, shipped_models())}; these are {', '.join(shipped_models())}.",
+        f"{suggestion(name, list_shipped_models())}; these are {', '.join(list_shipped_models())}.",
         "Correct `model` in the map's [diagnosis], or leave it out: then a linear one is fitted.",
     )

@@ -56,7 +56,9 @@ def part_signals(
         step()
     for computed in wanted.computed:
         named = {name: column for (_, name), column in reversed(columns.items())}  # of one name, the first counts
-        columns[computed.role, computed.name] = _computed(computed.name, computed.value, named, grid, loggers[0].names)
+        columns[computed.role, computed.name] = _compute_channel(
+            computed.name, computed.value, named, grid, loggers[0].names
+        )
         step()
     return PartSignals(grid, columns)
 
@@ -137,7 +139,7 @@ def _on_grid(channel: ChannelMap, samples: Samples, grid: Grid, say: Callable[[s
             'a command that stays until the next, "band-limited" for a signal sampled behind a filter, or "linear"'
         )
     else:
-        column = _moved(channel, channel.resample, samples, grid, say)
+        column = _resample(channel, channel.resample, samples, grid, say)
     if missing := int(np.isnan(column).sum()):
         say(f"{channel.name}: {missing} of {len(column)} samples are missing.")
     return column
@@ -147,7 +149,9 @@ def _same_rate(samples: Samples, grid: Grid) -> bool:
     return abs(samples.rate_hz / grid.rate_hz - 1) * grid.count < SAME_INSTANT
 
 
-def _moved(channel: ChannelMap, method: Method, samples: Samples, grid: Grid, say: Callable[[str], None]) -> FloatArray:
+def _resample(
+    channel: ChannelMap, method: Method, samples: Samples, grid: Grid, say: Callable[[str], None]
+) -> FloatArray:
     try:
         column = resample(samples, grid, method)
     except ValueError as error:
@@ -159,7 +163,9 @@ def _moved(channel: ChannelMap, method: Method, samples: Samples, grid: Grid, sa
     return column
 
 
-def _computed(name: str, text: str, columns: Mapping[str, FloatArray], grid: Grid, file: Namespace) -> FloatArray:
+def _compute_channel(
+    name: str, text: str, columns: Mapping[str, FloatArray], grid: Grid, file: Namespace
+) -> FloatArray:
     own = {**file.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
         value = Namespace(own, file.definitions, file.where, file.budget).value_of(text, _GridClock(grid))

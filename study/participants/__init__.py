@@ -1,1 +1,1 @@
-"""Simulated participants. Stateless: what they answer depends on the trial and the seed, never on what came before."""
+"""Simulated participants. Stateless: an answer depends on the trial and the seed only, not on earlier answers."""

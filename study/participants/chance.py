@@ -1,4 +1,4 @@
-"""Chance of simulated participants, keyed by trial: the same trial of the same session gets the same luck."""
+"""Random numbers of simulated participants, keyed by trial: the same trial of the same session gets the same draws."""
 
 import math
 from statistics import NormalDist
@@ -12,17 +12,17 @@ _SPREAD_OF_LOG = math.log(2.5 / 1.2) / (2 * 1.96)
 """So that 95 % of the response times lie between 1.2 and 2.5 s."""
 
 _OBSERVERS = 0x0B5E
-"""Sets these keys apart from those of the schedule: otherwise a session and its participant that share a seed would
-share their draws, and the participant's luck would know the direction."""
+"""Separates these keys from those of the schedule: with a shared seed, a participant's draws would otherwise be
+correlated with the directions."""
 
 
 def uniform(felt: Felt, seed: int, count: int) -> tuple[float, ...]:
-    """Independent draws, uniform within (0, 1), that belong to this presentation."""
+    """`count` independent draws, uniform in (0, 1), for this presentation."""
     key = (_OBSERVERS, felt.run, felt.trial, felt.attempt)
     words = np.random.SeedSequence(entropy=seed, spawn_key=key).generate_state(count, np.uint64)
     return tuple(((int(word) >> 11) + 0.5) * 2.0**-53 for word in words)
 
 
 def response_time_s(luck: float) -> float:
-    """Log-normal; luck: uniform within (0, 1)."""
+    """Log-normal response time (s). luck: uniform in (0, 1)."""
     return _MEDIAN_RESPONSE_S * math.exp(_SPREAD_OF_LOG * NormalDist().inv_cdf(luck))

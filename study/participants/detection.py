@@ -1,11 +1,12 @@
-"""At which level a vibration is felt at all, whatever its direction. All numbers are ours.
+"""Detection thresholds of simulated participants: whether a vibration is felt, regardless of its direction. All numbers
+are assumptions of ours.
 
-Feeling that something shakes takes far less than feeling along which line, and hardly more at 45 Hz than at 5 Hz:
-where the direction is lost, the vibration is not.
+Detecting a vibration takes a much lower level than telling its direction, and hardly rises from 5 to 45 Hz: where the
+direction is not felt, the vibration still is.
 """
 
 TYPICAL_DETECTION_N = ((5.0, 0.08), (15.0, 0.08), (25.0, 0.1), (35.0, 0.12), (45.0, 0.14))
 """(Hz, N): the median participant finds the interval 79.37 % of the time."""
 
 DETECTION_SLOPE = 2.5
-"""Of the Weibull curve over newtons. Detection is a little steeper than telling directions."""
+"""Slope of the Weibull curve over newtons; slightly steeper than for directions."""

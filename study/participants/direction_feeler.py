@@ -1,11 +1,11 @@
-"""A participant who feels the direction, more or less well.
+"""Simulated participant with a direction threshold: signal detection theory over a Weibull curve.
 
-One presentation, two answers: identification, not a choice between two intervals. With e normal around +d'/2 for
-direction 1 and -d'/2 for direction 2, spread 1, answer 1 is given where e > criterion. Unbiased, the share of
-right answers is Phi(d'/2), so d' = 2 Phi^-1(share of the Weibull curve); a criterion lowers the share at equal d'.
+One presentation, two possible answers (identification, not a choice between intervals). The evidence is normal around
++d'/2 for direction 1 and -d'/2 for direction 2 with unit standard deviation; answer 1 is given above the criterion.
+Without bias the fraction of right answers is Phi(d'/2), so d' = 2 Phi^-1(fraction of the Weibull curve); a criterion
+lowers the fraction at equal d'.
 
-In a detection trial the two are intervals, and what counts is whether the vibration is felt at all: the same model
-over a curve of its own, far below the one for directions.
+In a detection trial the alternatives are two intervals: the same model with the detection curve, at much lower levels.
 
 Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2.
 """
@@ -31,17 +31,18 @@ class DirectionFeeler:
     slope: float = 2.0
     """Of the Weibull curve over newtons; people's lie between 1 and 3.5."""
     lapse: float = 0.0
-    """Share of wrong answers that is left at the strongest level; such answers are a coin's, for twice this share."""
+    """Fraction of wrong answers at the strongest level; lapses are random answers, at twice this rate."""
     criterion: float = 0.0
     """c of Macmillan and Creelman, as in `psychophysics.bias`: positive, a tendency to answer 2; negative, to 1."""
     drift_db_per_100_trials: float = 0.0
-    """By how much the thresholds rise as the session goes on."""
+    """Rise of the thresholds during the session."""
     numb_above_hz: float = math.inf
-    """Above this frequency the direction is not felt at all; the vibration is."""
+    """Above this frequency the direction is not felt; the vibration is."""
     detection_n: tuple[tuple[float, float], ...] = TYPICAL_DETECTION_N
     """(frequency in Hz, level in N at which the vibration's interval is found 79.37 % of the time)."""
 
     def reply(self, felt: Felt, seed: int) -> Reply:
+        """The answer to one presentation."""
         luck, delay = uniform(felt, seed, 2)
         answer = 1 if luck < self.share_of_1(felt) else 2
         return Reply(answer, response_time_s(delay))
@@ -53,6 +54,7 @@ class DirectionFeeler:
         return self.lapse + (1.0 - 2.0 * self.lapse) * certain
 
     def share_right(self, felt: Felt) -> float:
+        """Probability of the right answer."""
         share_of_1 = self.share_of_1(felt)
         return share_of_1 if felt.direction_shown == 1 else 1.0 - share_of_1
 

@@ -1,14 +1,15 @@
-"""A participant who feels no direction, but notices that one direction comes out stronger than the other.
+"""Simulated participant without a sense of direction, who uses the difference in strength between the directions.
 
-A device rarely delivers both directions equally strong. Who remembers how strong this level feels on average can
-take "stronger" for direction 1 and "weaker" for direction 2. The level moves seldom, so the memory is taken as
-perfect: an upper bound of what this trick can do.
+A device rarely delivers both directions equally strongly. A participant who remembers the average strength at this
+level can take "stronger" for direction 1 and "weaker" for direction 2. The level changes rarely, so the memory is
+assumed perfect: an upper bound of this cue.
 
-Model: the felt strength in dB is normal around +difference_db/2 (direction 1) or -difference_db/2 (direction 2) of
-the remembered one, with the spread noise_db sqrt(1 + (detection_n / level)^2): a constant Weber fraction well above
-the detection level, growing noise towards it. So d' = difference_db / spread. Without a difference it is chance.
+Model: the felt strength in dB is normal around +difference_db/2 (direction 1) or -difference_db/2 (direction 2)
+relative to the memory, with standard deviation noise_db sqrt(1 + (detection_n / level)^2): a constant Weber fraction
+well above the detection level, and rising noise towards it. So d' = difference_db / standard deviation; without a
+difference the answers are at chance.
 
-Whether it shakes at all is felt as everybody feels it, with the detection level as threshold.
+Detection is that of other participants, with `detection_n` as threshold.
 """
 
 import math
@@ -26,13 +27,14 @@ from study.participants.psychometric_curve import WeibullCurve
 class IntensityCue:
     name: str
     difference_db: float = 3.0
-    """How much stronger direction 1 is delivered than direction 2."""
+    """By how much direction 1 is delivered more strongly than direction 2."""
     noise_db: float = 1.0
-    """Spread of one judgement of strength, about the difference limen of vibration."""
+    """Standard deviation of one judgement of strength; about the difference limen of vibration."""
     detection_n: float = 0.1
     """Level at which the noise has grown by the square root of two, and threshold of detection."""
 
     def reply(self, felt: Felt, seed: int) -> Reply:
+        """The answer to one presentation."""
         luck, delay = uniform(felt, seed, 2)
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         detection = WeibullCurve(self.detection_n, DETECTION_SLOPE)
@@ -41,4 +43,5 @@ class IntensityCue:
         return Reply(1 if luck < share_of_1 else 2, response_time_s(delay))
 
     def d_prime(self, level_n: float) -> float:
+        """Sensitivity d' at this level (N)."""
         return self.difference_db / (self.noise_db * math.hypot(1.0, self.detection_n / level_n))

@@ -1,4 +1,4 @@
-"""The port of simulated participants: what one feels, what one answers."""
+"""Interface of simulated participants: what is felt, what is answered."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -8,7 +8,7 @@ from protocols.trial import Phase
 
 @dataclass(frozen=True, slots=True)
 class Felt:
-    """One stimulus, as far as a participant could know it, and where in the session it comes."""
+    """One stimulus as far as a participant could perceive it, and its place in the session."""
 
     run: int
     trial: int
@@ -19,7 +19,7 @@ class Felt:
     direction_shown: int
     """Its number on the screen, 1 or 2; in a detection trial, of the interval in which it shook."""
     trials_before: int
-    """Answered so far in this session, training included."""
+    """Trials answered so far in this session, training included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,8 @@ class Reply:
 
 
 class Observer(Protocol):
-    """Stateless: the reply depends on what is felt, on the seed, and on nothing answered before. So a resumed
-    session gets the replies that the uninterrupted one would have got."""
+    """A stateless participant: the reply depends on the stimulus and the seed, not on earlier answers. So a resumed
+    session gets the same replies as an uninterrupted one."""
 
     @property
     def name(self) -> str: ...

@@ -30,7 +30,8 @@ _MEMBER = re.compile(r"person_(?P<number>[1-9]\d*)_seed_(?P<seed>\d+)")
 
 
 def observer_named(name: str, seed: int) -> Observer:
-    """seed: picks the person of "person", no other. Raises WrongUseError with the names there are."""
+    """The simulated participant of this name. seed: chooses the person for "person" only. Raises WrongUseError for
+    an unknown name."""
     known = name.replace("-", "_")
     if member := _MEMBER.fullmatch(known):
         return person(int(member["number"]), int(member["seed"]))

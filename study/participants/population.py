@@ -1,8 +1,8 @@
-"""Simulated participants who differ as people do, with thresholds that rise with frequency.
+"""A population of simulated participants with individual thresholds that rise with frequency.
 
-All numbers are ours. They are chosen so that a study of ten looks like the published figure 2 in its main lines:
-lowest at 5 Hz, a significant rise at 35 Hz, some who never find the direction there and end at the cap, 45 Hz much
-like 35 Hz. No published threshold is copied.
+All numbers are assumptions of ours, chosen such that a study of ten resembles the published figure 2: lowest threshold
+at 5 Hz, a significant rise at 35 Hz, some participants at the cap there, 45 Hz similar to 35 Hz. No published threshold
+is copied.
 """
 
 import numpy as np
@@ -11,24 +11,25 @@ from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.direction_feeler import DirectionFeeler
 
 TYPICAL_THRESHOLDS_N = ((5.0, 0.35), (15.0, 0.6), (25.0, 0.85), (35.0, 2.2), (45.0, 2.2))
-"""(Hz, N): the median participant. A fourth of the participants lies above the cap of 3 N at 35 Hz."""
+"""(Hz, N): the median participant. A quarter of the participants is above the cap of 3 N at 35 Hz."""
 
 SPREAD_OF_PERSON_DB = 2.5
-"""Standard deviation of what makes one person better or worse at all frequencies."""
+"""Standard deviation between participants, common to all frequencies."""
 SPREAD_OF_FREQUENCY_DB = 1.7
-"""And of what differs from frequency to frequency. Together 3 dB between participants."""
+"""Standard deviation per frequency. Together 3 dB between participants."""
 SPREAD_OF_DETECTION_DB = 2.5
-"""Standard deviation of what makes one person feel weaker vibrations than another, at all frequencies. Nothing of it
-is shared with the sense of direction."""
+"""Standard deviation of detection thresholds between participants, at all frequencies; independent of the direction
+thresholds."""
 
 
 def population(n: int, seed: int) -> tuple[DirectionFeeler, ...]:
-    """n participants. The first ones do not change when n grows."""
+    """n participants; the first ones do not change when n grows."""
     return tuple(person(number, seed) for number in range(1, n + 1))
 
 
 def person(number: int, seed: int) -> DirectionFeeler:
-    """One of the population of this seed, numbered from 1; the name says both, so that a log can call it back."""
+    """Participant `number` (from 1) of the population of this seed; the name contains both, so that a log can
+    recreate it."""
     rng = np.random.default_rng([seed, number])
     person_db = rng.normal(0.0, SPREAD_OF_PERSON_DB)
     offsets_db = person_db + rng.normal(0.0, SPREAD_OF_FREQUENCY_DB, len(TYPICAL_THRESHOLDS_N))
@@ -42,10 +43,13 @@ def person(number: int, seed: int) -> DirectionFeeler:
         lapse=float(rng.beta(1.0, 60.0)),
         criterion=-float(rng.normal(0.0, 0.15)),
         drift_db_per_100_trials=float(abs(rng.normal(0.0, 0.2))),
-        # Drawn last, so that the people of older studies are still the same.
-        detection_n=_shifted(TYPICAL_DETECTION_N, rng.normal(0.0, SPREAD_OF_DETECTION_DB)),
+        # Drawn last, so that the participants of older studies stay the same.
+        detection_n=_shift_thresholds(TYPICAL_DETECTION_N, rng.normal(0.0, SPREAD_OF_DETECTION_DB)),
     )
 
 
-def _shifted(thresholds_n: tuple[tuple[float, float], ...], offset_db: float) -> tuple[tuple[float, float], ...]:
+def _shift_thresholds(
+    thresholds_n: tuple[tuple[float, float], ...], offset_db: float
+) -> tuple[tuple[float, float], ...]:
+    """Thresholds (Hz, N) changed by an offset in dB."""
     return tuple((frequency_hz, float(n * 10.0 ** (offset_db / 20.0))) for frequency_hz, n in thresholds_n)

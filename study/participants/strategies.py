@@ -1,4 +1,4 @@
-"""Participants who answer without feeling anything: controls that must not pass for people who do."""
+"""Simulated participants who answer without feeling: controls that an analysis must recognise."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from study.participants.observer import Felt, Reply
 
 @dataclass(frozen=True, slots=True)
 class Guesser:
-    """Tosses a coin."""
+    """Answers at random."""
 
     name: str
 
@@ -19,7 +19,7 @@ class Guesser:
 
 @dataclass(frozen=True, slots=True)
 class Alternator:
-    """Says 1, 2, 1, 2 through the whole session."""
+    """Answers 1, 2, 1, 2 throughout the session."""
 
     name: str
 
@@ -30,7 +30,7 @@ class Alternator:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """Says the same every time."""
+    """Always gives the same answer."""
 
     name: str
     answer: int
@@ -42,13 +42,13 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Scripted:
-    """Right or wrong by run and trial number alone, whatever direction was drawn and however often: after any
-    interruption the levels must be those of the uninterrupted session."""
+    """Answers right or wrong by run and trial number only, whatever direction was drawn: after an interruption the
+    levels must equal those of an uninterrupted session."""
 
     name: str
     script: str = "111111011101110011111101110011101110"
-    """1 = right, 0 = wrong; repeated, and begun one place later in every run. The default ends a published
-    staircase with its 36th answer in run 0, a little sooner or later in others."""
+    """1 = right, 0 = wrong; repeated, and begun one place later in every run. The default ends a published staircase
+    at its 36th answer in run 0, slightly earlier or later in others."""
 
     def reply(self, felt: Felt, seed: int) -> Reply:
         _, delay = uniform(felt, seed, 2)

@@ -14,7 +14,7 @@ from protocols.definition.preparation import PracticeSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 from protocols.definition.study_protocol import StimulusSettings, StudyProtocol, TrainingSettings
 from protocols.procedure.run_rules import staircase_rule
-from protocols.procedure.staircase import StaircaseState, begin, finished, level_n, step
+from protocols.procedure.staircase import StaircaseState, begin, is_finished, level_n, step
 from protocols.trial import Phase, Trial, TrialStatus
 
 PUBLISHED = StaircaseRule(
@@ -73,7 +73,7 @@ def simulated_run(
     """One run of a Weibull observer; columns: values of the trial's columns that differ from the template."""
     state, trials = begin(rule), []
     template = replace(TEMPLATE, **columns)
-    while not finished(rule, state):
+    while not is_finished(rule, state):
         level = level_n(rule, state)
         correct = bool(generator.random() < chance_of_right(level, true_n, slope, lapse))
         state, trial = played(rule, state, template, correct, int(generator.integers(1, 3)))
@@ -122,7 +122,7 @@ def answered_run(answers: str, rule: StaircaseRule = PUBLISHED) -> list[Trial]:
     """A run from answers written as 1 (right) and 0 (wrong), directions in turn; the rest after the end is not used."""
     state, trials = begin(rule), []
     for index, answer in enumerate(answers):
-        if not finished(rule, state):
+        if not is_finished(rule, state):
             state, trial = played(rule, state, TEMPLATE, answer == "1", 1 + index % 2)
             trials.append(trial)
     return trials

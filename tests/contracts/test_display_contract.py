@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from protocols.trial import Phase
-from study.session.views.form_views import Form, FormField, FormKind, missing
+from study.session.views.form_views import Form, FormField, FormKind, find_missing_fields
 from study.session.views.views import (
     AfterPause,
     Answered,
@@ -66,7 +66,7 @@ def away(sentence: str = "Bring the handle back") -> HandleView:
 def test_a_form_comes_back_with_every_needed_answer(seat):
     seat.fill(FORM, ("no", "by its rhythm"))
     reply = seat.display.fill_in(FORM)
-    assert missing(FORM, reply) == ()
+    assert find_missing_fields(FORM, reply) == ()
     if seat.person:
         assert reply.answers == {"felt": "no", "how": "by its rhythm"}
 

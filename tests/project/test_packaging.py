@@ -36,9 +36,11 @@ def test_the_wheel_carries_the_shipped_protocols_and_the_report_template(wheel):
 
 
 def test_the_wheel_carries_the_maps_for_imports(wheel):
-    from study.importing.map_library import shipped_maps
+    from study.importing.map_library import list_shipped_maps
 
-    assert {f"study/importing/maps/{name}.toml" for name in shipped_maps()} <= set(zipfile.ZipFile(wheel).namelist())
+    assert {f"study/importing/maps/{name}.toml" for name in list_shipped_maps()} <= set(
+        zipfile.ZipFile(wheel).namelist()
+    )
 
 
 def test_the_wheel_carries_the_sources_of_an_exported_controller(wheel):

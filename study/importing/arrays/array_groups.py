@@ -23,11 +23,11 @@ class Groups:
 def groups_in(arrays: Mapping[str, npt.NDArray[Any]], least: int) -> Groups:
     """Runs are told by the most arrays that they share; each must hold one of `least` samples or more."""
     long_ones = [name for name, array in arrays.items() if array.size >= least]
-    found = [_grouped(tuple(arrays), long_ones, separator) for separator in _SEPARATORS]
+    found = [_group_arrays(tuple(arrays), long_ones, separator) for separator in _SEPARATORS]
     return max(found, key=lambda groups: len(groups.prefixes) * len(groups.names))
 
 
-def _grouped(names: Sequence[str], long_ones: Sequence[str], separator: str) -> Groups:
+def _group_arrays(names: Sequence[str], long_ones: Sequence[str], separator: str) -> Groups:
     members: dict[str, list[str]] = {}
     for name in names:
         before, between, after = name.rpartition(separator) if separator == "/" else name.partition(separator)

@@ -74,7 +74,7 @@ def read_mat5_arrays(path: Path) -> dict[str, Array]:
     while file.left >= 8:
         kind, element = file.element()
         if kind == _COMPRESSED:
-            kind, element = _unpacked(element, limit).element()
+            kind, element = _unpack(element, limit).element()
         if kind == _MATRIX:
             name, value = _matrix(element, 0)
             if not name.startswith("__"):
@@ -82,7 +82,7 @@ def read_mat5_arrays(path: Path) -> dict[str, Array]:
     return found
 
 
-def _unpacked(packed: _Bytes, limit: SizeLimit) -> _Bytes:
+def _unpack(packed: _Bytes, limit: SizeLimit) -> _Bytes:
     unpacker = zlib.decompressobj()
     content = unpacker.decompress(packed.content, limit.most_bytes)
     if unpacker.unconsumed_tail:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from study.store.disk.declared_size import SizeLimit
 from study.store.disk.hdf5_contents import datasets_in
-from study.store.disk.hdf5_file import opened_any_hdf5
+from study.store.disk.hdf5_file import open_any_hdf5
 from study.store.disk.regular_file import open_regular
 
 Array = npt.NDArray[Any]
@@ -77,7 +77,7 @@ def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
     """Datasets are named by their path, as in `run1/force`. transposed: dimensions in Matlab's order are turned.
     Raises UnusableFileError."""
     found: dict[str, Array] = {}
-    with opened_any_hdf5(path, "HDF5 file") as file:
+    with open_any_hdf5(path, "HDF5 file") as file:
         for name, entry in datasets_in(file):
             if name.startswith("#") or entry.shape is None:
                 continue

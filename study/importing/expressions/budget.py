@@ -45,7 +45,7 @@ class Budget:
             )
 
     @contextmanager
-    def holding(self, numbers: int) -> Iterator[None]:
+    def hold_numbers(self, numbers: int) -> Iterator[None]:
         """While another value is computed, this one stays."""
         self._held += numbers
         try:

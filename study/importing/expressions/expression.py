@@ -46,7 +46,7 @@ def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
 
     Raises ImportProblemError with the part that is not understood, or that costs more than the budget leaves.
     """
-    tree = parsed(text)
+    tree = parse_expression(text)
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, which is told as such later
@@ -60,7 +60,7 @@ def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
 
 def names_in(text: str) -> set[str]:
     """Of arrays, channels and definitions that an expression needs. Raises ImportProblemError."""
-    tree = parsed(text)
+    tree = parse_expression(text)
     functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     plain = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
     quoted = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
@@ -68,7 +68,7 @@ def names_in(text: str) -> set[str]:
 
 
 @lru_cache(maxsize=1024)
-def parsed(text: str) -> ast.expr:
+def parse_expression(text: str) -> ast.expr:
     """Raises ImportProblemError."""
     if not text.strip():
         raise ImportProblemError("the expression is empty")
@@ -104,7 +104,7 @@ class _Evaluation:
                     return self._call(name, arguments)
                 case ast.Subscript(value=inner, slice=index):
                     return self._part(inner, index)
-            raise self._refused(node)
+            raise self._refusal(node)
 
     def _leaf(self, node: ast.Constant | ast.Name) -> Any:
         self.budget.spend(0, self.text)
@@ -117,7 +117,7 @@ class _Evaluation:
                 return word
             case ast.Constant(value=int() | float() as number) if not isinstance(number, bool) and abs(number) < 1e300:
                 return np.float64(number)
-        raise self._refused(node)
+        raise self._refusal(node)
 
     def _numbers(self, node: ast.expr) -> Value:
         value = self.of(node)
@@ -133,7 +133,7 @@ class _Evaluation:
 
     def _together(self, operation: Callable[[Any, Any], Any], left: ast.expr, right: ast.expr) -> Value:
         one = self._numbers(left)
-        with self.budget.holding(np.size(one)):
+        with self.budget.hold_numbers(np.size(one)):
             two = self._numbers(right)
         try:
             self._spend_on((one, two), 1)
@@ -148,12 +148,12 @@ class _Evaluation:
     def _spend_on(self, values: Sequence[Value], times: int) -> None:
         """Of all values together, which are as large as the largest. Raises ValueError where they do not fit."""
         size = math.prod(np.broadcast_shapes(*(np.shape(value) for value in values)))
-        with self.budget.holding(sum(np.size(value) for value in values)):
+        with self.budget.hold_numbers(sum(np.size(value) for value in values)):
             self.budget.spend(size, self.text, times)
 
     def _call(self, name: str, arguments: list[ast.expr]) -> Value:
         if name == "array":
-            return self._quoted(arguments)
+            return self._array_by_name(arguments)
         if name not in FUNCTIONS:
             raise ImportProblemError(
                 f"in '{self.text}' there is no function '{name}'{suggestion(name, FUNCTIONS)}; {ALLOWED}"
@@ -163,7 +163,7 @@ class _Evaluation:
             raise ImportProblemError(f"in '{self.text}' {function.usage} was given {len(arguments)} values")
         values: list[Value] = []
         for argument in arguments:
-            with self.budget.holding(sum(np.size(value) for value in values)):
+            with self.budget.hold_numbers(sum(np.size(value) for value in values)):
                 values.append(self._numbers(argument))
         try:
             if name == "repeat":
@@ -176,7 +176,7 @@ class _Evaluation:
         except (ValueError, IndexError, TypeError, ArithmeticError) as error:
             raise ImportProblemError(f"in '{self.text}' {function.usage} fails: {error}") from error
 
-    def _quoted(self, arguments: list[ast.expr]) -> Value:
+    def _array_by_name(self, arguments: list[ast.expr]) -> Value:
         match arguments:
             case [ast.Constant(value=str() as name)]:
                 return self.lookup(name)
@@ -186,7 +186,7 @@ class _Evaluation:
         whole = self._numbers(inner)
         entries = index.elts if isinstance(index, ast.Tuple) else [index]
         places: list[int | slice] = []
-        with self.budget.holding(np.size(whole)), self.budget.deeper(self.text):
+        with self.budget.hold_numbers(np.size(whole)), self.budget.deeper(self.text):
             for entry in entries:
                 places.append(self._index(entry))
         try:
@@ -209,7 +209,7 @@ class _Evaluation:
             raise ImportProblemError(f"in '{self.text}' an index is not a whole number")
         return int(number)
 
-    def _refused(self, node: ast.expr) -> ImportProblemError:
+    def _refusal(self, node: ast.expr) -> ImportProblemError:
         # As it is written there: to put it together again would need as much room as it is deep.
         part = ast.get_source_segment(self.text.strip(), node) or self.text
         return ImportProblemError(f"in '{self.text}' this is not understood: {part}; {ALLOWED}")

@@ -55,24 +55,24 @@ class Namespace:
         if name in self.arrays:
             return self._numbers(name)
         if name in self.definitions:
-            return self._defined(name, clock)
+            return self._value_of_definition(name, clock)
         if name == "clock_s":
             raise ImportProblemError("clock_s is known in [[computed]] channels only, on the recording's grid")
         names = [*self.arrays, *self.definitions]
         raise ImportProblemError(
-            f"there is no array '{name}' in {self.where}{suggestion(name, names)}; there are {self.listed()}"
+            f"there is no array '{name}' in {self.where}{suggestion(name, names)}; there are {self.list_names()}"
         )
 
     def has(self, name: str) -> bool:
         return name in self.arrays or name in self.definitions
 
-    def listed(self) -> str:
+    def list_names(self) -> str:
         """Names with their shapes, for messages."""
         shown = [f"{name} {_shape(array)}" for name, array in list(self.arrays.items())[:_SHOWN]]
         more = len(self.arrays) - _SHOWN
         return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
-    def _defined(self, name: str, clock: Clock) -> Value:
+    def _value_of_definition(self, name: str, clock: Clock) -> Value:
         if name in self._open:
             raise ImportProblemError(f"the definition of '{name}' needs itself")
         self._open.add(name)
@@ -98,7 +98,7 @@ def of_file(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget:
     short = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
     plain = {unit_in(name)[0]: array for name, array in arrays.by_name.items()}
     if prefix and not short:
-        listed = Namespace(arrays.by_name, {}, arrays.name, budget).listed()
+        listed = Namespace(arrays.by_name, {}, arrays.name, budget).list_names()
         raise ImportProblemError(f"no array of {arrays.name} begins with '{prefix}'; there are {listed}")
     budget.allow_for(sum(array.size for array in arrays.by_name.values()))
     return Namespace({**plain, **arrays.by_name, **short}, definitions, arrays.name, budget)

@@ -26,7 +26,7 @@ class PartFiles:
 
 def part_files(wanted: ImportMap, files: Sequence[Path]) -> tuple[PartFiles, ...]:
     """In the order of the recording. Raises ImportProblemError for a file that is left over or missing."""
-    ordered = _ordered(wanted, files)
+    ordered = _order_files(wanted, files)
     if wanted.separate and len(ordered) > 1:
         names = ", ".join(path.name for path in ordered)
         raise ImportProblemError(f"the map makes one recording of each file; import {names} one by one")
@@ -38,7 +38,7 @@ def part_files(wanted: ImportMap, files: Sequence[Path]) -> tuple[PartFiles, ...
     return parts
 
 
-def _ordered(wanted: ImportMap, files: Sequence[Path]) -> list[Path]:
+def _order_files(wanted: ImportMap, files: Sequence[Path]) -> list[Path]:
     """By the map's patterns, then as given."""
     found = []
     for path in files:

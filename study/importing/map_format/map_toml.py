@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from protocols.document.refusals import key_path, nearest_key, shown
-from protocols.document.schema import Node, Place, allowed, keys_of, node_at, resolved
+from protocols.document.schema import Node, Place, describe_allowed, keys_of, node_at, resolve_reference
 from study.importing.map_format.import_map import ImportMap
 from study.store.disk.file_errors import UnusableFileError
 
@@ -50,38 +50,38 @@ def _problems(errors: Sequence[Any]) -> Iterator[str]:
             continue
         key = key_path(MAP_SCHEMA, place)
         if error["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
-            yield _unknown(key, place)
+            yield _report_unknown_key(key, place)
         elif error["type"] == "missing":
-            yield f"{key} is missing; it is {_allowed(place)}"
+            yield f"{key} is missing; it is {_describe_allowed(place)}"
         else:
-            yield f"{key} is {_given(error['input'])}; it must be {_allowed(place)}"
+            yield f"{key} is {_show_value(error['input'])}; it must be {_describe_allowed(place)}"
 
 
-def _unknown(key: str, place: Place) -> str:
+def _report_unknown_key(key: str, place: Place) -> str:
     table = node_at(MAP_SCHEMA, place[:-1])
     known = keys_of(MAP_SCHEMA, table) if table else ()
     meant = nearest_key(str(place[-1]), known)
     return f"{key} is no key of a map" + (f"; did you mean {meant}" if meant else f"; keys here are {', '.join(known)}")
 
 
-def _given(value: Any) -> str:
+def _show_value(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else shown(value)
 
 
-def _allowed(place: Place) -> str:
+def _describe_allowed(place: Place) -> str:
     node = node_at(MAP_SCHEMA, place)
     if node is None:
-        parent = resolved(MAP_SCHEMA, node_at(MAP_SCHEMA, place[:-1]) or {})
+        parent = resolve_reference(MAP_SCHEMA, node_at(MAP_SCHEMA, place[:-1]) or {})
         return "a number" if parent.get("additionalProperties", {}).get("type") == "number" else "text in quotes"
-    return allowed_in_map(node, str(place[-1]))
+    return describe_allowed_in_map(node, str(place[-1]))
 
 
-def allowed_in_map(node: Node, key: str) -> str:
+def describe_allowed_in_map(node: Node, key: str) -> str:
     """In words, what the value of a key may be."""
-    whole = resolved(MAP_SCHEMA, node)
+    whole = resolve_reference(MAP_SCHEMA, node)
     if whole.get("type") == "object" and "properties" not in whole:
         return "a table"
-    return allowed(MAP_SCHEMA, node, key)
+    return describe_allowed(MAP_SCHEMA, node, key)
 
 
 def _contradictions(found: ImportMap) -> Iterator[str]:

@@ -77,7 +77,7 @@ def unit_in(header: str) -> tuple[str, str]:
     return match["name"].strip(), plain_unit(match["unit"].strip())
 
 
-def named(header: str) -> Named:
+def name_signal(header: str) -> Named:
     name, unit = unit_in(header)
     words = [_QUANTITY[part.lower()] for part in _WORD.findall(name) if part.lower() in _QUANTITY]
     word = words[-1] if words else ""  # the last says it: a load angle is an angle
@@ -125,7 +125,7 @@ def open_roles(columns: Sequence[Named]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def proposed_roles(columns: Sequence[Named]) -> list[SignalRole | Literal[""]]:
+def propose_roles(columns: Sequence[Named]) -> list[SignalRole | Literal[""]]:
     """By names, then by quantity; empty where that leaves it open. A reference is a helper, and so are currents and
     voltages beside a force."""
     return [_said_role(column, columns) or _role(column, columns) for column in columns]

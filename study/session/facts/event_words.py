@@ -1,7 +1,7 @@
 """The log of a session in words: one plain sentence per fact.
 
-Nothing about health is in them, and no direction of a trial that does not count (yet): it may come again, and a reader
-may sit beside the participant. Runs and trials count from 1 here, as on the participant's screen.
+Health answers are left out, and so is the direction of a trial that does not count (yet): it may be repeated, and a
+reader may sit beside the participant. Runs and trials count from 1 here, as on the participant's screen.
 """
 
 from collections.abc import Iterable
@@ -34,7 +34,7 @@ _Key = tuple[int, int, int]
 
 
 def log_in_words(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...]:
-    """One line per event, oldest first: its local time and a sentence; a line wherever date or offset change."""
+    """One line per event, oldest first: local time and a sentence; a line wherever date or UTC offset change."""
     events = tuple(events)
     counted = {_key(event) for event in events if isinstance(event, TrialMeasured)}
     presented = {_key(e): e for e in events if isinstance(e, TrialPresented) and _key(e) in counted}
@@ -46,38 +46,38 @@ def log_in_words(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...
         if day and day != said:
             said = day
             lines.append(day)
-        lines.append(f"{time or date}  {_sentence(event, presented)}")
+        lines.append(f"{time or date}  {_describe(event, presented)}")
     return tuple(lines)
 
 
 def in_words(event: Event) -> str:
-    """One event by itself: what depends on the others (which direction, right or wrong) is left out."""
-    return _sentence(event, {})
+    """One event by itself: direction and correctness, which depend on other events, are left out."""
+    return _describe(event, {})
 
 
-def _sentence(event: Event, presented: dict[_Key, TrialPresented]) -> str:
-    """presented: the trials that count."""
+def _describe(event: Event, presented: dict[_Key, TrialPresented]) -> str:
+    """The sentence for an event. presented: the trials that count."""
     match event:
         case TrialPresented():
-            return _presented(event, told=_key(event) in presented)
+            return _describe_presented(event, told=_key(event) in presented)
         case AnswerGiven():
-            return _answer(event, presented.get(_key(event)))
+            return _describe_answer(event, presented.get(_key(event)))
         case TrialMeasured():
-            return _measured(event)
+            return _describe_measured(event)
         case TrialSpoiled():
             return f"{_place(event)} is void and comes again: {event.reason}."
         case RestTaken():
             return f"Rested {_seconds(event.rested_s)} before trial {event.trial + 1} of run {event.run + 1}."
         case _:
-            return _around(event)
+            return _describe_other(event)
 
 
-def _around(event: Event) -> str:
+def _describe_other(event: Event) -> str:
     match event:
         case SessionOpened() | SessionResumed() | SessionInterrupted() | SessionClosed():
-            return _sitting(event)
+            return _describe_sitting(event)
         case FormFilled():
-            return _form(event)
+            return _describe_form(event)
         case PlaceTaken():
             return f"Takes part, as number {event.participant_number + 1} of this protocol."
         case DeviceChecked():
@@ -98,7 +98,7 @@ def _around(event: Event) -> str:
             return f"{event.event.replace('_', ' ').capitalize()}."
 
 
-def _sitting(event: SessionOpened | SessionResumed | SessionInterrupted | SessionClosed) -> str:
+def _describe_sitting(event: SessionOpened | SessionResumed | SessionInterrupted | SessionClosed) -> str:
     match event:
         case SessionOpened():
             who = f"simulated participant {event.observer}" if event.observer else "a person"
@@ -114,7 +114,7 @@ def _sitting(event: SessionOpened | SessionResumed | SessionInterrupted | Sessio
             return "The session is finished."
 
 
-def _presented(event: TrialPresented, told: bool) -> str:
+def _describe_presented(event: TrialPresented, told: bool) -> str:
     again = f", attempt {event.attempt + 1}" if event.attempt else ""
     what = f"{event.level_n:.3f} N at {event.frequency_hz:g} Hz"
     if told:
@@ -123,14 +123,14 @@ def _presented(event: TrialPresented, told: bool) -> str:
     return f"{_place(event)} ({event.phase.value}{again}): {what}."
 
 
-def _answer(event: AnswerGiven, presented: TrialPresented | None) -> str:
+def _describe_answer(event: AnswerGiven, presented: TrialPresented | None) -> str:
     said = f"Answer {event.answer} after {event.response_time_s:.2f} s"
     if presented is None:
         return f"{said}."
     return f"{said}: {'right' if event.answer == presented.direction else 'wrong'}."
 
 
-def _measured(event: TrialMeasured) -> str:
+def _describe_measured(event: TrialMeasured) -> str:
     if event.status == "unmeasured":
         return " ".join(("Counts, without a measurement.", *map(_whole, event.flags)))
     parts = []
@@ -142,7 +142,7 @@ def _measured(event: TrialMeasured) -> str:
     return " ".join((measured, *map(_whole, event.flags)))
 
 
-def _form(event: FormFilled) -> str:
+def _describe_form(event: FormFilled) -> str:
     version = f", version {event.version}" if event.version else ""
     ethics = f" (ethics approval {event.ethics_id})" if event.ethics_id else ""
     match event.form:

@@ -27,13 +27,13 @@ def utc_time(text: str) -> str:
     return text
 
 
-def _recording(text: str) -> str:
+def _check_recording_path(text: str) -> str:
     if not _RECORDING.fullmatch(text):
         raise ValueError("is no file in the session's folder recordings")
     return text
 
 
-def _file_name(text: str) -> str:
+def _check_file_name(text: str) -> str:
     if not _FILE_NAME.fullmatch(text):
         raise ValueError("is no file name in the session's folder")
     return text
@@ -57,7 +57,7 @@ Measured = Annotated[float, Field(ge=-1e9, le=1e9)]
 Magnitude = Annotated[float, Field(ge=0, le=1e9)]
 Positive = Annotated[float, Field(gt=0, le=1e9)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-RecordingPath = Annotated[str, AfterValidator(_recording)]
+RecordingPath = Annotated[str, AfterValidator(_check_recording_path)]
 """`recordings/<name>.h5`, relative to the session's folder."""
-FileName = Annotated[str, AfterValidator(_file_name)]
+FileName = Annotated[str, AfterValidator(_check_file_name)]
 """Of a file directly in the session's folder."""

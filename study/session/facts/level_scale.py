@@ -35,8 +35,9 @@ class EqualizedFacts:
     """Of the model, by what was measured, in words; empty in logs of earlier versions."""
 
 
-def wanted_mps2(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float | None:
-    """The acceleration that a level stands for; None where levels are commanded forces."""
+def acceleration_of_level(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float | None:
+    """Acceleration (m/s^2) that a level (N) stands for; None where levels are commanded forces. Raises ValueError
+    for a frequency without a scale."""
     if equalized is None:
         return None
     scale = next((scale for scale in equalized.levels if scale.frequency_hz == frequency_hz), None)
@@ -45,7 +46,7 @@ def wanted_mps2(equalized: EqualizedFacts | None, level_n: float, frequency_hz: 
     return level_n / scale.n_per_mps2
 
 
-def amplitude(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float:
-    """In the unit that the equalizer takes: N without one, m/s² with one."""
-    wanted = wanted_mps2(equalized, level_n, frequency_hz)
+def equalizer_amplitude(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float:
+    """Amplitude of a level in the unit that the equalizer takes: N without one, m/s^2 with one."""
+    wanted = acceleration_of_level(equalized, level_n, frequency_hz)
     return level_n if wanted is None else wanted

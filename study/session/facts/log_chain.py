@@ -1,8 +1,8 @@
-"""The chained checksum of a log: each line carries a hash of its own bytes and of all lines before it.
+"""Hash chain of a log: each line carries a checksum of its own bytes and of all lines before it.
 
-A line without one (of an older version) enters the hash too, so that a log that goes on under this version has what
-came before covered by its first checksum. There is no key in it: it shows damage, and edits by those who do not
-compute it again; it does not prove who wrote a log.
+A line without checksum (of an older version) enters the hash too, so that when such a log is continued, its first
+checksum covers what came before. There is no key: the chain detects damage, and edits without recomputing it; it does
+not prove who wrote a log.
 """
 
 import hashlib
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 DIGITS = 32
 """Of SHA-256, in hexadecimal: 128 bits."""
 SEED = "0" * DIGITS
-"""Stands before the first line."""
+"""Checksum before the first line."""
 
 _FIELD, _END = b',"chain":"', b'"}'
 _LENGTH = len(_FIELD) + DIGITS + len(_END)
@@ -20,12 +20,12 @@ _HEXADECIMAL = frozenset(b"0123456789abcdef")
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """How far a log has been read or written."""
+    """State of the chain after the lines read or written so far."""
 
     head: str = SEED
     lines: int = 0
     since: int = 0
-    """Number of the first line that carries a checksum, from 1; 0 while none does."""
+    """Number of the first line with a checksum, from 1; 0 if there is none."""
 
     def in_words(self) -> str:
         if not self.since:
@@ -44,7 +44,7 @@ def write_chained(chain: Chain, event: bytes) -> tuple[Chain, bytes]:
 
 
 def read_chained(chain: Chain, line: bytes) -> tuple[Chain, bytes]:
-    """line: without its end. Returns the event's own bytes. Raises ChainBrokenError."""
+    """Check a line without its end. Returns the chain and the event's own bytes. Raises ChainBrokenError."""
     event, head = _split(line)
     after = _after(chain, event, carried=head is not None)
     if head is None and chain.since:
@@ -61,7 +61,7 @@ def _after(chain: Chain, event: bytes, carried: bool) -> Chain:
 
 
 def _split(line: bytes) -> tuple[bytes, str | None]:
-    """On the raw bytes: nothing is parsed and written again."""
+    """Event bytes and checksum; on the raw bytes, so that nothing is parsed and written again."""
     digits = line[-len(_END) - DIGITS : -len(_END)]
     ends_so = line[-_LENGTH:].startswith(_FIELD) and line.endswith(_END)
     if not ends_so or len(line) <= _LENGTH or not _HEXADECIMAL.issuperset(digits):

@@ -1,19 +1,17 @@
-"""Time as the log of a session tells it: by the monotonic clock within a sitting, by the wall clock between sittings.
+"""Elapsed time from a log: by the monotonic clock within a sitting, by the wall clock between sittings.
 
-The wall clock of a computer can be set at any moment, forward and back; the monotonic clock cannot. Every entry of a
-sitting carries both, so that no limit of a person's exposure depends on the wall clock within a sitting. Between two
-sittings only the wall clock is left: a clock set forward there cannot be told from time that passed. A clock set back
-can, and counts as no time at all.
+The wall clock can be set forward and back at any moment; the monotonic clock cannot. Every entry carries both, so that
+no exposure limit depends on the wall clock within a sitting. Between sittings only the wall clock is available: setting
+it forward there looks like elapsed time; setting it back is detected and counts as no time.
 
-The monotonic clock stands still while the computer sleeps: a sleep within a sitting looks like a clock set forward.
+The monotonic clock stops while the computer sleeps: sleep within a sitting looks like a clock set forward.
 """
 
 from dataclasses import dataclass
 from datetime import datetime
 
 STEP_S = 5.0
-"""From so large a disagreement of the two clocks on, the wall clock was set. Corrections by NTP while it runs are
-spread over hours, far below this."""
+"""Disagreement of the two clocks (s) above which the wall clock was set. NTP corrections are far smaller."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,23 +47,25 @@ class ClockStep:
         return f"The computer's clock was set back by {step}. {limits}"
 
 
-def passed_s(before: Moment, now: Moment) -> float:
-    """Never negative. By the monotonic clock where both carry it, else by the wall clock."""
+def elapsed_s(before: Moment, now: Moment) -> float:
+    """Time between two moments (s), never negative. By the monotonic clock where both carry it, otherwise by the
+    wall clock."""
     if before.monotonic_s is not None and now.monotonic_s is not None:
         return max(0.0, now.monotonic_s - before.monotonic_s)
     return max(0.0, _wall_s(before, now))
 
 
 def clock_step(before: Moment, now: Moment, between_sittings: bool = False) -> ClockStep | None:
-    """What the wall clock was set by; without monotonic times only a step back can be known."""
+    """By how much the wall clock was set between two entries, or None; without monotonic times only a step back can
+    be detected."""
     wall_s = _wall_s(before, now)
     monotonic = before.monotonic_s is not None and now.monotonic_s is not None
-    by_s = wall_s - passed_s(before, now) if monotonic else min(0.0, wall_s)
+    by_s = wall_s - elapsed_s(before, now) if monotonic else min(0.0, wall_s)
     return ClockStep(now.utc, by_s, between_sittings) if abs(by_s) >= STEP_S else None
 
 
 def minutes_between(first_utc: str, second_utc: str) -> float:
-    """By the wall clock: negative where it was set back. Both ISO 8601; 0 where the first is empty."""
+    """Minutes by the wall clock: negative if it was set back. Both ISO 8601; 0 if the first is empty."""
     if not first_utc:
         return 0.0
     return (datetime.fromisoformat(second_utc) - datetime.fromisoformat(first_utc)).total_seconds() / 60.0

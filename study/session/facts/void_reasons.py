@@ -1,35 +1,33 @@
-"""Why a trial was void, where the computer and not the participant was the cause: the reasons as they are logged, and
-what the participant and the experimenter read of them."""
+"""Reasons for void trials that the computer caused: as logged, and as participant and experimenter read them."""
 
 SCREEN_SILENT = "the screen gave no sign of life"
-"""It may have been suspended, hung, or waited for a processor; nothing told which."""
+"""The screen process may have been suspended, hung, or waiting for a processor; the cause is unknown."""
 SCREEN_LATE = f"{SCREEN_SILENT}: the computer was too busy"
 PROGRAM_STALLED = "the program gave no sign of life, so the force was faded out"
 TICKS_MISSED = "of the 1 kHz ticks were missed"
 
 LOAD_PER_PROCESSOR = 0.75
-"""Average number of processes that ran or waited for a processor in the last minute, for each processor. Above, what
-becomes due often finds all of them taken."""
+"""Load average per processor above which tasks often have to wait for a processor."""
 
 ENGINE_LATE_S = 0.1
-"""A program that wakes up so late has waited for a processor: it takes more than twice the time between two glances."""
+"""A delay of the engine's own wake-up (s) that shows a busy computer: more than twice the polling interval."""
 
 _NOT_YOU = "This was not your fault, and the trial is repeated."
 
 
 def why_screen_silent(engine_late_s: float, load_per_processor: float | None) -> str:
-    """engine_late_s: how late this program itself woke up meanwhile. load_per_processor: None where it is not known."""
+    """The reason to log. engine_late_s: how late the engine itself woke up; load_per_processor: None if unknown."""
     loaded = load_per_processor is not None and load_per_processor > LOAD_PER_PROCESSOR
     return SCREEN_LATE if loaded or engine_late_s >= ENGINE_LATE_S else SCREEN_SILENT
 
 
 def computer_too_busy(reason: str) -> bool:
-    """Whether a trial with this reason was void because the computer was too busy. False also where it is not known."""
+    """Whether this reason says that the computer was too busy; False also if unknown."""
     return reason in (SCREEN_LATE, PROGRAM_STALLED) or reason.endswith(TICKS_MISSED)
 
 
 def void_for_participant(reason: str) -> str:
-    """What the participant reads of a trial that was cut short without being asked for."""
+    """Text for the participant after a trial was cut short."""
     if computer_too_busy(reason):
         return f"The computer was too busy for a moment, so the trial could not be played as it should. {_NOT_YOU}"
     if reason == SCREEN_SILENT:
@@ -44,7 +42,7 @@ TOO_BUSY = "the computer is too busy"
 
 
 def why_too_many(reasons: tuple[str, ...]) -> str:
-    """Of void trials in a row, after which a sitting ends."""
+    """Why a sitting ends after several void trials in a row."""
     many = f"{len(reasons)} trials in a row were void"
     if all(map(computer_too_busy, reasons)):
         return f"{TOO_BUSY}: {many} because of it, not because of the participant (the last because {reasons[-1]})"
@@ -54,7 +52,7 @@ def why_too_many(reasons: tuple[str, ...]) -> str:
 
 
 def busy_sentence(voids: int) -> str:
-    """For the experimenter, at the end of a sitting."""
+    """Summary for the experimenter at the end of a sitting."""
     trials = "1 trial was" if voids == 1 else f"{voids} trials were"
     return (
         f"The computer was too busy: {trials} void because of it in this sitting and repeated. Close other programs; "

@@ -1,4 +1,4 @@
-"""What a hand got today in other sessions of the same participant: the daily dose does not begin again with each."""
+"""Vibration dose of the same hand in other sessions of the day: the daily dose does not restart with each session."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,11 +12,11 @@ from study.session.state.vibration_dose import NO_DOSE, Dose, total
 def dose_elsewhere(
     sessions: Mapping[str, SittingState], own: str, utc: str, unread: tuple[str, ...] = ()
 ) -> DoseElsewhere | None:
-    """sessions: all of the participant, by name; own: which of them is to go on at `utc`; unread: those that cannot be
-    read. None where there is nothing.
+    """Dose from other sessions since the last night's rest. sessions: all of the participant, by name; own: the one
+    that continues at `utc`; unread: unreadable ones. None where there is nothing.
 
-    From now back to the last rest of a night's length between any two of them. Between sessions only the wall clock is
-    known: a clock set back counts as no time, as between the sittings of one session.
+    Searched back to the last rest of a night's length between any two sessions. Between sessions only the wall clock is
+    known; a clock set back counts as no time.
     """
     until_now = {name: pass_time(sitting, Moment(utc), resumed=True) for name, sitting in sessions.items()}
     moved = {name: sitting for name, sitting in until_now.items() if sitting.still_s is not None}
@@ -37,7 +37,7 @@ def dose_elsewhere(
 
 
 def with_dose_elsewhere(sitting: SittingState, found: DoseElsewhere | None) -> SittingState:
-    """At the beginning of a sitting. What was found then replaces what was known before."""
+    """The state with this dose, at the beginning of a sitting; it replaces an earlier value."""
     if found is None:
         return replace(sitting, elsewhere=NO_DOSE, not_counted=())
     known = replace(sitting, not_counted=found.unread, elsewhere=NO_DOSE)

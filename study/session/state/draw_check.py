@@ -1,4 +1,4 @@
-"""A logged presentation against the one that rules, seed and place give. Nothing is trusted."""
+"""Check a logged presentation against the one that follows from rules, seed and position."""
 
 import math
 
@@ -7,10 +7,11 @@ from study.session.state.due_trial import Present
 
 
 class LogContradiction(ValueError):  # noqa: N818 - a contradiction is what it is
-    """An event cannot follow what came before it, or a logged level is not what the rules give."""
+    """An event cannot follow the previous ones, or a logged level is not what the rules give."""
 
 
 def check_draw(event: TrialPresented, expected: Present) -> None:
+    """Raise LogContradiction unless the logged presentation is the expected one."""
     place = (expected.run, expected.trial, expected.attempt)
     if (event.run, event.trial, event.attempt) != place:
         raise LogContradiction(
@@ -34,11 +35,12 @@ def check_draw(event: TrialPresented, expected: Present) -> None:
 
 
 def _same(logged: str | float | None, due: str | float | None) -> bool:
-    """Powers may differ in the last bit between machines; rules differ by far more."""
+    """Equal up to the last bits of floating-point powers, which may differ between machines."""
     if isinstance(logged, float) and isinstance(due, float):
         return math.isclose(logged, due, rel_tol=1e-9, abs_tol=1e-9)
     return logged == due
 
 
 def place_of(event: TrialPresented | AnswerGiven | TrialMeasured | TrialSpoiled) -> str:
+    """Run, trial and attempt in words, for messages."""
     return f"run {event.run}, trial {event.trial}, attempt {event.attempt}"

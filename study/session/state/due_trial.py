@@ -1,4 +1,4 @@
-"""The trial that is due: everything about a presentation that follows from rules, seed and place in the session."""
+"""The next trial: everything about a presentation that follows from rules, seed and position in the session."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ from protocols.procedure.schedule import (
 from protocols.procedure.staircase import StaircaseState, level_n, to_db
 from protocols.trial import Phase
 from study.session.facts.events import SessionOpened
-from study.session.facts.level_scale import wanted_mps2
+from study.session.facts.level_scale import acceleration_of_level
 from study.session.state.rules import same_stimulus_again
 from study.session.stimulus.stimulus import direction_angle_deg
 
@@ -33,9 +33,9 @@ class Present:
     level_db: float
     level_n: float
     label: int
-    """The number that is the right answer: of a direction, in a detection run of an interval."""
+    """Number of the right answer: of a direction or, in a detection run, of an interval."""
     direction: int
-    """The protocol's direction to play; another number than the label where labels are swapped."""
+    """The protocol's direction to play; differs from the label where labels are swapped."""
     angle_deg: float
     polarity: int
     wanted_mps2: float | None = None
@@ -44,7 +44,7 @@ class Present:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where in a session a trial stands."""
+    """Position of a trial in a session."""
 
     run: Run
     trial: int
@@ -53,6 +53,7 @@ class Place:
 
 
 def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRule, place: Place) -> Present:
+    """The presentation at this place."""
     run, polarity = place.run, protocol.stimulus.onset_polarity
     draws = 0 if same_stimulus_again(opened) else place.attempt
     draw = draw_trial(protocol.schedule, polarity, opened.seed, run.index, place.trial, draws)
@@ -79,10 +80,10 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
         direction=direction,
         angle_deg=direction_angle_deg(protocol.directions, direction),
         polarity=draw.polarity,
-        wanted_mps2=wanted_mps2(opened.equalized, newton, run.frequency_hz),
+        wanted_mps2=acceleration_of_level(opened.equalized, newton, run.frequency_hz),
     )
 
 
 def labels_are_swapped(protocol: StudyProtocol, opened: SessionOpened) -> bool:
-    """Whether the numbers 1 and 2 change places for this participant."""
+    """Whether the numbers 1 and 2 are exchanged for this participant."""
     return labels_swapped(protocol.schedule, len(protocol.stimulus.frequencies_hz), opened.participant_number)

@@ -1,11 +1,11 @@
-"""A session as a fold of its events: `begin_session` the first, `apply` each of the others."""
+"""A session as the fold of its events: `begin_session` takes the first, `apply` each of the others."""
 
 import math
 from dataclasses import replace
 
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.procedure.practice import PracticeState, practice_over, practised
-from protocols.procedure.staircase import begin, finished, step
+from protocols.procedure.practice import PracticeState, add_answer, practice_over
+from protocols.procedure.staircase import begin, is_finished, step
 from protocols.trial import Phase, Trial, TrialStatus, VoidCause
 from study.session.facts.events import (
     AnswerGiven,
@@ -32,20 +32,20 @@ from study.session.state.draw_check import LogContradiction, check_draw, place_o
 from study.session.state.rules import place_comes_later
 from study.session.state.sitting_state import (
     SittingState,
+    add_exposure,
     check,
-    demonstrated,
-    exposed,
     fill_in,
+    finish_demo,
     likely_amplitude_mps2,
-    moved,
     pass_time,
     sit_down_again,
+    start_motion,
 )
-from study.session.state.state import SessionState, begin_session, current_rule, due, felt, placed, repeats_left
+from study.session.state.state import SessionState, begin_session, current_rule, due, felt, repeats_left, take_place
 
 
 def trial_row(opened: SessionOpened, event: TrialPresented, felt: bool | None, repeat_cause: VoidCause | None) -> Trial:
-    """A presentation as the first half of its row in `trials.csv`; answer and measurement come later."""
+    """Presentation part of a row of `trials.csv`; answer and measurement follow later."""
     return Trial(
         subject=opened.subject,
         session=opened.session,
@@ -81,7 +81,7 @@ def apply(state: SessionState, event: Event) -> SessionState:
         raise LogContradiction(f"{event.event} after the session was closed")
     if state.turned_away_for_good and not isinstance(event, NoteTaken | SessionInterrupted | SessionClosed):
         raise LogContradiction(f"{event.event} of a person who does not take part")
-    state = replace(state, sitting=_up_to(state.sitting, event))
+    state = replace(state, sitting=_advance_time(state.sitting, event))
     match event:
         case TrialPresented():
             return _present(state, event)
@@ -95,7 +95,8 @@ def apply(state: SessionState, event: Event) -> SessionState:
             return _apply_between_trials(state, event)
 
 
-def _up_to(sitting: SittingState, event: Event) -> SittingState:
+def _advance_time(sitting: SittingState, event: Event) -> SittingState:
+    """The sitting advanced to the time of the event."""
     return pass_time(sitting, Moment(event.utc, event.monotonic_s), resumed=isinstance(event, SessionResumed))
 
 
@@ -104,7 +105,7 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
         case RestTaken():
             return _rest(state, event)
         case FormFilled() | DeviceChecked() | DemoPlayed() | DemoFinished():
-            return _around(state, event)
+            return _apply_preparation(state, event)
         case SessionResumed():
             again = sit_down_again(state.sitting, state.answers)
             return replace(state, sitting=with_dose_elsewhere(again, event.dose_elsewhere))
@@ -126,7 +127,7 @@ def _present(state: SessionState, event: TrialPresented) -> SessionState:
     check_draw(event, due(state))
     repeat_cause = state.trials[-1].void_cause if state.attempt else None
     row = trial_row(state.opened, event, felt(state.opened), repeat_cause)
-    return replace(state, presented=event, trials=(*state.trials, row), sitting=moved(state.sitting))
+    return replace(state, presented=event, trials=(*state.trials, row), sitting=start_motion(state.sitting))
 
 
 def _answer(state: SessionState, event: AnswerGiven) -> SessionState:
@@ -152,7 +153,7 @@ def _rest(state: SessionState, event: RestTaken) -> SessionState:
 def _take_place(state: SessionState, event: PlaceTaken) -> SessionState:
     if state.trials or state.sitting.placed or not place_comes_later(state.opened):
         raise LogContradiction("a place in the order was taken where none was due")
-    return placed(state, event.participant_number)
+    return take_place(state, event.participant_number)
 
 
 def _close(state: SessionState, event: SessionClosed) -> SessionState:
@@ -185,7 +186,7 @@ def _measure(state: SessionState, event: TrialMeasured) -> SessionState:
     if event.delivered_mps2 is not None:
         amplitude_mps2 = math.hypot(event.delivered_mps2, event.off_axis_mps2 or 0.0)
     after = replace(
-        _shaken(stepped, presented, amplitude_mps2, event.vibrated_s),
+        _add_vibration(stepped, presented, amplitude_mps2, event.vibrated_s),
         presented=None,
         answered=None,
         trial=state.trial + 1,
@@ -197,9 +198,9 @@ def _measure(state: SessionState, event: TrialMeasured) -> SessionState:
 
 
 def _step(state: SessionState, presented: TrialPresented, correct: bool) -> SessionState:
-    """What an answer moves: the staircase, a practice run's tally, or, in a catch trial, nothing."""
+    """Effect of an answer: on the staircase, on a practice run's count, or none in a catch trial."""
     if state.runs[state.run].practice:
-        return replace(state, practice=practised(state.practice, correct))
+        return replace(state, practice=add_answer(state.practice, correct))
     if presented.phase is Phase.CATCH:
         return state
     return replace(state, staircase=step(current_rule(state), state.staircase, correct))
@@ -208,7 +209,7 @@ def _step(state: SessionState, presented: TrialPresented, correct: bool) -> Sess
 def _run_over(state: SessionState) -> bool:
     if state.runs[state.run].practice:
         return practice_over(state.protocol.practice, state.practice)
-    return finished(current_rule(state), state.staircase)
+    return is_finished(current_rule(state), state.staircase)
 
 
 def _next_run(state: SessionState) -> SessionState:
@@ -219,7 +220,10 @@ def _next_run(state: SessionState) -> SessionState:
     return after if last else replace(after, staircase=begin(current_rule(after)))
 
 
-def _around(state: SessionState, event: FormFilled | DeviceChecked | DemoPlayed | DemoFinished) -> SessionState:
+def _apply_preparation(
+    state: SessionState, event: FormFilled | DeviceChecked | DemoPlayed | DemoFinished
+) -> SessionState:
+    """Apply a form, device check or demonstration."""
     if state.presented is not None:
         raise LogContradiction(f"{event.event} while a trial is open")
     match event:
@@ -228,20 +232,20 @@ def _around(state: SessionState, event: FormFilled | DeviceChecked | DemoPlayed 
         case DeviceChecked():
             return replace(state, sitting=check(state.sitting, event))
         case DemoFinished():
-            return replace(state, sitting=demonstrated(state.sitting, event))
+            return replace(state, sitting=finish_demo(state.sitting, event))
         case DemoPlayed():
             amplitude = likely_amplitude_mps2(state.trials, event.frequency_hz, event.level_n)
-            sitting = exposed(moved(state.sitting), event.frequency_hz, amplitude, event.seconds)
+            sitting = add_exposure(start_motion(state.sitting), event.frequency_hz, amplitude, event.seconds)
             return replace(state, sitting=replace(sitting, demos=sitting.demos + 1))
 
 
-def _shaken(
+def _add_vibration(
     state: SessionState, presented: TrialPresented, amplitude_mps2: float | None, seconds: float | None
 ) -> SessionState:
-    """Whatever shook the hand counts for its dose, whether the trial counts or not."""
+    """Add the vibration of a presentation to the dose, whether or not the trial counts."""
     if amplitude_mps2 is None:
         amplitude_mps2 = likely_amplitude_mps2(state.trials, presented.frequency_hz, presented.level_n)
-    sitting = exposed(state.sitting, presented.frequency_hz, amplitude_mps2, seconds)
+    sitting = add_exposure(state.sitting, presented.frequency_hz, amplitude_mps2, seconds)
     return replace(state, sitting=sitting)
 
 
@@ -260,7 +264,7 @@ def _spoil(state: SessionState, event: TrialSpoiled) -> SessionState:
     busy_voids = state.sitting.busy_voids + computer_too_busy(event.reason)
     counted = replace(state, sitting=replace(state.sitting, busy_voids=busy_voids))
     return replace(
-        _shaken(counted, presented, None, event.vibrated_s),
+        _add_vibration(counted, presented, None, event.vibrated_s),
         presented=None,
         answered=None,
         attempt=state.attempt + 1,

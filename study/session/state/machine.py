@@ -1,4 +1,4 @@
-"""What to do next in a session. Decides nothing by itself: it reads the state that the events made."""
+"""State machine of a session: the next action from the folded state."""
 
 from dataclasses import dataclass
 
@@ -34,14 +34,14 @@ class Rest:
 
 @dataclass(frozen=True, slots=True)
 class Leave:
-    """The sitting must end here; the session can go on another time."""
+    """The sitting must end here; the session can be resumed."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """Nothing is left to do."""
+    """All is done."""
 
 
 Preparation = FillIn | CheckDevice | Leave
@@ -49,7 +49,7 @@ Action = Demonstrate | Present | Rest | FillIn | Leave | Finish
 
 
 def next_preparation(state: SessionState) -> Preparation | None:
-    """What comes before the instructions, in each sitting; None when all is done. Simulated participants need none."""
+    """Next step before the instructions, in each sitting; None when all are done. Simulated participants need none."""
     sitting = state.sitting
     if state.opened.observer is not None or state.finished:
         return None
@@ -68,9 +68,9 @@ def next_preparation(state: SessionState) -> Preparation | None:
 
 
 def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = None) -> Action:
-    """Raises ValueError while a trial is open: it must be answered, measured or spoiled first.
+    """The next action. Raises ValueError while a trial is open: it must be answered, measured or spoiled first.
 
-    utc, monotonic_s: the time now, against the limits of a sitting; utc is empty where the limits are not to end it.
+    utc, monotonic_s: time now, for the limits of a sitting; utc is empty where these are not to be applied.
     """
     if state.presented is not None:
         raise ValueError("a trial is open; it must be closed before the next action")
@@ -88,7 +88,7 @@ def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = 
 
 
 def limit_reached(state: SessionState, utc: str, monotonic_s: float | None = None) -> str:
-    """Why this sitting must end; empty where it may go on."""
+    """Why this sitting must end; empty if it may continue."""
     limits = state.protocol.limits
     sitting = pass_time(state.sitting, Moment(utc, monotonic_s))
     if (sitting.sat_s or 0.0) / 60.0 >= limits.longest_min:

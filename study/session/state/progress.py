@@ -1,4 +1,4 @@
-"""How far a session is, told without a hint at levels: from runs done and trials counted."""
+"""Progress of a session from completed runs and counted trials, without revealing levels."""
 
 import math
 from statistics import median
@@ -9,18 +9,18 @@ from study.session.state.state import SessionState
 from study.session.views.views import Progress
 
 USUAL_TRIALS = 65
-"""Of a staircase with 13 reversals; an able participant needs some 60, a guesser 110."""
+"""Trials of a staircase with 13 reversals; 60 with few errors, 110 for guessing."""
 USUAL_PER_REVERSAL = USUAL_TRIALS / 13
 
 
 LATEST = 30
-"""Answers whose pace counts."""
+"""Number of latest answers that give the pace."""
 FIRST = 8
-"""Answers before which nothing is said of time: the first ones are slow, and a long time left frightens."""
+"""No time is estimated before this many answers: the first ones are slow."""
 
 
 def progress(state: SessionState) -> Progress:
-    """The time left goes by the latest answers' own pace, rests that are still to come added."""
+    """Share done, and minutes left at the pace of the latest answers, pending rests included."""
     expected = [_usual_trials(state, run) for run in state.runs]
     done = sum(expected[: state.run])
     if not state.finished:
@@ -40,7 +40,7 @@ def _usual_trials(state: SessionState, run: Run) -> float:
 
 
 def _minutes_left(state: SessionState, trials_left: float) -> int | None:
-    """By how long answers took, not by the clock: forms, instructions and pauses say nothing of what is left."""
+    """From the duration of answers, not from the clock: forms, instructions and pauses do not predict the rest."""
     answered = state.answers - state.sitting.answers_before
     taken_s = [trial.response_time_s for trial in state.trials if trial.counts and trial.response_time_s is not None]
     if answered < FIRST or not taken_s:

@@ -28,13 +28,16 @@ LATEST: Literal[2] = 2
 
 
 def same_stimulus_again(opened: SessionOpened) -> bool:
+    """Whether a void trial is repeated with the same stimulus."""
     return opened.rules >= 2
 
 
 def refusal_is_final(opened: SessionOpened) -> bool:
+    """Whether refusal or exclusion closes the session."""
     return opened.rules >= 2
 
 
 def place_comes_later(opened: SessionOpened) -> bool:
-    """Whether the participant number is taken after the preparation. Simulated participants refuse nothing."""
+    """Whether the participant number is assigned after the preparation. Never for simulated participants, who refuse
+    nothing."""
     return opened.rules >= 2 and opened.observer is None

@@ -1,4 +1,4 @@
-"""What holds around the trials: forms, checks, the demonstration, and what the hand got today. A part of the fold."""
+"""State around the trials: forms, checks, demonstration, and today's vibration dose. Part of the fold."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from protocols.trial import Trial
-from study.session.facts.log_time import ClockStep, Moment, clock_step, passed_s
+from study.session.facts.log_time import ClockStep, Moment, clock_step, elapsed_s
 from study.session.facts.sitting_events import DemoFinished, DeviceChecked, FormFilled
 from study.session.state.vibration_dose import NO_DOSE, Dose, add, total
 
 
 @dataclass(frozen=True, slots=True)
 class Night:
-    """A rest after which the dose began again."""
+    """A rest after which the dose started again."""
 
     still_s: float
-    """How long the handle had not moved, as far as the clock said."""
+    """How long the handle had not moved, by the clock."""
     dose: Dose
-    """What was set to zero by it."""
+    """The dose that it reset."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class SittingState:
     consented: bool = False
     included: bool = False
     turned_away: Literal["", "refused", "excluded"] = ""
-    """Why nothing may be played: see TURNED_AWAY. Empty where nothing speaks against it."""
+    """Why nothing may be played: see TURNED_AWAY; empty if allowed."""
     placed: bool = False
     """The place in the balanced order is taken."""
     setup_done: bool = False
@@ -38,7 +38,7 @@ class SittingState:
     """Demonstrations played in the session."""
     debriefed: bool = False
     last: Moment = Moment("")  # noqa: RUF009 - frozen
-    """Time of the last entry in the log, up to which everything here counts."""
+    """Time of the last log entry, up to which everything here counts."""
     sat_s: float | None = None
     """Since the handle first moved in this sitting; None before."""
     busy_voids: int = 0
@@ -50,7 +50,7 @@ class SittingState:
     dose: Dose = NO_DOSE
     """Since the last long rest: see NIGHT_H."""
     elsewhere: Dose = NO_DOSE
-    """In other sessions of the participant since then, as known when this sitting began."""
+    """In other sessions of the participant since then, as known at the beginning of this sitting."""
     not_counted: tuple[str, ...] = ()
     """Sessions of the participant that could not be read then."""
     night: Night | None = None
@@ -60,13 +60,14 @@ class SittingState:
 
 
 NIGHT_H = 10.0
-"""After so long without a movement a new day begins for the hand. A date would do worse: midnight, in whatever time
-zone, may fall into a sitting. Within a sitting the monotonic clock counts, between two of them the wall clock does: a
-clock that is set forward by so much between them passes for a night, unless it is set back later."""
+"""A rest of this length (h) without movement starts a new day for the hand. A calendar date would be worse: midnight
+may fall into a sitting. Within a sitting the monotonic clock counts, between sittings the wall clock: setting it
+forward by this much there passes for a night, unless it is set back later."""
 NIGHT_S = 3600 * NIGHT_H
 
 
 def fill_in(sitting: SittingState, event: FormFilled) -> SittingState:
+    """The state after a form."""
     match event.form:
         case "consent":
             return replace(sitting, consented=event.passed, turned_away="" if event.passed else "refused")
@@ -79,16 +80,18 @@ def fill_in(sitting: SittingState, event: FormFilled) -> SittingState:
 
 
 def check(sitting: SittingState, event: DeviceChecked) -> SittingState:
+    """The state after a device check."""
     return replace(sitting, device_checked=event.passed)
 
 
-def demonstrated(sitting: SittingState, event: DemoFinished) -> SittingState:
+def finish_demo(sitting: SittingState, event: DemoFinished) -> SittingState:
+    """The state after the demonstration."""
     return replace(sitting, demo_done=True)
 
 
 def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
-    """A new sitting of the same session. Under the first rules, which ask once, a person who was turned away is asked
-    again, in case it was a slip of the finger."""
+    """The state at the beginning of another sitting. Under the first rules, which ask once, a person who was turned
+    away is asked again, in case of a mistyped answer."""
     return replace(
         sitting,
         setup_done=False,
@@ -101,24 +104,25 @@ def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
 
 
 def pass_time(sitting: SittingState, now: Moment, resumed: bool = False) -> SittingState:
-    """Up to this moment. resumed: a new sitting begins with it, so that its monotonic clock says nothing of before."""
+    """Advance to this moment. resumed: it begins a new sitting, so that its monotonic clock is not comparable with
+    earlier ones."""
     last = Moment(sitting.last.utc) if resumed else sitting.last
-    passed, step = passed_s(last, now), clock_step(last, now, between_sittings=resumed)
+    passed, step = elapsed_s(last, now), clock_step(last, now, between_sittings=resumed)
     later = replace(
         sitting,
         last=now,
         sat_s=None if sitting.sat_s is None else sitting.sat_s + passed,
         still_s=None if sitting.still_s is None else sitting.still_s + passed,
     )
-    return later if step is None else _stepped(later, step)
+    return later if step is None else _apply_clock_step(later, step)
 
 
-def _stepped(sitting: SittingState, step: ClockStep) -> SittingState:
-    """A clock set back may take back a step forward that passed for rest, because it happened between two sittings: the
-    rest may then be shorter by as much. A night that was none gives its dose back."""
+def _apply_clock_step(sitting: SittingState, step: ClockStep) -> SittingState:
+    """A clock set back may reveal that a rest between two sittings was shorter than it seemed, because the clock had
+    been set forward: the rest is shortened, and a dose that it reset is restored."""
     steps = (*sitting.clock_steps, step)
     known = replace(sitting, clock_steps=steps)
-    # Steps forward that are known never passed for rest: setting the clock back by as much says nothing of it.
+    # Known steps forward were never counted as rest: setting the clock back by as much changes nothing.
     doubt_s = max(0.0, -_sum_s(steps)) - max(0.0, -_sum_s(sitting.clock_steps))
     if doubt_s <= 0:
         return known
@@ -136,30 +140,31 @@ def _sum_s(steps: tuple[ClockStep, ...]) -> float:
     return sum(step.by_s for step in steps)
 
 
-def moved(sitting: SittingState) -> SittingState:
-    """The handle moves now."""
+def start_motion(sitting: SittingState) -> SittingState:
+    """The handle moves now: after a night's rest the dose starts again."""
     if sitting.still_s is not None and sitting.still_s >= NIGHT_S:
         sitting = replace(sitting, night=Night(sitting.still_s, sitting.dose), dose=NO_DOSE, elsewhere=NO_DOSE)
     return replace(sitting, sat_s=sitting.sat_s or 0.0, still_s=0.0)
 
 
 def dose_now(sitting: SittingState) -> Dose:
-    """What counts today: nothing after a night's rest."""
+    """Dose of today: none after a night's rest."""
     rested = sitting.still_s is not None and sitting.still_s >= NIGHT_S
     return NO_DOSE if rested else total(sitting.dose, sitting.elsewhere)
 
 
-def exposed(
+def add_exposure(
     sitting: SittingState, frequency_hz: float, amplitude_mps2: float | None, seconds: float | None
 ) -> SittingState:
-    """seconds: None where they were not counted (an older log); that adds nothing."""
+    """Add vibration to the dose. seconds: None where an older log did not count them; nothing is then added."""
     if not seconds:
         return sitting
     return replace(sitting, dose=add(sitting.dose, frequency_hz, amplitude_mps2, seconds))
 
 
 def likely_amplitude_mps2(trials: tuple[Trial, ...], frequency_hz: float, level_n: float) -> float | None:
-    """What a stimulus without a measurement gave the hand: at the largest ratio measured so far at this frequency."""
+    """Estimated acceleration (m/s^2) of a stimulus without a measurement: level times the largest ratio measured at
+    this frequency."""
     ratios = [
         trial.delivered_mps2 / trial.level_n
         for trial in trials

@@ -1,4 +1,4 @@
-"""What a session is at one moment: everything decided so far. `study.session.state.fold` makes it from events."""
+"""State of a session at one moment, folded from events by `study.session.state.fold`."""
 
 from dataclasses import dataclass, field, replace
 
@@ -26,7 +26,7 @@ class SessionState:
     protocol: StudyProtocol
     runs: tuple[Run, ...]
     run: int
-    """Index of the present run; len(runs) when all are finished."""
+    """Index of the current run; len(runs) when all are finished."""
     staircase: StaircaseState
     trial: int
     attempt: int
@@ -38,7 +38,7 @@ class SessionState:
     rest_due_s: float
     closed: bool
     practice: PracticeState = field(default_factory=PracticeState)
-    """Of the present run, where it is a practice run; the staircase then stands still."""
+    """Of the current run, if it is a practice run; its staircase is then unused."""
     sitting: SittingState = field(default_factory=SittingState)
 
     @property
@@ -82,7 +82,7 @@ def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionStat
 
 
 def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
-    """Every frequency that is due later has its scale of levels."""
+    """Raise LogContradiction unless every frequency has its scale of levels."""
     if opened.equalized is None:
         return
     known = {scale.frequency_hz for scale in opened.equalized.levels}
@@ -91,8 +91,9 @@ def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
         raise LogContradiction(f"the session has no scale of levels for {', '.join(missing)}")
 
 
-def placed(state: SessionState, participant_number: int) -> SessionState:
-    """Before the first trial: from here on this number, not that of the opening line, gives the order of the runs."""
+def take_place(state: SessionState, participant_number: int) -> SessionState:
+    """Assign the place in the balanced order before the first trial: this number, not that of the opening line, now
+    gives the order of the runs."""
     opened = replace(state.opened, participant_number=participant_number)
     order = runs(state.protocol, opened.seed, participant_number)
     after = replace(state, opened=opened, runs=order, sitting=replace(state.sitting, placed=True))
@@ -100,18 +101,18 @@ def placed(state: SessionState, participant_number: int) -> SessionState:
 
 
 def current_rule(state: SessionState) -> StaircaseRule:
-    """Of the present run; a practice run, at its fixed level, uses nothing of it."""
+    """Staircase rule of the current run; unused in a practice run."""
     return staircase_rule(state.protocol, state.runs[state.run].phase)
 
 
 def due(state: SessionState) -> Present:
-    """The trial that comes next."""
+    """The next trial."""
     place = Place(state.runs[state.run], state.trial, state.attempt, state.staircase)
     return due_trial(state.protocol, state.opened, current_rule(state), place)
 
 
 def repeats_left(state: SessionState) -> int | None:
-    """How often the participant may still ask for a trial of this run again; None where the rules set no limit."""
+    """How many more repeats the participant may ask for in this run; None if unlimited."""
     if not same_stimulus_again(state.opened):
         return None
     asked = sum(trial.run == state.run and trial.void_cause is VoidCause.ASKED for trial in state.trials)

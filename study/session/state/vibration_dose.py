@@ -13,6 +13,7 @@ LIMIT_VALUE_MPS2 = 5.0
 """Of A(8), directive 2002/44/EC, article 3."""
 
 WORKING_DAY_S = 8 * 3600.0
+"""Reference duration of A(8)."""
 
 _F1_HZ, _F2_HZ, _Q1 = 10**0.8, 10**3.1, 0.71
 """Band limits: second-order high-pass and low-pass."""
@@ -23,22 +24,24 @@ _Q2 = 0.64
 
 @dataclass(frozen=True, slots=True)
 class Dose:
+    """Accumulated hand-arm vibration."""
+
     squared_s: float
-    """Sum of the weighted rms squared times its seconds, (m/s^2)^2 s."""
+    """Integral of the squared weighted rms acceleration, (m/s^2)^2 s."""
     vibrated_s: float
-    """All seconds of vibration, measured or not."""
+    """Total duration of vibration (s), measured or not."""
     unmeasured_s: float
-    """Those without a known amplitude: they are in `vibrated_s` and not in `squared_s`, so A(8) is too low by them."""
+    """Part of `vibrated_s` with unknown amplitude, which is missing in `squared_s`: A(8) is underestimated."""
 
 
 NO_DOSE = Dose(0.0, 0.0, 0.0)
 
 
 def hand_arm_weight(frequency_hz: float) -> float:
-    """Factor by which Wh weights an acceleration of this frequency.
+    """Frequency weighting Wh of an acceleration.
 
-    The standard is stated for the octave bands of 8 Hz to 1 kHz, from 5.6 Hz on. Below, the same filter goes on:
-    it falls with the square of the frequency, 0.55 at 5 Hz; so slow a motion is no hazard of this kind.
+    The standard defines it for octave bands of 8 Hz to 1 kHz, from 5.6 Hz. Below, the same filter is used: it falls
+    with the square of the frequency, to 0.55 at 5 Hz.
     """
     if frequency_hz <= 0:
         raise ValueError(f"frequency_hz is {frequency_hz:g}; a weight exists above 0 Hz")
@@ -50,20 +53,22 @@ def hand_arm_weight(frequency_hz: float) -> float:
 
 
 def add(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, seconds: float) -> Dose:
-    """The dose after one more sinusoid. amplitude_mps2: its peak; None where nothing was measured.
+    """The dose after one more sinusoid. amplitude_mps2: peak; None if unmeasured.
 
-    Fades counted at full amplitude make the dose too high, never too low.
+    Fades count at full amplitude, which overestimates the dose, never underestimates it.
     """
     if seconds < 0:
         raise ValueError(f"seconds is {seconds:g}; a vibration lasts 0 s or longer")
     longer = replace(dose, vibrated_s=dose.vibrated_s + seconds)
     if amplitude_mps2 is None:
         return replace(longer, unmeasured_s=dose.unmeasured_s + seconds)
-    return replace(longer, squared_s=dose.squared_s + _weighted_rms(frequency_hz, amplitude_mps2) ** 2 * seconds)
+    return replace(
+        longer, squared_s=dose.squared_s + _frequency_weighted_rms(frequency_hz, amplitude_mps2) ** 2 * seconds
+    )
 
 
 def total(*doses: Dose) -> Dose:
-    """Of one hand on one day."""
+    """Sum of doses of one hand on one day."""
     return Dose(
         squared_s=sum(dose.squared_s for dose in doses),
         vibrated_s=sum(dose.vibrated_s for dose in doses),
@@ -72,14 +77,15 @@ def total(*doses: Dose) -> Dose:
 
 
 def a8_mps2(dose: Dose) -> float:
-    """The exposure as the constant weighted rms acceleration that would give it in eight hours."""
+    """Daily exposure A(8): the constant weighted rms acceleration (m/s^2) over eight hours with the same dose."""
     return math.sqrt(dose.squared_s / WORKING_DAY_S)
 
 
 def amplitude_that_fits_mps2(dose: Dose, a8_limit_mps2: float, frequency_hz: float, seconds: float) -> float:
-    """Highest peak amplitude which, played for so many seconds more, leaves A(8) at or below the limit.
+    """Largest peak amplitude (m/s^2) which, played for `seconds` more, keeps A(8) within the limit; 0 where nothing is
+    left.
 
-    0 where nothing is left. Raises ValueError unless seconds is above 0.
+    Raises ValueError unless seconds is above 0.
     """
     if seconds <= 0:
         raise ValueError(f"seconds is {seconds:g}; it must be above 0")
@@ -87,5 +93,6 @@ def amplitude_that_fits_mps2(dose: Dose, a8_limit_mps2: float, frequency_hz: flo
     return math.sqrt(2 * max(0.0, left) / seconds) / hand_arm_weight(frequency_hz)
 
 
-def _weighted_rms(frequency_hz: float, amplitude_mps2: float) -> float:
+def _frequency_weighted_rms(frequency_hz: float, amplitude_mps2: float) -> float:
+    """Weighted rms (m/s^2) of a sinusoid with this peak."""
     return hand_arm_weight(frequency_hz) * amplitude_mps2 / math.sqrt(2)

@@ -1,4 +1,4 @@
-"""What a trial really delivered: acceleration along and off the direction, and displacement."""
+"""Delivered stimulus of a trial: acceleration along and across the direction, and displacement."""
 
 from dataclasses import dataclass
 
@@ -18,8 +18,9 @@ class Delivered:
     displacement_mm: float
 
 
-def delivered(recording: Recording, unit_vector: FloatArray, frequency_hz: float) -> Delivered | None:
-    """None where less than one period was measured. unit_vector: (3,), the direction played."""
+def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_hz: float) -> Delivered | None:
+    """Amplitudes from a trial's recording by a Fourier projection at the stimulus frequency; None if less than one
+    period was measured. unit_vector: (3,), the direction played."""
     measured = int(np.isfinite(recording.response.samples).all(axis=1).sum())
     if not covers_a_period(measured, recording.sample_rate_hz, frequency_hz):
         return None

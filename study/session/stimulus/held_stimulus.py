@@ -1,4 +1,4 @@
-"""What a device is asked to hold. Apart from how it is made, so that a device knows nothing of equalizers."""
+"""The stimulus as a device sees it: separate from how it is made, so that devices do not depend on equalizers."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from equalizer.signals.signal import FloatArray, Signal
 
 @dataclass(frozen=True, slots=True)
 class HeldStimulus:
-    """A force to be held: one loop of whole periods, repeated, with a fade at either end."""
+    """A force to be played: one loop of whole periods, repeated, with a fade at either end."""
 
     loop: Signal
     """(n, 3) in N, axes x, y, z, at the device's rate."""
@@ -18,10 +18,10 @@ class HeldStimulus:
     fade_shape: str
     """"raised_cosine" or "linear"."""
     onset: Signal | None = None
-    """(ticks, 3) in N: played once before the loop, as it is, where a faded loop would not fade in what it moves.
-    Such a stimulus has no other fade-in."""
+    """(ticks, 3) in N: played once before the loop, for a stimulus that has an onset of its own instead of a
+    fade-in."""
 
     @property
     def played_once_then_loop(self) -> FloatArray:
-        """(ticks + n, 3)"""
+        """Onset and loop in sequence, (ticks + n, 3), N."""
         return self.loop.samples if self.onset is None else np.concatenate([self.onset.samples, self.loop.samples])

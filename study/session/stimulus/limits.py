@@ -1,4 +1,4 @@
-"""The limits of a sitting, from its protocol: what the safety layer keeps at every tick."""
+"""Safety limits of a sitting from its protocol, which the safety layer enforces at every tick."""
 
 import math
 from dataclasses import dataclass, field
@@ -10,14 +10,14 @@ from protocols.definition.recording_segments import MultisineSegment, highest_hz
 from protocols.definition.study_protocol import StudyProtocol
 
 SPRING_SLEW_N_PER_S = 100.0
-"""Room for the centring spring: 150 N/m pulled away at 0.6 m/s, faster than a hand moves in a trial."""
+"""Allowance for the centring spring: 150 N/m at 0.6 m/s, faster than a hand moves in a trial."""
 
 SLEW_MARGIN = 1.05
 
 BETWEEN_SAMPLES = math.sqrt(2)
-"""A multisine's peak is that of its samples. The wave through them is at most so much higher while its lines lie below
-a quarter of the rate (Ehlich and Zeller 1964), and Bernstein's inequality then bounds its slope as a sine's. Above a
-quarter, two samples of opposite sign change by less than that bound anyway."""
+"""Bound of a multisine between its samples: with lines below a quarter of the rate the continuous signal exceeds the
+largest sample by at most this factor (Ehlich and Zeller 1964), and Bernstein's inequality then bounds its slope like
+that of a sine. Above a quarter, consecutive samples of opposite sign change by less than that bound anyway."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,12 +29,12 @@ class Limits:
     watchdog_s: float
     release_s: float
     feedback_cap_n: float = SafetySettings.feedback_cap_n
-    """Of spring and damper: each by itself, and both together."""
+    """Of spring and damper: each alone, and both together."""
     plausibility: PlausibilitySettings = field(default_factory=PlausibilitySettings)
 
 
 def limits_of_study(protocol: StudyProtocol) -> Limits:
-    """Slew just above the steepest stimulus: the highest frequency at the cap, while it fades."""
+    """Limits with a slew rate just above the steepest stimulus: the highest frequency at the cap, during its fade."""
     stimulus = protocol.stimulus
     fastest_hz = max(protocol.all_frequencies_hz)
     fade_s = min(stimulus.fade_in_s, stimulus.fade_out_s)
@@ -42,7 +42,7 @@ def limits_of_study(protocol: StudyProtocol) -> Limits:
 
 
 def limits_of_recording(protocol: RecordingProtocol) -> Limits:
-    """Slew just above the steepest excitation of this recording."""
+    """Limits with a slew rate just above the steepest excitation of this recording."""
     slews = [
         (BETWEEN_SAMPLES if isinstance(segment, MultisineSegment) else 1.0)
         * _slew(highest_hz(segment), segment.amplitude_n, protocol.fade_s)
@@ -52,7 +52,7 @@ def limits_of_recording(protocol: RecordingProtocol) -> Limits:
 
 
 def forces_in_words(safety: SafetySettings) -> str:
-    """What a hand may feel at the most, for the places where a person decides."""
+    """Largest forces on the hand, in words, for places where a person decides."""
     feedback_n = min(safety.feedback_cap_n, safety.total_cap_n)
     return (
         f"stimulus at most {safety.stimulus_cap_n:g} N, spring and damper {feedback_n:g} N, "

@@ -1,4 +1,4 @@
-"""A recording protocol turned into what is played: one piece per sinusoid, sweep or multisine, rests included."""
+"""Commands of a recording protocol: one piece per sinusoid, sweep or multisine, rests included."""
 
 from dataclasses import dataclass, replace
 
@@ -21,12 +21,12 @@ class Piece:
     commands: Signal
     """(n, 3) in N."""
     segment: Segment
-    """The part that counts, in samples of `commands`."""
+    """The evaluated part, in samples of `commands`."""
     number: int
-    """Of the protocol's segment that it comes from, from 1."""
+    """Number of its segment in the protocol, from 1."""
     along: str
     unit_vector: tuple[float, float, float] | None
-    """None along all axes at once."""
+    """None for all axes at once."""
     frequency_hz: float | None = None
     """Of a sinusoid; None for a sweep or a multisine."""
     band_hz: tuple[float, float] | None = None
@@ -35,7 +35,7 @@ class Piece:
     """Of a multisine's phases, from 1."""
 
     def at(self, amplitude_n: float) -> "Piece":
-        """The same excitation with another peak."""
+        """The same excitation with another peak (N)."""
         samples = self.commands.samples * (amplitude_n / self.segment.amplitude)
         return replace(
             self,
@@ -45,7 +45,7 @@ class Piece:
 
 
 def pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[Piece, ...]:
-    """Everything the protocol plays, in order."""
+    """All pieces of the protocol, in order."""
     once: list[Piece] = []
     for number, segment in enumerate(protocol.segments, start=1):
         match segment:
@@ -69,7 +69,7 @@ def unit_vector(directions: TestDirections, along: str) -> FloatArray:
 def _sine_piece(
     protocol: RecordingProtocol, number: int, segment: SineSegment, frequency_hz: float, rate_hz: float
 ) -> Piece:
-    """The counted part is whole loops; settling before it and the fades lie outside."""
+    """The evaluated part is whole loops; settling time and fades lie outside."""
     period = loop_length(frequency_hz, rate_hz)
     fade = round(protocol.fade_s * rate_hz)
     settle = max(fade, round(segment.settle_s * rate_hz))
@@ -89,7 +89,7 @@ def _sine_piece(
 
 
 def _sweep_piece(protocol: RecordingProtocol, number: int, segment: SweepSegment, rate_hz: float) -> Piece:
-    """Faded in during the first period, which is there for the transient; every period ends at zero by itself."""
+    """Faded in during the first period, which contains the transient; every period ends at zero."""
     period = round(segment.duration_s * rate_hz)
     wave = np.tile(log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period, rate_hz), segment.periods)
     vector = unit_vector(protocol.directions, segment.along)
@@ -108,7 +108,7 @@ def _sweep_piece(protocol: RecordingProtocol, number: int, segment: SweepSegment
 def _multisine_pieces(
     protocol: RecordingProtocol, number: int, segment: MultisineSegment, rate_hz: float
 ) -> list[Piece]:
-    """One for each realisation. A multisine begins and ends anywhere, so its fades lie outside its periods."""
+    """One for each realisation. A multisine does not start at zero, so its fades lie outside its periods."""
     period, fade = round(segment.duration_s * rate_hz), round(protocol.fade_s * rate_hz)
     lines = lines_between(segment.from_hz, segment.to_hz, period, rate_hz, odd_only=segment.odd_only)
     vector = None if segment.along == "all" else unit_vector(protocol.directions, segment.along)
@@ -136,7 +136,7 @@ def _multisine_pieces(
 
 
 def _with_rests(protocol: RecordingProtocol, forces: FloatArray, rate_hz: float) -> tuple[Signal, int]:
-    """The commands of a piece, and where in them forces, (n, 3), begin."""
+    """Commands of a piece, and the index at which `forces`, (n, 3), begin."""
     rest = round(protocol.rest_s * rate_hz)
     samples = np.zeros((len(forces) + 2 * rest, 3))
     samples[rest : rest + len(forces)] = forces

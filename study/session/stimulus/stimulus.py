@@ -1,4 +1,4 @@
-"""From a level to a force that can be held: one loop of whole periods along one of the two directions."""
+"""Stimulus of a trial from its level: one loop of whole periods along one of the two directions."""
 
 import math
 from dataclasses import replace
@@ -31,13 +31,13 @@ def direction_angle_deg(directions: TestDirections, direction: int) -> float:
 
 
 def loop_length(frequency_hz: float, sample_rate_hz: float) -> int:
-    """Samples of the shortest loop of whole periods; frequencies are whole tenths of a hertz."""
+    """Samples of the shortest loop of whole periods; frequencies are multiples of 0.1 Hz."""
     rate, frequency = round(sample_rate_hz * 10), round(frequency_hz * 10)
     return rate // math.gcd(rate, frequency)
 
 
 def fade_in(settings: StimulusSettings, sample_rate_hz: float) -> FloatArray:
-    """(ticks,): how an amplitude rises, as the safety layer does it where a stimulus has no onset of its own."""
+    """(ticks,): amplitude envelope at the start, as the safety layer applies it to a stimulus without its own onset."""
     ticks = round(settings.fade_in_s * sample_rate_hz)
     share: FloatArray = np.arange(ticks) / max(ticks, 1)
     return share if settings.fade_shape == "linear" else 0.5 - 0.5 * np.cos(np.pi * share)
@@ -51,8 +51,8 @@ def held_stimulus(
     equalizer: Equalizer,
     sample_rate_hz: float,
 ) -> HeldStimulus:
-    """The stimulus of one trial. `amplitude` carries the onset's polarity in its sign; its unit is what the
-    equalizer takes: N without one, m/s² with one. unit_vector: (3,)."""
+    """The stimulus of one trial. The sign of `amplitude` is the polarity of the onset; its unit is the equalizer's:
+    N without one, m/s^2 with one. unit_vector: (3,)."""
     n = loop_length(frequency_hz, sample_rate_hz)
     phase = 2 * math.pi * frequency_hz / sample_rate_hz * np.arange(n)
     force = equalizer.takes == "force"

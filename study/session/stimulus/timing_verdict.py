@@ -1,8 +1,8 @@
-"""Whether a computer keeps the time of a device: the limits, and the verdict that follows from a measurement.
+"""Timing requirements of a device and the verdict on a computer from a measurement.
 
 A real device does not wait: a loop that wakes up later than one tick has missed it. A simulated device waits for its
-computer, so that lateness is a warning there and no fault. A verdict never says fine of what is too late for the device
-at hand, nor of what would be too late for a real one.
+computer, so that lateness is only a warning there. A timing that is too late for a real device is never reported as
+fine.
 """
 
 import math
@@ -17,13 +17,13 @@ from study.session.views.views import DeviceFinding
 MS_PER_S = 1000.0
 
 LATE_TICKS = 1.0
-"""99 of 100 wake-ups must come before so many ticks of the device have passed: 1 ms at 1 kHz."""
+"""99 % of the wake-ups must be less than this many ticks late: 1 ms at 1 kHz."""
 
 MISSED_SHARE = 0.001
-"""Missed ticks that are still fine: a twentieth of what makes a trial void by default."""
+"""Allowed fraction of missed ticks: a twentieth of what makes a trial void by default."""
 
 LATE_SHARE = 0.002
-"""Ticks that may come late, those among them that were missed: what a loop with a real-time class keeps on a quiet
+"""Allowed fraction of late ticks, missed ones included: what a loop with real-time priority keeps on an idle
 computer."""
 
 ADVICE = "Close other programs, switch power saving off, and measure again."
@@ -31,23 +31,23 @@ ADVICE = "Close other programs, switch power saving off, and measure again."
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """Of this program, which wanted to wake up at every tick of the device's rate."""
+    """Lateness of this program, which tried to wake up at every tick."""
 
     median_ms: float
     p99_ms: float
     longest_ms: float
     missing_a_tick: float
-    """Share of the wake-ups that were later than a tick."""
+    """Fraction of the wake-ups that were later than a tick."""
     tick_ms: float
 
     @property
     def too_late(self) -> bool:
-        """For a real device. A measurement that is no number is no evidence of being in time."""
+        """For a real device. NaN counts as too late."""
         return not self.p99_ms < LATE_TICKS * self.tick_ms
 
 
 def lateness_of(late_s: FloatArray, rate_hz: float) -> Lateness:
-    """late_s (n,): how late each wake-up was, s, not negative. Raises ValueError where there is none."""
+    """Lateness statistics. late_s (n,): how late each wake-up was (s), not negative. Raises ValueError if empty."""
     if len(late_s) == 0:
         raise ValueError("no wake-up was measured")
     late_ms = MS_PER_S * np.asarray(late_s, dtype=float)
@@ -88,7 +88,7 @@ def judge_missed(missed_ticks: int, ticks: int, simulated: bool) -> DeviceFindin
 
 
 def judge_late(late_ticks: int, latest_ms: float, ticks: int) -> DeviceFinding:
-    """Of a real device. late_ticks: whose work ended after the next was due, and those that were missed."""
+    """Verdict for a real device. late_ticks: ticks whose work ended after the next was due, missed ones included."""
     share = late_ticks / max(ticks, 1)
     fine = share <= LATE_SHARE
     value = f"{late_ticks} of {ticks} ({share:.2%}) ended after the next was due, missed ones among them"
@@ -98,7 +98,7 @@ def judge_late(late_ticks: int, latest_ms: float, ticks: int) -> DeviceFinding:
 
 
 def judge_load(per_processor: float | None) -> DeviceFinding:
-    """per_processor: None where the system does not tell. A warning with every device: the lateness is what counts."""
+    """Verdict on the load average; per_processor: None if unknown. Only a warning: what counts is the lateness."""
     if per_processor is None:
         return DeviceFinding("Load", "this system does not tell it, so it was not checked", fine=True)
     value = f"{per_processor:.0%} of what its processors can do, over the last minute"

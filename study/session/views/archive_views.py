@@ -1,4 +1,4 @@
-"""What lists and viewers of past sessions show. Values only, light to import."""
+"""Views of past sessions for lists and viewers: values only, light to import."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,6 +1,6 @@
-"""Numbers of answers in a sentence, one of them included."""
+"""Number of answers with the right verb, for sentences."""
 
 
 def answers_are(answers: int) -> str:
-    """Such as "3 answers are", to be followed by where."""
+    """Such as "3 answers are" or "1 answer is"."""
     return "1 answer is" if answers == 1 else f"{answers} answers are"

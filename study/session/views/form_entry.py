@@ -6,23 +6,23 @@ belongs to the question at which the cursor stood when its key arrived, however 
 
 from dataclasses import dataclass, replace
 
-from study.session.views.form_views import Form, FormField, FormKind, FormReply, missing
+from study.session.views.form_views import Form, FormField, FormKind, FormReply, find_missing_fields
 
 MOST_CHARACTERS = 500
 CHECKED = (FormKind.CONSENT, FormKind.EXCLUSION)
-"""A choice that replaced another is shown once more before these are sent: safety depends on them."""
+"""Forms in which changed choices are shown once more before sending, because safety depends on them."""
 STEPS = {"down": 1, "up": -1, "tab": 1, "shift+tab": -1}
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What one field holds."""
+    """Content of one field."""
 
     answer: str = ""
     marked: int | None = None
     """Index of the choice that Space would choose; None before the first move."""
     caret: int = 0
-    """Where in free text the next character comes."""
+    """Position of the cursor in free text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,13 +31,13 @@ class FormEntry:
     given: tuple[Given, ...]
     """In the order of the form's fields."""
     at: int = 0
-    """Index of the field under the cursor; the number of fields: Continue, below the last."""
+    """Index of the field under the cursor; the number of fields means Continue, below the last."""
     replaced: frozenset[int] = frozenset()
     """Indices of choices that were changed and not shown again yet; only of the forms in CHECKED."""
     open: tuple[int, ...] = ()
-    """Indices of the fields without an answer when it was last to be sent; empty after the next answer."""
+    """Indices of the fields without an answer when sending was last tried; empty after the next answer."""
     check: tuple[int, ...] = ()
-    """Indices of the changed choices to be looked at before it is sent; empty after the next answer."""
+    """Indices of the changed choices to be checked before sending; empty after the next answer."""
     sent: bool = False
 
     @property
@@ -47,24 +47,26 @@ class FormEntry:
 
 
 def blank_entry(form: Form) -> FormEntry:
+    """An empty entry for this form."""
     return FormEntry(form, (Given(),) * len(form.fields))
 
 
 def reply_of(entry: FormEntry) -> FormReply:
+    """The reply that a sent entry makes."""
     return FormReply({f.key: given.answer.strip() for f, given in zip(entry.form.fields, entry.given, strict=True)})
 
 
 def press(entry: FormEntry, key: str, character: str | None = None, stacked: bool = False) -> FormEntry | None:
-    """One key. None: it means nothing to a form. After sending no key changes anything.
+    """The entry after one key; None if the key has no meaning in a form. After sending no key changes anything.
 
-    key: Textual's name, such as "enter", "shift+tab", "1". character: what it prints, None where it prints nothing.
-    stacked: the choices under the cursor lie below each other, so Up and Down go through them first.
+    key: Textual's name, such as "enter", "shift+tab", "1". character: what it prints, None if nothing. stacked: the
+    choices under the cursor are listed vertically, so Up and Down move through them first.
     """
     if entry.sent:
         return entry
     field = entry.field
     if field is not None and field.choices and stacked and key in ("up", "down"):
-        marked = moved(entry.given[entry.at].marked, STEPS[key], len(field.choices), stay=False)
+        marked = move_mark(entry.given[entry.at].marked, STEPS[key], len(field.choices), stay=False)
         if marked is not None:
             return _with(entry, marked=marked)
     if key in STEPS:
@@ -85,27 +87,30 @@ def click_choice(entry: FormEntry, at: int, choice: int) -> FormEntry:
 
 
 def click_continue(entry: FormEntry) -> FormEntry:
+    """The entry after a click on Continue."""
     return entry if entry.sent else _send(go_to(entry, len(entry.form.fields)))
 
 
 def paste(entry: FormEntry, text: str) -> FormEntry:
-    """Pasted text is written where free text is asked for, and answers nothing else: it is no row of keys."""
+    """Insert pasted text where free text is asked for; ignored elsewhere."""
     field = entry.field
     if entry.sent or field is None or field.choices:
         return entry
     return _write(entry, "".join(c for c in " ".join(text.split()) if c.isprintable()))
 
 
-def moved(marked: int | None, step: int, choices: int, stay: bool = True) -> int | None:
-    """The choice after a step: from nothing to the first or the last. At the ends it stays, or there is None."""
+def move_mark(marked: int | None, step: int, choices: int, stay: bool = True) -> int | None:
+    """Index of the choice after a step: from none to the first or last. At the ends it stays, or is None if `stay`
+    is false."""
     if marked is None:
         return (0 if step > 0 else choices - 1) if stay or step > 0 else None
     there = marked + step
     return there if 0 <= there < choices else marked if stay else None
 
 
-def named_choice(choices: tuple[str, ...], character: str) -> int | None:
-    """By its number, or by a first letter that no other has. Where choices are numbers, a digit means that choice."""
+def find_choice(choices: tuple[str, ...], character: str) -> int | None:
+    """Index of the choice by its number, or by a first letter that is unique. Where choices are numbers, a digit
+    means that choice."""
     if character.isdecimal():
         if any(choice.isdigit() for choice in choices):
             return choices.index(character) if character in choices else None
@@ -117,11 +122,11 @@ def named_choice(choices: tuple[str, ...], character: str) -> int | None:
 def _press_choice(entry: FormEntry, field: FormField, key: str, character: str | None) -> FormEntry | None:
     given = entry.given[entry.at]
     if key in ("left", "right"):
-        return _with(entry, marked=moved(given.marked, 1 if key == "right" else -1, len(field.choices)))
+        return _with(entry, marked=move_mark(given.marked, 1 if key == "right" else -1, len(field.choices)))
     if key in ("space", "enter"):
         chosen = entry if given.marked is None else _choose(entry, given.marked)
         return go_to(chosen, entry.at + 1) if key == "enter" and chosen.given[entry.at].answer else chosen
-    named = named_choice(field.choices, character) if character else None
+    named = find_choice(field.choices, character) if character else None
     return None if named is None else _choose(entry, named)
 
 
@@ -159,7 +164,7 @@ def _choose(entry: FormEntry, choice: int) -> FormEntry:
 def _with(
     entry: FormEntry, answer: str | None = None, marked: int | None = None, caret: int | None = None
 ) -> FormEntry:
-    """Of the field under the cursor, what is not None becomes this."""
+    """The entry with changes to the field under the cursor; None leaves a value."""
     before = entry.given[entry.at]
     now = Given(
         before.answer if answer is None else answer,
@@ -172,8 +177,9 @@ def _with(
 
 
 def _send(entry: FormEntry) -> FormEntry:
-    """Refused, with the cursor on the first of them, while answers are missing or changed choices were not checked."""
-    gaps = missing(entry.form, reply_of(entry))
+    """Send the form; refused, with the cursor on the first problem, while answers are missing or changed choices
+    unchecked."""
+    gaps = find_missing_fields(entry.form, reply_of(entry))
     if gaps:
         places = tuple(entry.form.fields.index(field) for field in gaps)
         return replace(entry, at=places[0], open=places, check=())

@@ -20,7 +20,7 @@ class FormField:
     choices: tuple[str, ...] = ()
     """Exactly one of them; empty for free text."""
     needed: bool = True
-    """Whether an answer must be given; free text of a field that is not needed may stay empty."""
+    """Whether an answer is required; free text that is not required may stay empty."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +39,12 @@ class FormReply:
     """By the fields' keys."""
 
 
-def missing(form: Form, reply: FormReply) -> tuple[FormField, ...]:
-    """Fields that still need an answer, or have one that is none of their choices."""
-    return tuple(field for field in form.fields if not _answered(field, reply.answers.get(field.key, "").strip()))
+def find_missing_fields(form: Form, reply: FormReply) -> tuple[FormField, ...]:
+    """Fields without a valid answer."""
+    return tuple(field for field in form.fields if not _has_answer(field, reply.answers.get(field.key, "").strip()))
 
 
-def _answered(field: FormField, answer: str) -> bool:
+def _has_answer(field: FormField, answer: str) -> bool:
     if field.choices:
         return answer in field.choices or (not field.needed and not answer)
     return bool(answer) or not field.needed

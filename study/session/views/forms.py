@@ -1,4 +1,4 @@
-"""The forms of a sitting, made from its protocol, and what a filled one means."""
+"""The forms of a sitting, made from its protocol, and the meaning of a filled one."""
 
 from dataclasses import dataclass
 
@@ -14,13 +14,13 @@ HEARING = ("ear plugs", "ear muffs", "masking noise", "plugs and noise", "nothin
 class FormOutcome:
     passed: bool
     kept: dict[str, str]
-    """Of the answers, what goes into the log."""
+    """Answers that go into the log."""
     reminder: str = ""
-    """Where the set-up is not what the protocol asks for; empty where it is."""
+    """Where the set-up differs from the protocol; empty if it agrees."""
 
 
 def form_of(protocol: StudyProtocol, kind: FormKind) -> Form | None:
-    """None where the protocol asks nothing of that kind."""
+    """The form; None if the protocol asks nothing of that kind."""
     match kind:
         case FormKind.CONSENT:
             return _consent(protocol.consent) if protocol.consent.statements else None
@@ -33,6 +33,7 @@ def form_of(protocol: StudyProtocol, kind: FormKind) -> Form | None:
 
 
 def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> FormOutcome:
+    """Whether the form is passed, and what of it is kept."""
     answers = {key: answer.strip() for key, answer in reply.answers.items()}
     match kind:
         case FormKind.CONSENT:
@@ -49,7 +50,7 @@ def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> For
 
 
 def confirmation_of(form: Form, reply: FormReply) -> Form:
-    """Before consent that was not given, or an exclusion, is final: what was answered, and whether that is right."""
+    """Confirmation form before a refused consent or an exclusion becomes final."""
     consent = form.kind is FormKind.CONSENT
     given, other = ("no", "yes") if consent else ("yes", "no")
     told = [f"“{field.label}”" for field in form.fields if reply.answers.get(field.key, "").strip() != other]
@@ -64,8 +65,8 @@ def confirmation_of(form: Form, reply: FormReply) -> Form:
     )
 
 
-def confirmed(reply: FormReply) -> bool:
-    """Else the form is to be filled in once more."""
+def is_confirmed(reply: FormReply) -> bool:
+    """Whether the answers were confirmed; otherwise the form is filled in again."""
     return reply.answers.get("right", "").strip() == "yes"
 
 
@@ -106,12 +107,13 @@ def _setup(settings: SetupSettings) -> Form:
         "How you sit",
         "Arrange these with the experimenter; they are kept with the data.",
         (
-            FormField("hearing", _asked("What covers the sound of the device?", wanted.format(
+            FormField("hearing", _add_wish("What covers the sound of the device?", wanted.format(
                 "ear protection or masking noise (hapteq noise makes a file)"), settings.hearing_masked), HEARING),
-            FormField("hand_hidden", _asked("Is the hand hidden from your eyes?", wanted.format("a hidden hand"),
+            FormField("hand_hidden", _add_wish("Is the hand hidden from your eyes?", wanted.format("a hidden hand"),
                                             settings.hand_hidden), YES_NO),
-            FormField("arm_supported", _asked("Does your forearm rest on a support?", wanted.format("a supported arm"),
-                                              settings.arm_supported), YES_NO),
+            FormField("arm_supported", _add_wish(
+                "Does your forearm rest on a support?", wanted.format("a supported arm"),
+                settings.arm_supported), YES_NO),
             FormField("grip", f"How do you hold the handle? Asked for: {settings.grip}.",
                       ("pen grip", "whole hand", "finger tips", "other")),
             FormField("hand", "Which hand holds it?", ("right", "left")),
@@ -119,7 +121,7 @@ def _setup(settings: SetupSettings) -> Form:
     )  # fmt: skip
 
 
-def _asked(question: str, wish: str, wished: bool) -> str:
+def _add_wish(question: str, wish: str, wished: bool) -> str:
     return f"{question} {wish}" if wished else question
 
 

@@ -1,10 +1,10 @@
-"""What has to be said before a real device moves by itself: who may touch it, and who must not."""
+"""Notice before a real device moves by itself: who may touch it."""
 
 from protocols.definition.recording_protocol import RecordingProtocol
 
 
 def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> str:
-    """total_s: how long it will be, if nothing is played twice."""
+    """The notice. total_s: duration if nothing is repeated."""
     peak_n = max(segment.amplitude_n for segment in protocol.segments)
     for_how_long = f"for about {round(total_s / 60)} min" if total_s >= 60 else f"for about {max(1, round(total_s))} s"
     if protocol.hand == "held":

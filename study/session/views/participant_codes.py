@@ -9,12 +9,12 @@ _NUMBERED = re.compile(r"(?P<letters>[A-Za-z]*)(?P<digits>\d{1,9})")
 
 
 def is_code(text: str) -> bool:
-    """Letters and digits, nothing that could be a name with an address."""
+    """Whether the text is a valid participant code."""
     return _CODE.fullmatch(text) is not None
 
 
 def code_problem(text: str) -> str:
-    """What is wrong with a code, as a sentence for the person who types it; empty where nothing is."""
+    """What is wrong with a code, as a sentence; empty if it is valid."""
     if is_code(text):
         return ""
     if not text.strip():
@@ -23,7 +23,7 @@ def code_problem(text: str) -> str:
 
 
 def next_code(taken: tuple[str, ...]) -> str:
-    """A free code, in the manner of the latest of those taken (latest first); P01 where there is none."""
+    """A free code that continues the latest one; P01 if there is none. taken: latest first."""
     for code in taken:
         match = _NUMBERED.fullmatch(code)
         if match is None:

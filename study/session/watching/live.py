@@ -1,4 +1,4 @@
-"""What a running session tells a viewer beside its log: how it is right now. Values only, replaced often."""
+"""Live state of a running session, written beside its log for a viewer. Values only, replaced often."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,7 +10,7 @@ Activity = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """Never a direction: it lies open beside the log while a trial runs."""
+    """Current state. Never contains a direction: it is readable while a trial runs."""
 
     utc: str
     activity: Activity

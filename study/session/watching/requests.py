@@ -1,4 +1,4 @@
-"""What may reach a running session from beside it: another terminal, or a key outside the trial. Values only."""
+"""Requests to a running session from another terminal or from a key outside the trial. Values only."""
 
 from dataclasses import dataclass
 from typing import Literal

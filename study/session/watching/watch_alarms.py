@@ -1,26 +1,26 @@
-"""What a person who watches a session must hear of. Each alarm is one small function of the situation."""
+"""Alarms for the experimenter who watches a session. Each alarm is one small function of the situation."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from protocols.trial import Phase, Trial, TrialStatus
-from study.session.facts.log_time import Moment, minutes_between, passed_s
+from study.session.facts.log_time import Moment, elapsed_s, minutes_between
 from study.session.facts.void_reasons import computer_too_busy
 from study.session.watching.live import Live
 from study.session.watching.watch_view import ON, Alarm, Exposure, Standing
 from study.session.watching.watched import Watched
 
 SILENT_AFTER_S = 3.0
-"""`live.json` comes some four times a second; a slow disk may hold it up for a second or two."""
+"""`live.json` is written about four times a second; a slow disk may delay it by a second or two."""
 _LIVELY = ("demo", "waiting for the handle", "rest")
-"""Activities in which a session says all the time that it lives. While a form or a notice is read it does not."""
+"""Activities during which the session writes `live.json` continuously; not while a form or a notice is read."""
 HANDLE_AWAY_S = 2.0
 UNANSWERED_S = 60.0
-"""Answers take seconds. After a minute a participant is stuck, or gone."""
+"""Answers take seconds; after this time the participant may need help."""
 JUST_NOW_S = 60.0
-"""How long the end of a sitting is news."""
+"""How long the end of a sitting is reported."""
 CATCH_TRIALS, LAPSES = 5, 2
-"""So many wrong ones among the last five: a participant who attends misses none at full level."""
+"""This many wrong ones among the last five catch trials: an attentive participant misses none at full level."""
 PRESENTATIONS, VOIDS = 10, 3
 NEAR = 0.8
 
@@ -41,27 +41,27 @@ class Situation:
 
     @property
     def fresh(self) -> bool:
-        """Whether the live state is of now."""
+        """Whether the live state is up to date."""
         return self.live is not None and self.seconds_since(self.live.utc) <= SILENT_AFTER_S
 
     @property
     def open_s(self) -> float:
-        """How long a trial waits for its answer; by the session's monotonic clock where its live state tells it."""
+        """How long a trial has waited for its answer; by the session's monotonic clock if its live state has it."""
         state = self.watched.state
         if state.presented is None or state.answered is not None:
             return 0.0
         begun = Moment(state.presented.utc, state.presented.monotonic_s)
         stamped = self.live is not None and self.live.monotonic_s is not None and begun.monotonic_s is not None
         if self.live is not None and stamped:
-            return passed_s(begun, Moment(self.live.utc, self.live.monotonic_s))
-        return passed_s(begun, Moment(self.now_utc))
+            return elapsed_s(begun, Moment(self.live.utc, self.live.monotonic_s))
+        return elapsed_s(begun, Moment(self.now_utc))
 
     def seconds_since(self, utc: str) -> float:
         return 60.0 * minutes_between(utc, self.now_utc)
 
 
 def alarms_of(now: Situation, before: tuple[Alarm, ...]) -> tuple[Alarm, ...]:
-    """The most urgent first. A state that was an alarm before keeps its time."""
+    """Current alarms, most urgent first. A lasting alarm keeps its start time."""
     known = {alarm.kind: alarm for alarm in before}
     looks = _RUNNING if now.standing in ON else _OVER
     found = [alarm for look in looks if (alarm := look(now)) is not None]
@@ -75,8 +75,8 @@ def alarms_of(now: Situation, before: tuple[Alarm, ...]) -> tuple[Alarm, ...]:
     )
 
 
-def _silent(now: Situation) -> Alarm | None:
-    """The session should be alive, and nothing lives."""
+def _silence_alarm(now: Situation) -> Alarm | None:
+    """The session should be running, but its live state is not updated."""
     live, silence = now.live, "The session has been silent for seconds: it hangs, or was killed. Hands off the handle."
     if live is None or now.fresh:
         return None
@@ -84,37 +84,37 @@ def _silent(now: Situation) -> Alarm | None:
     return Alarm("silent", silence, live.utc) if expected else None
 
 
-def _gone(now: Situation) -> Alarm | None:
+def _gone_alarm(now: Situation) -> Alarm | None:
     if now.standing != "not running":
         return None
     last_utc = max(now.watched.last_utc, now.live.utc if now.live is not None else "")
     return Alarm("gone", "The program that ran the session is gone. hapteq resume goes on with it.", last_utc)
 
 
-def _ended(now: Situation) -> Alarm | None:
+def _end_alarm(now: Situation) -> Alarm | None:
     watched = now.watched
     return Alarm("ended", f"The sitting ended: {watched.left}.", watched.last_utc) if watched.left else None
 
 
-def _unreadable(now: Situation) -> Alarm | None:
+def _log_alarm(now: Situation) -> Alarm | None:
     if not now.problem:
         return None
     return Alarm("log", f"The log cannot be followed: {now.problem}", now.now_utc)
 
 
-def _device(now: Situation) -> Alarm | None:
+def _device_alarm(now: Situation) -> Alarm | None:
     if now.live is None or not now.fresh or not now.live.fault:
         return None
     return Alarm("device", f"The device reported a fault: {now.live.fault}.", now.live.utc)
 
 
-def _clipped(now: Situation) -> Alarm | None:
+def _sensor_alarm(now: Situation) -> Alarm | None:
     if now.live is None or not now.fresh or not now.live.sensor_clipped:
         return None
     return Alarm("sensor", "The acceleration sensor is clipped: it reads too little.", now.now_utc)
 
 
-def _handle(now: Situation) -> Alarm | None:
+def _handle_alarm(now: Situation) -> Alarm | None:
     live, radius = now.live, now.watched.state.protocol.gate.radius_mm
     if live is None or not now.fresh:
         return None
@@ -126,19 +126,19 @@ def _handle(now: Situation) -> Alarm | None:
     return None
 
 
-def _adverse(now: Situation) -> Alarm | None:
+def _adverse_alarm(now: Situation) -> Alarm | None:
     adverse = [note for note in now.watched.notes[now.watched.notes_before :] if note.adverse]
     return Alarm("adverse", f"Adverse event: {adverse[-1].text}", adverse[-1].utc, event=True) if adverse else None
 
 
-def _time(now: Situation) -> Alarm | None:
+def _time_alarm(now: Situation) -> Alarm | None:
     share, limit = now.exposure.time_share, f"the {now.exposure.limit_min:g} minutes of a sitting"
     if share >= 1:
         return Alarm("time reached", f"{limit[0].upper()}{limit[1:]} are over: it ends after this trial.", now.now_utc)
     return Alarm("time near", f"{share:.0%} of {limit} are over.", now.now_utc, urgent=False) if share >= NEAR else None
 
 
-def _dose(now: Situation) -> Alarm | None:
+def _dose_alarm(now: Situation) -> Alarm | None:
     share = now.exposure.dose_share
     if share >= 1:
         return Alarm("dose reached", "The vibration dose is reached: the sitting ends after this trial.", now.now_utc)
@@ -146,7 +146,7 @@ def _dose(now: Situation) -> Alarm | None:
     return Alarm("dose near", near, now.now_utc, urgent=False) if share >= NEAR else None
 
 
-def _lapses(now: Situation) -> Alarm | None:
+def _lapse_alarm(now: Situation) -> Alarm | None:
     last = [trial for trial in now.trials if trial.phase is Phase.CATCH and trial.counts][-CATCH_TRIALS:]
     wrong = sum(not trial.correct for trial in last)
     if wrong < LAPSES:
@@ -155,7 +155,7 @@ def _lapses(now: Situation) -> Alarm | None:
     return Alarm("lapses", many, now.watched.last_utc)
 
 
-def _voids(now: Situation) -> Alarm | None:
+def _void_alarm(now: Situation) -> Alarm | None:
     last = [trial for trial in now.trials if trial.status is not TrialStatus.OPEN][-PRESENTATIONS:]
     void = sum(trial.status is TrialStatus.SPOILED for trial in last)
     if void < VOIDS:
@@ -164,7 +164,7 @@ def _voids(now: Situation) -> Alarm | None:
     return Alarm("voids", many, now.watched.last_utc)
 
 
-def _busy(now: Situation) -> Alarm | None:
+def _load_alarm(now: Situation) -> Alarm | None:
     remarks = now.watched.remarks[-PRESENTATIONS:]
     void = sum(map(computer_too_busy, remarks))
     if not void:
@@ -178,7 +178,7 @@ def _last_void(now: Situation) -> str:
     return [remark for trial, remark in remarks if trial.status is TrialStatus.SPOILED][-1]
 
 
-def _unanswered(now: Situation) -> Alarm | None:
+def _answer_alarm(now: Situation) -> Alarm | None:
     state = now.watched.state
     if now.standing != "running" or state.presented is None or state.answered is not None:
         return None
@@ -189,7 +189,8 @@ def _unanswered(now: Situation) -> Alarm | None:
 
 
 _ENDS = ("gone", "ended")
-_OVER: tuple[Callable[[Situation], Alarm | None], ...] = (_unreadable, _gone, _ended)
+_OVER: tuple[Callable[[Situation], Alarm | None], ...] = (_log_alarm, _gone_alarm, _end_alarm)
 _RUNNING: tuple[Callable[[Situation], Alarm | None], ...] = (
-    _device, _silent, _unreadable, _adverse, _handle, _clipped, _dose, _time, _lapses, _busy, _voids, _unanswered,
+    _device_alarm, _silence_alarm, _log_alarm, _adverse_alarm, _handle_alarm, _sensor_alarm, _dose_alarm,
+    _time_alarm, _lapse_alarm, _load_alarm, _void_alarm, _answer_alarm,
 )  # fmt: skip

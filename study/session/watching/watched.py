@@ -1,4 +1,4 @@
-"""A session as it is followed: its state, and the facts that decide nothing (notes, remarks, how it ended)."""
+"""A followed session: its state, and the facts that do not affect it (notes, remarks, how it ended)."""
 
 from dataclasses import dataclass, replace
 
@@ -40,6 +40,7 @@ class Watched:
 
 
 def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> Watched:
+    """The followed session after its first line."""
     return Watched(
         state=begin_session(opened, protocol),
         remarks=(),
@@ -53,15 +54,15 @@ def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> Watched:
 
 
 def follow(watched: Watched, event: Event) -> Watched:
-    """After one more event. Raises LogContradiction where it cannot follow."""
+    """The followed session after one more event. Raises LogContradiction where it cannot follow."""
     after = replace(watched, state=apply(watched.state, event), last_utc=event.utc)
     match event:
         case TrialPresented():
             return replace(after, remarks=(*watched.remarks, ""))
         case TrialMeasured():
-            return _remarked(after, ", ".join(flag for flag in event.flags if flag != NO_STEADY_PART))
+            return _set_remark(after, ", ".join(flag for flag in event.flags if flag != NO_STEADY_PART))
         case TrialSpoiled():
-            return _remarked(after, event.reason)
+            return _set_remark(after, event.reason)
         case FormFilled():
             return replace(after, forms=(*watched.forms, FormLine(event.utc, event.form, event.passed)))
         case NoteTaken():
@@ -75,5 +76,5 @@ def follow(watched: Watched, event: Event) -> Watched:
             return after
 
 
-def _remarked(watched: Watched, remark: str) -> Watched:
+def _set_remark(watched: Watched, remark: str) -> Watched:
     return replace(watched, remarks=(*watched.remarks[:-1], remark))

@@ -1,4 +1,4 @@
-"""Trials and runs of a followed session, in the words of its watcher. A part of `study.session.watching.watching`."""
+"""Trials and runs of a followed session, as shown to the experimenter. Part of `study.session.watching.watching`."""
 
 from protocols.procedure.practice import PracticeState, practice_passed, right_of_last
 from protocols.procedure.run_rules import staircase_rule
@@ -13,21 +13,22 @@ LAST_TRIALS = 40
 
 
 def shown_run(state: SessionState) -> int | None:
+    """Index of the run to plot: the current one, or the last one while nothing is answered in it."""
     answered = [trial.run for trial in state.trials if trial.counts]
     if not state.finished and (not answered or state.presented is not None):
         return state.run
     return answered[-1] if answered else None
 
 
-def _counted(state: SessionState, run: int) -> list[Trial]:
+def _select_counted(state: SessionState, run: int) -> list[Trial]:
     return [trial for trial in state.trials if trial.run == run and trial.counts]
 
 
 def points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
-    """An answer whose trial is not closed yet may still turn out void: it is no point so far."""
+    """Counted trials of a run. An answer whose trial is not closed yet may still become void and is left out."""
     if run is None:
         return ()
-    closed = [t for t in _counted(state, run) if t.phase is not Phase.CATCH and not _is_open(state, t)]
+    closed = [t for t in _select_counted(state, run) if t.phase is not Phase.CATCH and not _is_open(state, t)]
     return tuple(StaircasePoint(t.trial, t.level_n, bool(t.correct), t.reversal) for t in closed)
 
 
@@ -36,6 +37,7 @@ def _is_open(state: SessionState, trial: Trial) -> bool:
 
 
 def next_level_n(state: SessionState, shown: int | None) -> float | None:
+    """Level of the next trial of the shown run (N); None if it is over."""
     if state.finished or shown != state.run:
         return None
     run = state.runs[state.run]
@@ -43,7 +45,7 @@ def next_level_n(state: SessionState, shown: int | None) -> float | None:
 
 
 def run_line(state: SessionState, run: Run) -> WatchedRun:
-    counted = _counted(state, run.index)
+    counted = _select_counted(state, run.index)
     return WatchedRun(
         run=run.index,
         phase="practice" if run.practice else run.phase.value,
@@ -71,14 +73,15 @@ def open_trial(state: SessionState, presented_s: float) -> OpenTrial | None:
 
 
 def last_trials(watched: Watched) -> tuple[ClosedTrial, ...]:
+    """Latest trials, newest first."""
     rows = list(zip(watched.state.trials, watched.remarks, strict=True))[-LAST_TRIALS - 1 :]
     closed = [
-        _closed_trial(watched.state, trial, remark) for trial, remark in rows if trial.status is not TrialStatus.OPEN
+        _close_trial(watched.state, trial, remark) for trial, remark in rows if trial.status is not TrialStatus.OPEN
     ]
     return tuple(closed[::-1][:LAST_TRIALS])
 
 
-def _closed_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
+def _close_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
     # Of a void trial it stays hidden, answered or not: it tells something about the draws, and the same comes again.
     # While the device is judged the answer may still turn out void.
     known = trial.counts and not _is_open(state, trial)
@@ -106,7 +109,7 @@ def practice(state: SessionState) -> tuple[PracticeLine, ...]:
     settings, lines = state.protocol.practice, []
     for run in state.runs[: state.run]:
         if run.practice:
-            done = PracticeState(tuple(bool(trial.correct) for trial in _counted(state, run.index)))
+            done = PracticeState(tuple(bool(trial.correct) for trial in _select_counted(state, run.index)))
             of = min(settings.of_last, len(done.correct))
             lines.append(
                 PracticeLine(run.frequency_hz, right_of_last(settings, done), of, practice_passed(settings, done))

@@ -1,4 +1,4 @@
-"""From a followed session to what its watcher sees. Pure: the same session and time give the same view."""
+"""The experimenter's view of a followed session. Pure: the same session and time give the same view."""
 
 from dataclasses import dataclass
 
@@ -24,20 +24,20 @@ from study.session.watching.watched_trials import (
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """What is known of a session from beside its log."""
+    """What is known about a session besides its log."""
 
     live: Live | None = None
     writer: bool | None = None
-    """Whether a program holds the session; None where that was not asked."""
+    """Whether a program holds the session's lock; None if not checked."""
     problem: str = ""
     """Why the log cannot be followed any further; empty where it can."""
 
 
 def watch_view(watched: Watched, beside: Beside, now_utc: str, before: WatchView | None = None) -> WatchView:
-    """before: the view shown last, so that an alarm that lasts keeps its time."""
+    """The view at `now_utc`. before: the previous view, so that a lasting alarm keeps its start time."""
     state = watched.state
     live = _of_this_sitting(watched, beside.live)
-    standing = _standing(watched, live, beside.writer)
+    standing = _find_standing(watched, live, beside.writer)
     exposure = _exposure(watched, live, standing, now_utc)
     situation = Situation(watched, live, beside.problem, standing, exposure, now_utc)
     activity, since_utc = _activity(watched, live, standing)
@@ -76,13 +76,13 @@ def watch_view(watched: Watched, beside: Beside, now_utc: str, before: WatchView
 
 
 def _of_this_sitting(watched: Watched, live: Live | None) -> Live | None:
-    """What an earlier sitting left behind says nothing of this one. Versions that log the monotonic clock take it away
-    before a sitting; of others only the times tell."""
+    """The live state, unless it is left over from an earlier sitting. Versions that log the monotonic clock remove
+    it before a sitting; for others the times decide."""
     ours = live is not None and (live.monotonic_s is not None or live.utc >= watched.sitting_utc)
     return live if ours else None
 
 
-def _standing(watched: Watched, live: Live | None, writer: bool | None) -> Standing:
+def _find_standing(watched: Watched, live: Live | None, writer: bool | None) -> Standing:
     if watched.state.turned_away_for_good:
         return watched.state.sitting.turned_away or "refused"
     if watched.state.closed:
@@ -125,7 +125,7 @@ _WORDS = {
 
 
 def _activity(watched: Watched, live: Live | None, standing: Standing) -> tuple[str, str]:
-    """In words, and since when. What the log says of a trial goes before what `live` said a moment earlier."""
+    """Activity in words, and since when. The log takes precedence over `live`."""
     state = watched.state
     if standing not in ON:
         return standing, watched.last_utc
@@ -149,7 +149,8 @@ def _exposure(watched: Watched, live: Live | None, standing: Standing, now_utc: 
 
 
 def _until_now(sitting: SittingState, live: Live | None, now_utc: str) -> SittingState:
-    """By the session's own monotonic clock where its live state tells it, else by the clock of who watches."""
+    """The sitting advanced to now, by the session's monotonic clock if its live state has it, otherwise by this
+    computer's clock."""
     stamped = live is not None and live.monotonic_s is not None and sitting.last.monotonic_s is not None
     if live is not None and stamped:
         return pass_time(sitting, Moment(live.utc, live.monotonic_s))
@@ -157,5 +158,5 @@ def _until_now(sitting: SittingState, live: Live | None, now_utc: str) -> Sittin
 
 
 def _seconds(since_utc: str, now_utc: str) -> float:
-    """Never negative: the clocks of two computers differ."""
+    """Seconds between two times, never negative: the clocks of two computers differ."""
     return max(0.0, 60.0 * minutes_between(since_utc, now_utc))

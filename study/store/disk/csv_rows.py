@@ -34,7 +34,7 @@ def columns(row_type: type[Any]) -> tuple[str, ...]:
 
 def rows_to_csv(rows: Iterable[Row], row_type: type[Row]) -> str:
     names = columns(row_type)
-    lines = [_line(names), *(_line([_written(getattr(row, name)) for name in names]) for row in rows)]
+    lines = [_line(names), *(_line([_field_text(getattr(row, name)) for name in names]) for row in rows)]
     return "\n".join(lines) + "\n"
 
 
@@ -114,7 +114,7 @@ def in_words(hint: Any) -> str:
     return {bool: "`true` or `false`", int: "whole number", float: "number", str: "text"}[hint]
 
 
-def _written(value: Any) -> str:
+def _field_text(value: Any) -> str:
     match value:
         case None:
             return ""

@@ -18,7 +18,7 @@ def text_attribute(owner: Any, name: str, default: str | None = None) -> str:
     """Raises AttributeProblemError where there is none and no default."""
     texts = texts_attribute(owner, name, None if default is None else (default,))
     if len(texts) != 1:
-        raise AttributeProblemError(f"{_named(owner, name)} holds {len(texts)} texts; it must be one")
+        raise AttributeProblemError(f"{_describe_attribute(owner, name)} holds {len(texts)} texts; it must be one")
     return texts[0]
 
 
@@ -26,31 +26,31 @@ def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = Non
     """One text or a list of texts, as a tuple."""
     if name not in owner.attrs:
         if default is None:
-            raise AttributeProblemError(f"{_named(owner, name)} is missing")
+            raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
         return default
     found = _value(owner, name)
     values = np.atleast_1d(found).ravel().tolist()
     if not all(isinstance(value, str | bytes) for value in values):
-        raise AttributeProblemError(f"{_named(owner, name)} is {_shown(found)}; it must be text")
+        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shown(found)}; it must be text")
     try:
         # h5py gives bytes that are no UTF-8 as half characters, which nothing can write again.
         texts = tuple(value if isinstance(value, bytes) else value.encode() for value in (*values, name))
         return tuple(text.decode() for text in texts[:-1])
     except UnicodeError:
-        raise AttributeProblemError(f"{_named(owner, name)} is not text in UTF-8") from None
+        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is not text in UTF-8") from None
 
 
 def numbers_attribute(owner: Any, name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
     """`count` numbers; a single one may be a scalar or a list of one."""
     if name not in owner.attrs:
         if default is None:
-            raise AttributeProblemError(f"{_named(owner, name)} is missing")
+            raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
         return default
     found = _value(owner, name)
     values = np.atleast_1d(found).ravel()
     if values.dtype.kind not in "iuf" or len(values) != count:
         wanted = "a number" if count == 1 else f"{count} numbers"
-        raise AttributeProblemError(f"{_named(owner, name)} is {_shown(found)}; it must be {wanted}")
+        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shown(found)}; it must be {wanted}")
     return tuple(float(value) for value in values)
 
 
@@ -70,7 +70,9 @@ def _value(owner: Any, name: str) -> Any:
     """What stands there. Raises AttributeProblemError, before any memory is taken, where it is too much."""
     shape = owner.attrs.get_id(name).shape
     if shape is None or math.prod(shape) > _MOST_ENTRIES:
-        raise AttributeProblemError(f"{_named(owner, name)} has the shape {shape}; up to {_MOST_ENTRIES} are read")
+        raise AttributeProblemError(
+            f"{_describe_attribute(owner, name)} has the shape {shape}; up to {_MOST_ENTRIES} are read"
+        )
     return owner.attrs[name]
 
 
@@ -79,6 +81,6 @@ def _shown(value: Any) -> str:
     return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
 
 
-def _named(owner: Any, name: str) -> str:
+def _describe_attribute(owner: Any, name: str) -> str:
     where = owner.name.strip("/")
     return f"the attribute '{name}' of {where}" if where else f"the attribute '{name}'"

@@ -40,7 +40,7 @@ def is_hdf5(path: Path) -> bool:
 
 def format_of(path: Path) -> str:
     """What an HDF5 file calls itself; empty where it says nothing. Raises UnusableFileError."""
-    with opened_any_hdf5(path, "HDF5 file") as file:
+    with open_any_hdf5(path, "HDF5 file") as file:
         try:
             return text_attribute(file, "format", "")
         except AttributeProblemError:
@@ -48,9 +48,9 @@ def format_of(path: Path) -> str:
 
 
 @contextmanager
-def opened_hdf5(path: Path, kind: str, format_name: str, version: int) -> Iterator[Any]:
+def open_hdf5(path: Path, kind: str, format_name: str, version: int) -> Iterator[Any]:
     """The open file, once it says the right format and version. Raises CannotReadError, UnusableFileError."""
-    with opened_any_hdf5(path, kind) as file:
+    with open_any_hdf5(path, kind) as file:
         try:
             found = text_attribute(file, "format")
             (number,) = numbers_attribute(file, "version", 1)
@@ -85,7 +85,7 @@ def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool) -> N
 
 
 @contextmanager
-def opened_any_hdf5(path: Path, kind: str) -> Iterator[Any]:
+def open_any_hdf5(path: Path, kind: str) -> Iterator[Any]:
     """The open file, whatever its format, once its contents are checked. Raises CannotReadError, UnusableFileError."""
     try:
         open_regular(path).close()

@@ -10,7 +10,7 @@ import os
 import stat
 from pathlib import Path
 
-from study.store.disk.real_folder import RealFolder, is_real_folder, opened_folder
+from study.store.disk.real_folder import RealFolder, is_real_folder, open_folder
 
 PRIVATE_FOLDER, PRIVATE_FILE = 0o700, 0o600
 OTHERS = 0o077
@@ -52,7 +52,7 @@ def make_folder(folder: Path, *, private: bool = False) -> None:
 def close_to_others(folder: Path, *, inside: bool = False) -> None:
     """Take the rights of group and others away; inside: also from everything in it. No link is followed, and what
     belongs to another account stays as it is. Raises nothing."""
-    with contextlib.suppress(OSError), opened_folder(folder.absolute()) as place:
+    with contextlib.suppress(OSError), open_folder(folder.absolute()) as place:
         _close(place, inside)
 
 
@@ -79,7 +79,7 @@ def why_open(data: Path) -> str:
     return ""
 
 
-def warning(folder: Path, why: str = "") -> str:
+def privacy_warning(folder: Path, why: str = "") -> str:
     """Sentences where others have rights to the folder; else empty. why: it stays so."""
     if not open_to_others(folder):
         return ""
@@ -88,10 +88,10 @@ def warning(folder: Path, why: str = "") -> str:
     return f"{said}{why and f' A session leaves them: {why}.'} Take them away: chmod 700 {folder}"
 
 
-def left_open(data: Path) -> str:
+def data_folder_warning(data: Path) -> str:
     """Sentences where others have rights to a data folder and a session does not take them away; else empty."""
     why = why_open(data)
-    return warning(data, why) if why else ""
+    return privacy_warning(data, why) if why else ""
 
 
 def _close(place: RealFolder, inside: bool) -> None:

@@ -39,7 +39,7 @@ class RealFolder:
     def erase_if_empty(self, name: str) -> None:
         """A folder inside this one."""
         with suppress(FileNotFoundError, NotADirectoryError):
-            with opened_folder(self, name) as inner:
+            with open_folder(self, name) as inner:
                 empty = not inner.names()
             if empty:
                 os.rmdir(self._at(name), dir_fd=self.descriptor)
@@ -54,7 +54,7 @@ class RealFolder:
 
 
 @contextmanager
-def opened_folder(where: Path | RealFolder, *names: str) -> Iterator[RealFolder]:
+def open_folder(where: Path | RealFolder, *names: str) -> Iterator[RealFolder]:
     """The folder `where`, or the one that `names` lead to from it, level by level.
 
     Raises NotADirectoryError where a level is a link or no folder, FileNotFoundError where there is none.

@@ -33,7 +33,7 @@ def write_bids(
         _text(folder / "code" / "protocol.toml", protocol_text),
         _json(folder / f"task-{task}_beh.json", {
             "TaskName": task,
-            **{column: _described(column) for column in columns(Trial) if column not in FIXED},
+            **{column: _describe_column(column) for column in columns(Trial) if column not in FIXED},
         }),
     ]  # fmt: skip
     subjects = list(dict.fromkeys(trial.subject for trial in trials))
@@ -53,7 +53,7 @@ def _tsv(trials: Sequence[Trial]) -> str:
     return "".join("\t".join(line[number] or "n/a" for number in kept) + "\n" for line in lines)
 
 
-def _described(column: str) -> dict[str, str]:
+def _describe_column(column: str) -> dict[str, str]:
     words, unit = TRIAL_COLUMNS[column]
     return {"Description": words, **({"Units": unit} if unit else {})}
 

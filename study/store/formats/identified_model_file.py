@@ -18,7 +18,7 @@ from study.store.disk.hdf5_attributes import (
     texts_attribute,
     write_texts,
 )
-from study.store.disk.hdf5_file import Problems, float_dataset, opened_hdf5, write_hdf5
+from study.store.disk.hdf5_file import Problems, float_dataset, open_hdf5, write_hdf5
 from study.store.disk.layout import Entry
 from study.store.disk.strict_json import load_json
 
@@ -56,7 +56,7 @@ LAYOUT = (
 def read_identified_model(path: Path) -> IdentifiedModel:
     """Raises CannotReadError, or UnusableFileError with everything that is wrong."""
     problems = Problems()
-    with opened_hdf5(path, KIND, FORMAT, VERSION) as file:
+    with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         parts = _parts(file, problems)
     if problems.found:
         raise UnusableFileError(path, KIND, tuple(problems.found))
@@ -68,7 +68,7 @@ def read_identified_model(path: Path) -> IdentifiedModel:
 
 def is_identified_model(path: Path) -> bool:
     """By what the file says of itself. Raises StudyError for one that says nothing, or something else."""
-    with opened_hdf5(path, KIND, FORMAT, VERSION):
+    with open_hdf5(path, KIND, FORMAT, VERSION):
         return True
 
 

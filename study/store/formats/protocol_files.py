@@ -65,7 +65,7 @@ class LockedProtocolChangedError(StudyError):
         )
 
 
-def shipped_protocols() -> tuple[str, ...]:
+def list_shipped_protocols() -> tuple[str, ...]:
     """Names of the protocols that come with hapteq."""
     return tuple(
         sorted(entry.name.removesuffix(".toml") for entry in files("protocols").iterdir() if _is_toml(entry.name))
@@ -78,7 +78,7 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
     A lock beside the file or in `data` must be that of this very protocol. Raises WrongUseError (no such protocol),
     CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock).
     """
-    path = None if name in shipped_protocols() else _path_of(name)
+    path = None if name in list_shipped_protocols() else _path_of(name)
     text = (
         files("protocols").joinpath(f"{name}.toml").read_text("utf-8")
         if path is None
@@ -89,7 +89,7 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
         protocol = load_protocol(text, source)
     except ProtocolError as error:
         raise ProtocolRefusedError(source, error) from error
-    return ProtocolFile(protocol, text, path, _checked_lock(protocol, path, data))
+    return ProtocolFile(protocol, text, path, _find_lock(protocol, path, data))
 
 
 def read_study_protocol(name: str, data: Path | None = None) -> ProtocolFile[StudyProtocol]:
@@ -124,7 +124,7 @@ def lock_path(protocol: Protocol, folder: Path) -> Path:
     return folder / f"{protocol.name}.lock.json"
 
 
-def _checked_lock(protocol: Protocol, path: Path | None, data: Path | None) -> ProtocolLock | None:
+def _find_lock(protocol: Protocol, path: Path | None, data: Path | None) -> ProtocolLock | None:
     folders = [folder for folder in (data, path.parent if path else None) if folder is not None]
     locks = [_lock_at(lock_path(protocol, folder), protocol) for folder in folders]
     return next((lock for lock in locks if lock is not None), None)
@@ -149,12 +149,12 @@ def _path_of(name: str) -> Path:
     path = Path(name)
     if _is_toml(name) or path.parent != Path() or path.exists():
         return path
-    close = get_close_matches(name, shipped_protocols(), n=1)
+    close = get_close_matches(name, list_shipped_protocols(), n=1)
     guess = f" Did you mean {close[0]}?" if close else ""
     raise WrongUseError(
         title="There is no such protocol",
         happened=f"'{name}' is neither a file nor a shipped protocol.{guess}",
-        do_now=f"Give the path of a .toml file, or one of {', '.join(shipped_protocols())}.",
+        do_now=f"Give the path of a .toml file, or one of {', '.join(list_shipped_protocols())}.",
     )
 
 

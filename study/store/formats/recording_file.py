@@ -20,7 +20,7 @@ from study.store.disk.hdf5_attributes import (
     texts_attribute,
     write_texts,
 )
-from study.store.disk.hdf5_file import Problems, float_dataset, opened_hdf5, write_hdf5
+from study.store.disk.hdf5_file import Problems, float_dataset, open_hdf5, write_hdf5
 from study.store.disk.strict_json import load_json
 from study.store.formats.recording_layout import FORMAT, KIND, SEGMENT_FIELDS, VERSION
 
@@ -36,7 +36,7 @@ _PACK_ABOVE_BYTES = 2**18
 
 def read_recording(path: Path) -> Recording:
     """In SI units, checked. Raises CannotReadError, or UnusableFileError with everything that is wrong."""
-    with opened_hdf5(path, KIND, FORMAT, VERSION) as file:
+    with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         problems = Problems()
         rate_hz = problems.attempt(lambda: _rate(file), 1.0)
 

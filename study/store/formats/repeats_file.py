@@ -48,7 +48,7 @@ class Repeats:
 REPEATS: TypeAdapter[Repeats] = TypeAdapter(Repeats)
 
 
-def beside(forces: Path) -> Path:
+def repeats_path(forces: Path) -> Path:
     return forces.with_suffix(SUFFIX)
 
 

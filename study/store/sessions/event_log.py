@@ -32,7 +32,7 @@ class EventLog:
         """Raises FileExistsError rather than touch an existing log."""
         descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, PRIVATE_FILE)
         sync_folder(path.parent)
-        _own(descriptor, path)
+        _lock_file(descriptor, path)
         return cls(path, descriptor)
 
     @classmethod
@@ -48,7 +48,7 @@ class EventLog:
                 "Check the permissions of the session's folder.",
                 saved="Nothing was changed.",
             ) from problem
-        _own(descriptor, path)
+        _lock_file(descriptor, path)
         return cls(path, descriptor, chain=None)
 
     def append(self, event: Event) -> None:
@@ -136,7 +136,7 @@ def mend(path: Path, contents: LogContents) -> None:
         os.close(descriptor)
 
 
-def _own(descriptor: int, path: Path) -> None:
+def _lock_file(descriptor: int, path: Path) -> None:
     """A second lock, on the log itself: the lock file might be deleted while its holder still writes."""
     try:
         import fcntl
@@ -157,7 +157,7 @@ def _own(descriptor: int, path: Path) -> None:
 
 
 @contextlib.contextmanager
-def nobody_writes(path: Path) -> Iterator[None]:
+def hold_log_lock(path: Path) -> Iterator[None]:
     """Hold the lock of a log that is to be erased, where there is one. Raises StudyError while it is being written."""
     if not path.exists():
         yield

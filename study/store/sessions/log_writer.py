@@ -5,7 +5,7 @@ from pathlib import Path
 from study.store.disk.regular_file import open_regular
 
 
-def somebody_writes(log: Path) -> bool | None:
+def is_log_locked(log: Path) -> bool | None:
     """None where this cannot be known (no such locks here, no such log).
 
     Looking takes the lock for some microseconds, in which a program that wants it is refused: look seldom.

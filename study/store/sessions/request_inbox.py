@@ -105,7 +105,7 @@ class RequestInbox:
             raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(self._folder))
 
     def _take_one(self, name: str) -> Request | None:
-        request = _parsed(_content(self._folder / name))
+        request = _parse_request(_content(self._folder / name))
         if request is None and name.startswith(_STOP):
             request = StopAsked("experimenter")
         if request is None:
@@ -147,7 +147,7 @@ def _content(path: Path) -> bytes:
         os.close(descriptor)
 
 
-def _parsed(content: bytes) -> Request | None:
+def _parse_request(content: bytes) -> Request | None:
     try:
         document = load_json(content)
     except ValueError:

@@ -16,7 +16,7 @@ PATIENCE_S = 20.0
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def hold_session_lock(folder: Path) -> Iterator[None]:
     """Hold the session's lock. Raises StudyError at once where another program does."""
     lock = FileLock(folder / LOCK_NAME, mode=PRIVATE_FILE)
     try:
@@ -42,7 +42,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def places_locked(data: Path) -> Iterator[None]:
+def hold_places_lock(data: Path) -> Iterator[None]:
     """Hold the right to take a place in the balanced order; waits for others. Raises StudyError after PATIENCE_S."""
     lock = FileLock(data / PLACES_NAME, mode=PRIVATE_FILE)
     try:

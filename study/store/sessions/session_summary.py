@@ -20,7 +20,7 @@ def read_summary(folder: Path) -> dict[str, Any] | None:
     return summary
 
 
-def said_to_have(summary: dict[str, Any] | None) -> tuple[bool, int]:
+def closed_and_presentations(summary: dict[str, Any] | None) -> tuple[bool, int]:
     """Whether the session was closed when this was written, and how many presentations its log had."""
     if summary is None:
         return False, 0

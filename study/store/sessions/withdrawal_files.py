@@ -11,7 +11,7 @@ from typing import Any
 
 from study.errors import StudyError
 from study.store.disk.json_document import read_json, write_json
-from study.store.disk.real_folder import is_real_file, is_real_folder, opened_folder
+from study.store.disk.real_folder import is_real_file, is_real_folder, open_folder
 from study.store.sessions.archive import FOLDER, SessionFolder, withdrawal_file
 from study.store.sessions.session_lock import LOCK_NAME
 
@@ -53,7 +53,7 @@ def read_intent(data: Path, subject: str) -> Intent | None:
         return None
     try:
         left = read_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION)
-        sessions = {str(name): _begun(begun) for name, begun in left["sessions"].items() if _of(name, subject)}
+        sessions = {str(name): _parse_begun(begun) for name, begun in left["sessions"].items() if _of(name, subject)}
         derived = tuple(str(name) for name in left["derived"] if _inside(str(name)))
         return Intent(subject, str(left["withdrawn_utc"]), sessions, derived)
     except (StudyError, AttributeError, KeyError, TypeError):
@@ -75,14 +75,14 @@ def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
         return {}
 
 
-def begun_of_tombstone(folder: SessionFolder) -> Begun | None:
-    return _begun(read_tombstone(folder).get("begun"))
+def read_begun(folder: SessionFolder) -> Begun | None:
+    return _parse_begun(read_tombstone(folder).get("begun"))
 
 
-def not_erased(folder: SessionFolder) -> tuple[str, ...]:
+def remaining_entries(folder: SessionFolder) -> tuple[str, ...]:
     """What is still there in the folder of a session that was withdrawn; folders end in a slash. Raises nothing."""
     try:
-        with opened_folder(folder.path) as place:
+        with open_folder(folder.path) as place:
             names = [name for name in place.names() if name not in (folder.tombstone.name, LOCK_NAME)]
     except OSError:
         return ()
@@ -91,14 +91,14 @@ def not_erased(folder: SessionFolder) -> tuple[str, ...]:
 
 def how_to_finish(folder: SessionFolder) -> str:
     """Empty where a withdrawal left nothing; else what is still there, and the command that goes on."""
-    left = not_erased(folder)
+    left = remaining_entries(folder)
     if not left and folder.tombstone.exists() and not folder.withdrawal.exists():
         return ""
     still = f"Still there: {', '.join(left)}. " if left else ""
     return f"{still}Go on with: hapteq withdraw {folder.name} --data {folder.path.parent}"
 
 
-def _begun(left: Any) -> Begun | None:
+def _parse_begun(left: Any) -> Begun | None:
     try:
         return Begun(**left) if left else None
     except TypeError:

@@ -20,7 +20,7 @@ def note_written(source: Path, out: Path) -> None:
     """
     out, source = out.resolve(), source.resolve()
     data = source.parent if FOLDER.fullmatch(source.name) else source
-    known = written_elsewhere(data)
+    known = folders_written_elsewhere(data)
     beside = out.relative_to(data).parts if out.is_relative_to(data) else None
     found = beside is not None and (len(beside) < 2 or FOLDER.fullmatch(beside[0]) is not None)
     if found or out in known:
@@ -30,7 +30,7 @@ def note_written(source: Path, out: Path) -> None:
         write_atomically(data / WRITTEN_ELSEWHERE, os.fsencode(text), overwrite=True)
 
 
-def written_elsewhere(data: Path) -> tuple[Path, ...]:
+def folders_written_elsewhere(data: Path) -> tuple[Path, ...]:
     """Empty where nothing was noted, or the note cannot be read."""
     note = data / WRITTEN_ELSEWHERE
     if not is_real_file(note):

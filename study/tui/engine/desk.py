@@ -11,7 +11,7 @@ from study.devices.device import Device
 from study.errors import WrongUseError
 from study.local_clock import machine_zone
 from study.session.views.archive_views import HomeView
-from study.store.disk.privacy import left_open
+from study.store.disk.privacy import data_folder_warning
 from study.store.sessions.archive import SessionFolder, find_session
 from study.tui.engine.from_engine import (
     Diagnosis,
@@ -105,7 +105,7 @@ class Desk:
                 f"It goes on by itself with: hapteq resume {folder.path}",
                 saved="Nothing was changed.",
             )
-        if still_open := left_open(folder.path.parent):
+        if still_open := data_folder_warning(folder.path.parent):
             self._link.send(Trouble(still_open))
         if folded.state.closed:
             self._link.send(Preparing("Making the tables and the report."))

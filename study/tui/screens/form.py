@@ -22,7 +22,7 @@ from study.session.views.form_entry import (
     press,
     reply_of,
 )
-from study.session.views.form_views import Form, FormReply, missing
+from study.session.views.form_views import Form, FormReply, find_missing_fields
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.choice_row import ChoiceRow
@@ -186,7 +186,7 @@ class FormScreen(Screen[FormReply]):
         button.set_class(entry.field is None, "-at")
         if entry.field is None:
             button.scroll_visible(animate=False)
-        open_ones = len(missing(entry.form, reply_of(entry)))
+        open_ones = len(find_missing_fields(entry.form, reply_of(entry)))
         told = f"{open_ones} of {len(entry.given)} still open" if open_ones else "everything is answered"
         self.query_one("#top", Said).update(f"{entry.form.title}: {told}")
         self.query_one("#said", Said).update(_said(entry, all_answered=not open_ones))

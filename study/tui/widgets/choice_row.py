@@ -11,7 +11,7 @@ from textual.message import Message
 from textual.reactive import reactive
 from textual.widget import Widget
 
-from study.session.views.form_entry import moved, named_choice
+from study.session.views.form_entry import find_choice, move_mark
 
 GAP = 3
 
@@ -63,7 +63,7 @@ class ChoiceRow(Widget, can_focus=True):
     def on_key(self, event: Key) -> None:
         if event.key in ("up", "down") and self._moved_within(1 if event.key == "down" else -1):
             event.stop()
-        elif event.character and (named := named_choice(self._choices, event.character)) is not None:
+        elif event.character and (named := find_choice(self._choices, event.character)) is not None:
             event.stop()
             self._choose(named)
 
@@ -85,7 +85,7 @@ class ChoiceRow(Widget, can_focus=True):
         return len({y for _, y in self._places(self.size.width)}) > 1
 
     def action_move(self, step: int) -> None:
-        self.cursor = moved(self.cursor, step, len(self._choices))
+        self.cursor = move_mark(self.cursor, step, len(self._choices))
 
     def action_choose(self) -> None:
         if self.cursor is not None:
@@ -129,7 +129,7 @@ class ChoiceRow(Widget, can_focus=True):
 
     def _moved_within(self, step: int) -> bool:
         """Up and down go through choices that lie below each other, and at their ends to the next question."""
-        there = moved(self.cursor, step, len(self._choices), stay=False) if self.stacked else None
+        there = move_mark(self.cursor, step, len(self._choices), stay=False) if self.stacked else None
         if there is None:
             return False
         self.cursor = there

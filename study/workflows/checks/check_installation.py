@@ -17,7 +17,7 @@ from packaging.specifiers import SpecifierSet
 
 import study
 from study.session.views.views import DeviceFinding
-from study.store.disk.privacy import warning
+from study.store.disk.privacy import privacy_warning
 
 HAPTEQ = "hapteq"
 IMPORT_NAMES = ("study", "analysis", "equalizer", "protocols")
@@ -141,7 +141,7 @@ def check_privacy(data: Path) -> DeviceFinding:
     name = "Data rights"
     if not data.exists():
         return DeviceFinding(name, f"{data}: not there yet; it will be for this account alone", fine=True)
-    said = warning(data)
+    said = privacy_warning(data)
     value = f"{data}: open to other accounts" if said else f"{data}: for this account alone"
     return DeviceFinding(name, value, not said, said)
 

@@ -17,7 +17,7 @@ from study.devices.device import Device, Fault, Played
 from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
-from study.store.formats.repeats_file import beside
+from study.store.formats.repeats_file import repeats_path
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, repeated, write_repeated
 
 REST_S = 2.0
@@ -61,7 +61,7 @@ def _check(plan: RepeatPlan) -> None:
         )
     if plan.repeats < 1:
         raise _refused(f"{plan.repeats} repeats were asked for.", "Ask for one or more with --repeat N.")
-    for path in () if plan.out is None else (plan.out, beside(plan.out)):
+    for path in () if plan.out is None else (plan.out, repeats_path(plan.out)):
         if path.exists():
             raise _refused(f"{path} exists already, and results are never overwritten.", "Choose another --out.")
     if plan.out is not None and not plan.out.absolute().parent.is_dir():

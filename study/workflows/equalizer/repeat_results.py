@@ -14,7 +14,7 @@ from equalizer.tracking.learning.model_inverse import InverseOfLength
 from study.devices.device import DeviceSettings, Played
 from study.errors import StudyError
 from study.store.disk.provenance import gather_provenance
-from study.store.formats.repeats_file import Repeats, beside, read_repeats, write_repeats
+from study.store.formats.repeats_file import Repeats, read_repeats, repeats_path, write_repeats
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 
 
@@ -102,12 +102,12 @@ def write_repeated(plan: RepeatPlan, state: IterationState, interrupted: bool) -
         remark=state.remark,
         interrupted=interrupted,
     )
-    write_repeats(beside(plan.out), repeats, gather_provenance(seeds={"device": plan.seed}))
+    write_repeats(repeats_path(plan.out), repeats, gather_provenance(seeds={"device": plan.seed}))
 
 
 def earlier_forces(forces: Path, wanted: Trajectory, model_sha256: str) -> FloatArray:
     """(N, 3): what an earlier run found for the same trajectory and model. Raises StudyError for any other."""
-    document, table = read_repeats(beside(forces)), read_trajectory(forces)
+    document, table = read_repeats(repeats_path(forces)), read_trajectory(forces)
     found = {
         "another trajectory": document.trajectory_sha256 == trajectory_sha256(wanted),
         "another model": document.model_sha256 == model_sha256,
@@ -116,7 +116,7 @@ def earlier_forces(forces: Path, wanted: Trajectory, model_sha256: str) -> Float
     if wrong := [what for what, same in found.items() if not same]:
         raise StudyError(
             "The earlier forces cannot be gone on from",
-            f"{beside(forces).name} belongs to {' and '.join(wrong)}.",
+            f"{repeats_path(forces).name} belongs to {' and '.join(wrong)}.",
             "Leave it out to begin with the model's own forces.",
             saved="Nothing moved.",
         )

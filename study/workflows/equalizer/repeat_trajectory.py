@@ -18,7 +18,7 @@ from equalizer.tracking.workspace.feedforward_at_place import inverse_at
 from study.devices.device import DeviceSettings
 from study.errors import StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
-from study.store.formats.repeats_file import beside
+from study.store.formats.repeats_file import repeats_path
 from study.workflows.equalizer.equalize_trajectory import (
     EqualizedTrajectory,
     EqualizePlan,
@@ -60,7 +60,7 @@ class RepeatedTrajectory:
 
 def repeat_trajectory(plan: EqualizePlan, order: RepeatOrder, on_progress: OnProgress) -> RepeatedTrajectory:
     """Writes forces and repeats. Raises StudyError, before anything moves for what could not be repeated."""
-    check_free(plan.out, beside(plan.out))
+    check_free(plan.out, repeats_path(plan.out))
     solved = solve_trajectory(plan)
     _require_repeatable(solved.models)
     if solved.solved.loss is not None:
@@ -93,7 +93,7 @@ def repeated_summary(done: RepeatedTrajectory) -> dict[str, Any]:
     return {
         **summary(done.solved),
         "peak_n": _peak_n(found),
-        "repeats": str(beside(done.solved.plan.out)),
+        "repeats": str(repeats_path(done.solved.plan.out)),
         "errors": list(found.errors),
         "noise_floor": found.noise_floor,
         "kept": found.kept,

@@ -4,12 +4,12 @@ from collections.abc import Iterable
 
 from equalizer.signals.resampling import FLAT_TO
 from equalizer.signals.units import ALLOWED
-from protocols.document.schema import Node, resolved
+from protocols.document.schema import Node, resolve_reference
 from study.importing.arrays.csv_arrays import MOST_ROWS
 from study.importing.expressions.budget import DEEPEST, LARGEST, NUMBERS, WORK
 from study.importing.expressions.functions import FUNCTIONS
-from study.importing.map_format.map_toml import MAP_SCHEMA, allowed_in_map
-from study.importing.map_library import read_map, shipped_maps
+from study.importing.map_format.map_toml import MAP_SCHEMA, describe_allowed_in_map
+from study.importing.map_library import list_shipped_maps, read_map
 from study.store.disk.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES
 from study.store.disk.regular_file import TABLE_BYTES
 
@@ -163,7 +163,7 @@ def importing_markdown() -> str:
         *(_keys(_title(name, node), _table_of(node)) for name, node in _tables()),
         "## Maps that come with hapteq",
         "For public recordings; no data are in them. `--map NAME` takes one.",
-        _rows(("name", "files", "what"), (_shipped(name) for name in shipped_maps())),
+        _rows(("name", "files", "what"), (_shipped(name) for name in list_shipped_maps())),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -174,20 +174,24 @@ def _tables() -> list[tuple[str, Node]]:
 
 def _table_of(node: Node) -> Node:
     """The schema of a table, or of each of a list of tables; empty for plain values."""
-    inner = resolved(MAP_SCHEMA, node)
-    entries = resolved(MAP_SCHEMA, inner["items"]) if inner.get("type") == "array" else inner
+    inner = resolve_reference(MAP_SCHEMA, node)
+    entries = resolve_reference(MAP_SCHEMA, inner["items"]) if inner.get("type") == "array" else inner
     return entries if "properties" in entries else {}
 
 
 def _title(name: str, node: Node) -> str:
-    return f"`[[{name}]]`" if resolved(MAP_SCHEMA, node).get("type") == "array" else f"`[{name}]`"
+    return f"`[[{name}]]`" if resolve_reference(MAP_SCHEMA, node).get("type") == "array" else f"`[{name}]`"
 
 
 def _keys(title: str, table: Node) -> str:
     plain = [(key, node) for key, node in table["properties"].items() if table is not MAP_SCHEMA or not _table_of(node)]
     needed = table.get("required", ())
     rows = (
-        (f"`{key}`{' (needed)' if key in needed else ''}", allowed_in_map(node, key), node.get("description", ""))
+        (
+            f"`{key}`{' (needed)' if key in needed else ''}",
+            describe_allowed_in_map(node, key),
+            node.get("description", ""),
+        )
         for key, node in plain
     )
     return f"### {title}\n\n{_rows(('key', 'holds', 'meaning'), rows)}"

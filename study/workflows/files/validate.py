@@ -8,7 +8,7 @@ import numpy as np
 
 from study.errors import StudyError
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.privacy import warning
+from study.store.disk.privacy import privacy_warning
 from study.store.disk.regular_file import DOCUMENT_BYTES
 from study.store.disk.strict_json import load_json
 from study.store.disk.toml_text import TOML_BYTES, too_long_key
@@ -40,7 +40,7 @@ def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECO
     """Never raises for what is in a file or for one that is not there."""
     found = _validated(path, recognisers)
     folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
-    said = (warning(folder) for folder in folders if _is_folder(folder))
+    said = (privacy_warning(folder) for folder in folders if _is_folder(folder))
     return replace(found, notes=(*filter(None, said), *_notes(found)))
 
 

@@ -16,7 +16,7 @@ from study.session.state.state import SessionState
 from study.store.sessions.archive import SessionFolder, SessionWithdrawnError
 from study.store.sessions.event_log import LogContents, read_log
 from study.store.sessions.log_seal import check_seals
-from study.store.sessions.session_summary import SUMMARY_NAME, read_summary, said_to_have
+from study.store.sessions.session_summary import SUMMARY_NAME, closed_and_presentations, read_summary
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
 
 def _check_end(state: SessionState, folder: SessionFolder) -> None:
     """A log whose end was lost looks like that of an interrupted session; its results remember more."""
-    closed, presentations = said_to_have(read_summary(folder.path))
+    closed, presentations = closed_and_presentations(read_summary(folder.path))
     if closed or presentations > len(state.trials):
         what = "a finished session" if closed else f"{presentations} presentations"
         raise StudyError(

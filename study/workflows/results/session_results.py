@@ -19,7 +19,7 @@ from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME,
 from study.store.formats.trials_file import TRIALS_NAME, read_trials, write_trials
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.log_seal import SEAL_NAME, write_seal
-from study.store.sessions.session_lock import locked
+from study.store.sessions.session_lock import hold_session_lock
 from study.store.sessions.session_summary import SUMMARY_FORMAT, SUMMARY_NAME, SUMMARY_VERSION, read_summary
 from study.workflows.results.analysis_files import ANALYSIS_NAME
 from study.workflows.results.fold_session import FoldedSession, fold_session
@@ -74,7 +74,7 @@ def finish_tables(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ..
     """Write what is due, under the session's lock. Returns the names of these files. Raises StudyError."""
     due = due_results(folder, folded)
     if due:
-        with locked(folder.path):
+        with hold_session_lock(folder.path):
             write_tables(folder)
     return due
 

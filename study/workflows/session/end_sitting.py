@@ -7,7 +7,7 @@ from study.errors import DeviceError, LeftError, StudyError
 from study.session.facts.void_reasons import TOO_BUSY
 from study.session.views.counted import answers_are
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.session_lock import locked
+from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.results.analysis_files import ANALYSIS_NAME, is_analysis_of
 from study.workflows.results.fold_session import FoldedSession
 from study.workflows.results.session_results import REPORT_NAME, due_results, finish_tables, write_results, write_tables
@@ -43,7 +43,7 @@ def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalys
     due = (*due_results(folder, folded), *report)
     if not due:
         raise already_finished(folded.state, folder)
-    with locked(folder.path):
+    with hold_session_lock(folder.path):
         written = write_results(folder)
     said = f"{folder.name} had all its runs already; written now, because missing or out of date: {', '.join(due)}."
     return replace(written, warnings=(said, *written.warnings))

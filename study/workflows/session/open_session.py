@@ -17,7 +17,7 @@ from study.session.state.state import SessionState
 from study.store.disk.provenance import versions
 from study.store.sessions.archive import SessionFolder, new_session_folder
 from study.store.sessions.event_log import EventLog
-from study.store.sessions.session_lock import locked
+from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.session.equalize_stimuli import Equalized, keep_model
 from study.workflows.session.other_sessions import dose_before
 from study.workflows.session.participant_number import participant_number
@@ -82,7 +82,7 @@ def opened_session(
         dose_elsewhere=dose_before(folder, plan.observer, device.simulated, utc),
         rules=LATEST,
     )
-    with locked(folder.path):
+    with hold_session_lock(folder.path):
         keep_model(equalized, folder)
         log = EventLog.create(folder.log)
         try:

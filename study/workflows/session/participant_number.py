@@ -12,8 +12,8 @@ from study.session.state.state import SessionState
 from study.store.disk.regular_file import read_regular
 from study.store.sessions.archive import SessionFolder, session_folders
 from study.store.sessions.event_log import read_opening
-from study.store.sessions.session_lock import places_locked
-from study.store.sessions.withdrawal_files import Begun, begun_of_tombstone, read_intent
+from study.store.sessions.session_lock import hold_places_lock
+from study.store.sessions.withdrawal_files import Begun, read_begun, read_intent
 from study.workflows.trial.sitting import Sitting, record
 
 PLACED = b'"event":"place_taken"'
@@ -45,7 +45,7 @@ def participant_number(data: Path, subject: str, protocol: str, simulated: bool)
 def begun_in(folder: SessionFolder) -> Begun | None:
     """None where nothing was begun, or nothing can be read of it."""
     if folder.tombstone.exists():
-        return begun_of_tombstone(folder)
+        return read_begun(folder)
     intent = read_intent(folder.path.parent, folder.subject)
     if intent is not None and folder.name in intent.sessions:
         return intent.sessions[folder.name]
@@ -97,6 +97,6 @@ def take_place(state: SessionState, sitting: Sitting) -> SessionState:
     if not place_comes_later(state.opened) or state.takes_part:
         return state
     data = sitting.folder.path.parent
-    with places_locked(data):
+    with hold_places_lock(data):
         number = participant_number(data, state.opened.subject, state.protocol.name, simulated=False)
         return record(state, PlaceTaken(utc=sitting.clock.utc(), participant_number=number), sitting)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
-from study.store.disk.privacy import left_open
+from study.store.disk.privacy import data_folder_warning
 from study.store.formats.protocol_files import read_study_protocol
 from study.store.sessions.archive import SessionFolder, check_subject, session_folders
 from study.workflows.results.fold_session import fold_session
@@ -77,4 +77,4 @@ def plan_sitting(
         f"{unfinished.name} is not finished; hapteq resume {unfinished.path} goes on with it."
         for unfinished in unfinished_sessions(data, plan.subject, source.protocol.name)
     )
-    return SittingPlan(plan, (*unfinished_before, *filter(None, [left_open(data)])))
+    return SittingPlan(plan, (*unfinished_before, *filter(None, [data_folder_warning(data)])))

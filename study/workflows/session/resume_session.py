@@ -19,7 +19,7 @@ from study.session.facts.events import (
 from study.session.state.due_trial import labels_are_swapped
 from study.session.state.fold import apply
 from study.session.state.state import SessionState
-from study.session.stimulus.delivered import delivered
+from study.session.stimulus.delivered import measure_delivered
 from study.session.stimulus.stimulus import direction_vector
 from study.session.views.counted import answers_are
 from study.store.disk.privacy import close_data_folder, close_to_others
@@ -28,7 +28,7 @@ from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, mend
 from study.store.sessions.live_file import remove_live
 from study.store.sessions.request_inbox import RequestInbox
-from study.store.sessions.session_lock import locked
+from study.store.sessions.session_lock import hold_session_lock
 from study.store.sessions.trial_recordings import find_trial_recording, recording_name
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import write_tables
@@ -44,7 +44,7 @@ def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> 
     """An existing session, mended and locked as long as the context lasts."""
     close_data_folder(folder.path.parent)
     close_to_others(folder.path, inside=True)  # an earlier version left its files to everyone
-    with locked(folder.path):
+    with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
         # Yesterday's stop must not end today's sitting; from now on requests are heard. Nor does yesterday's live state
         # say anything of today, whatever its time is.
@@ -195,7 +195,7 @@ def _from_recording(
     logged = state.answered.health if state.answered is not None else None
     direction = label_of(presented.direction, labels_are_swapped(state.protocol, state.opened))
     vector = direction_vector(state.protocol.directions, direction)
-    values = delivered(recording, vector, presented.frequency_hz)
+    values = measure_delivered(recording, vector, presented.frequency_hz)
     return TrialMeasured(
         utc=clock.utc(),
         run=presented.run,

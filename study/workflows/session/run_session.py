@@ -3,7 +3,7 @@
 import contextlib
 from dataclasses import dataclass, replace
 
-from protocols.procedure.practice import practice_passed, practised, right_of_last
+from protocols.procedure.practice import add_answer, practice_passed, right_of_last
 from protocols.trial import Phase
 from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, StudyError
@@ -196,7 +196,7 @@ def _between_trials(after: AfterTrial, present: Present, before: SessionState, s
 
 
 def _practice_result(before: SessionState, correct: bool) -> PracticeResult:
-    settings, done = before.protocol.practice, practised(before.practice, correct)
+    settings, done = before.protocol.practice, add_answer(before.practice, correct)
     asked = min(settings.of_last, len(done.correct))
     return PracticeResult(practice_passed(settings, done), right_of_last(settings, done), asked)
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from study.errors import StudyError, WrongUseError
-from study.store.disk.real_folder import RealFolder, is_real_file, is_real_folder, opened_folder
+from study.store.disk.real_folder import RealFolder, is_real_file, is_real_folder, open_folder
 from study.store.sessions.archive import FOLDER, TOMBSTONE_NAME, SessionFolder, withdrawal_file
-from study.store.sessions.event_log import LOG_NAME, nobody_writes
-from study.store.sessions.session_lock import LOCK_NAME, locked
+from study.store.sessions.event_log import LOG_NAME, hold_log_lock
+from study.store.sessions.session_lock import LOCK_NAME, hold_session_lock
 from study.store.sessions.withdrawal_files import Intent, read_intent, write_intent, write_tombstone
-from study.store.sessions.written_elsewhere import written_elsewhere
+from study.store.sessions.written_elsewhere import folders_written_elsewhere
 from study.workflows.session.participant_number import begun_in
 from study.workflows.session.participant_traces import analysis_names, find_traces
 
@@ -83,7 +83,7 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
     data, subject = data.resolve(), withdrawal.subject
     folders = tuple(SessionFolder(data / name) for name in withdrawal.sessions)
     try:
-        with ExitStack() as held, opened_folder(data) as place:
+        with ExitStack() as held, open_folder(data) as place:
             for folder in folders:
                 _hold(folder, held)
             earlier = read_intent(data, subject)
@@ -104,7 +104,7 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
 
 def still_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
     """Sentences on copies outside the data folder, by what was noted when they were written."""
-    noted = [path for path in written_elsewhere(data) if path.exists()]
+    noted = [path for path in folders_written_elsewhere(data) if path.exists()]
     named = [path for path in noted if analysis_names(path, withdrawal.subject) is not False]
     return (*(f"Written with --out, and not erased: {path}" for path in named), ELSEWHERE)
 
@@ -116,13 +116,13 @@ def _hold(folder: SessionFolder, held: ExitStack) -> None:
     lock = folder.path / LOCK_NAME
     if lock.is_symlink():
         lock.unlink()
-    held.enter_context(locked(folder.path))
+    held.enter_context(hold_session_lock(folder.path))
     if is_real_file(folder.log):
-        held.enter_context(nobody_writes(folder.log))
+        held.enter_context(hold_log_lock(folder.log))
 
 
 def _erase_session(data: RealFolder, folder: SessionFolder) -> None:
-    with opened_folder(data, folder.name) as place:
+    with open_folder(data, folder.name) as place:
         for name in place.names():
             if name not in (TOMBSTONE_NAME, LOCK_NAME, LOG_NAME):
                 place.erase(name)
@@ -135,14 +135,14 @@ def _erase_derived(data: RealFolder, name: str) -> None:
     """And the folders that are empty then, up to the data folder."""
     *parents, last = PurePosixPath(name).parts
     try:
-        with opened_folder(data, *parents) as place:
+        with open_folder(data, *parents) as place:
             place.erase(last)
             place.sync()
     except (FileNotFoundError, NotADirectoryError):
         return  # gone already, or a link was put into its way: what that leads to is not ours
     while parents:
         *parents, last = parents
-        with opened_folder(data, *parents) as place:
+        with open_folder(data, *parents) as place:
             place.erase_if_empty(last)
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from protocols.trial import Phase, VoidCause
 from study.devices.device import Fault, Health, Played
-from study.session.facts.level_scale import amplitude
+from study.session.facts.level_scale import equalizer_amplitude
 from study.session.state.due_trial import Present
 from study.session.state.state import SessionState
 from study.session.stimulus.held_stimulus import HeldStimulus
@@ -91,7 +91,7 @@ def _stimulus(state: SessionState, present: Present, sitting: Sitting) -> HeldSt
         state.protocol.stimulus,
         direction_vector(state.protocol.directions, present.direction),
         present.frequency_hz,
-        present.polarity * amplitude(state.opened.equalized, present.level_n, present.frequency_hz),
+        present.polarity * equalizer_amplitude(state.opened.equalized, present.level_n, present.frequency_hz),
         sitting.equalizer,
         sitting.device.info.sample_rate_hz,
     )

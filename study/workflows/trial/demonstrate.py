@@ -3,7 +3,7 @@
 from protocols.procedure.schedule import demo_level_n, label_of
 from study.devices.device import Fault
 from study.session.facts.events import DemoFinished, DemoPlayed
-from study.session.facts.level_scale import amplitude
+from study.session.facts.level_scale import equalizer_amplitude
 from study.session.state.due_trial import labels_are_swapped
 from study.session.state.state import SessionState, felt
 from study.session.stimulus.stimulus import direction_angle_deg, direction_vector, held_stimulus
@@ -70,7 +70,7 @@ def _play(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial
             protocol.stimulus,
             direction_vector(protocol.directions, direction),
             frequency_hz,
-            amplitude(state.opened.equalized, level_n, frequency_hz),
+            equalizer_amplitude(state.opened.equalized, level_n, frequency_hz),
             sitting.equalizer,
             sitting.device.info.sample_rate_hz,
         )

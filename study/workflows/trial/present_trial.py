@@ -12,7 +12,7 @@ from study.session.facts.events import AnswerGiven
 from study.session.state.due_trial import Present, labels_are_swapped
 from study.session.state.progress import progress
 from study.session.state.state import SessionState, repeats_left
-from study.session.stimulus.delivered import delivered
+from study.session.stimulus.delivered import measure_delivered
 from study.session.stimulus.stimulus import AXES, direction_vector
 from study.session.views.views import HandleView, Question, Task, Unanswered, picture_of
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
@@ -115,7 +115,7 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
 def _close(state: SessionState, present: Present, played: Played, felt_whole: bool, sitting: Sitting) -> AfterTrial:
     correct = state.answered is not None and state.answered.answer == present.label
     vector = direction_vector(state.protocol.directions, present.direction)
-    values = delivered(played.recording, vector, present.frequency_hz) if played.recording else None
+    values = measure_delivered(played.recording, vector, present.frequency_hz) if played.recording else None
     verdict = judge(played.health, state.protocol.measurement, felt_whole)
     fault = played.health.fault
     leave = reason_to_leave(fault)

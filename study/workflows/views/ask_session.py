@@ -4,7 +4,7 @@ from study.devices.clock import Clock
 from study.errors import StudyError
 from study.session.watching.requests import NoteAsked, Request, StopAsked
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 
 HEARD_WITHIN_S = 3.0
@@ -17,7 +17,7 @@ def ask_session(folder: SessionFolder, request: Request, clock: Clock) -> bool:
 
     Raises StudyError where nothing runs, or where a stop or a pause was not heard.
     """
-    if somebody_writes(folder.log) is False:
+    if is_log_locked(folder.log) is False:
         raise StudyError(
             "This session is not running",
             f"No program has {folder.name} open, so there is nothing to stop or to pause.",

@@ -11,7 +11,7 @@ from study.session.views.archive_views import HomeView, ProtocolLine, SessionLin
 from study.session.views.printable import printable, printable_text
 from study.store.disk.toml_text import read_toml_text
 from study.store.formats.identified_model_file import is_identified_model, read_identified_model
-from study.store.formats.protocol_files import ProtocolRefusedError, read_protocol, shipped_protocols
+from study.store.formats.protocol_files import ProtocolRefusedError, list_shipped_protocols, read_protocol
 from study.store.sessions.archive import session_folders
 from study.workflows.views.session_line import session_line
 
@@ -20,7 +20,7 @@ def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
     """The shipped ones first, then files in the data folder and beside it."""
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
     found = [str(path) for place in places for path in _toml_files(place) if _says_study(path)]
-    lines = (protocol_line(name, data) for name in (*shipped_protocols(), *found))
+    lines = (protocol_line(name, data) for name in (*list_shipped_protocols(), *found))
     return tuple(line for line in lines if line is not None)
 
 

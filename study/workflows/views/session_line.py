@@ -19,7 +19,7 @@ from study.store.disk.regular_file import read_regular
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_opening
 from study.store.sessions.log_seal import is_sealed, seal_paths
-from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.session_summary import SUMMARY_NAME
 from study.store.sessions.withdrawal_files import how_to_finish, read_intent, read_tombstone
 from study.workflows.results.fold_session import fold_session
@@ -44,7 +44,7 @@ def session_line(folder: SessionFolder) -> SessionLine:
 
 def with_writer(line: SessionLine, folder: SessionFolder) -> SessionLine:
     """`running` where it is being written right now; the lock is looked at for some microseconds."""
-    if line.standing == "unfinished" and somebody_writes(folder.log):
+    if line.standing == "unfinished" and is_log_locked(folder.log):
         return replace(line, standing="running")
     return line
 

@@ -8,8 +8,8 @@ from study.store.disk.provenance import as_text
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, mend
 from study.store.sessions.log_seal import seal_log
-from study.store.sessions.log_writer import somebody_writes
-from study.store.sessions.session_lock import locked
+from study.store.sessions.log_writer import is_log_locked
+from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.results.fold_session import fold_session
 from study.workflows.views.ask_session import ask_session
 
@@ -28,9 +28,9 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
             "Type it again.",
             saved="Nothing was changed.",
         )
-    if somebody_writes(folder.log):
+    if is_log_locked(folder.log):
         return ask_session(folder, note, clock)
-    with locked(folder.path):
+    with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
         try:
             folded = fold_session(folder)

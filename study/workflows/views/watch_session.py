@@ -19,7 +19,7 @@ from study.store.disk.regular_file import TABLE_BYTES, open_regular
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import read_live
 from study.store.sessions.log_seal import read_seal, seal_paths
-from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.results.fold_session import protocol_of
 
@@ -134,7 +134,7 @@ class Follower:
             self._writer = None
         elif 60.0 * abs(minutes_between(self._probed_utc, now_utc)) >= PROBE_EVERY_S or not self._probed_utc:
             self._probed_utc = now_utc
-            self._writer = somebody_writes(self._folder.log)
+            self._writer = is_log_locked(self._folder.log)
         return self._writer
 
 

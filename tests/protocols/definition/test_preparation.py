@@ -9,7 +9,7 @@ from protocols.definition.exposure import CatchSettings, DetectionSettings
 from protocols.definition.preparation import PracticeSettings
 from protocols.document.hashing import TABLES_SINCE, protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
-from protocols.procedure.practice import PracticeState, practice_over, practice_passed, practised, right_of_last
+from protocols.procedure.practice import PracticeState, add_answer, practice_over, practice_passed, right_of_last
 from protocols.procedure.run_rules import staircase_rule
 from protocols.trial import Phase
 
@@ -19,7 +19,7 @@ SETTINGS = PracticeSettings(frequencies_hz=(15.0,), right_needed=3, of_last=4, t
 def after(*answers: bool) -> PracticeState:
     state = PracticeState()
     for answer in answers:
-        state = practised(state, answer)
+        state = add_answer(state, answer)
     return state
 
 

@@ -17,9 +17,9 @@ from protocols.procedure.schedule import (
     Draw,
     detection_direction,
     draw_trial,
+    draw_words,
     frequency_order,
     is_catch_trial,
-    keyed_words,
     label_of,
     labels_swapped,
     runs,
@@ -193,7 +193,7 @@ def test_polarity_can_be_held_positive():
 
 def test_draws_are_the_same_on_every_machine_and_for_all_time():
     """Sessions in the field are checked against these; numpy promises that SeedSequence does not change."""
-    assert keyed_words(1, (0, 0, 0), 1) == (12163234266317937517,)
+    assert draw_words(1, (0, 0, 0), 1) == (12163234266317937517,)
     assert [draw_trial(RANDOM, "random", 1, 0, trial, 0) for trial in range(3)] == [
         Draw(direction=2, polarity=-1),
         Draw(direction=2, polarity=-1),

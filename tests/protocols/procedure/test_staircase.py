@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocols.definition.staircase_rule import StaircaseRule, StepChange, StepPhase
-from protocols.procedure.staircase import Heading, StaircaseState, begin, finished, level_n, step, to_db, to_newton
+from protocols.procedure.staircase import Heading, StaircaseState, begin, is_finished, level_n, step, to_db, to_newton
 
 S1 = "111111011101110011111101110011101110"
 S2 = "11111101110011111101110111011101110"
@@ -51,7 +51,7 @@ def levels_db(rule: StaircaseRule, answers: str) -> list[float]:
 def until_finished(rule: StaircaseRule, answers: list[bool]) -> list[StaircaseState]:
     run = [begin(rule)]
     for correct in answers:
-        if finished(rule, run[-1]):
+        if is_finished(rule, run[-1]):
             break
         run.append(step(rule, run[-1], correct))
     return run
@@ -68,7 +68,7 @@ def test_check_sequences(published, change, answers, levels, turns, mean_db, geo
     assert sum(averaged) / 10 == pytest.approx(mean_db, abs=1e-9)
     assert to_newton(sum(averaged) / 10) == pytest.approx(geometric_n, abs=5e-6)
     assert sum(map(to_newton, averaged)) / 10 == pytest.approx(arithmetic_n, abs=5e-5)
-    assert finished(rule, end)
+    assert is_finished(rule, end)
 
 
 def test_reversal_levels_of_the_first_check_sequence(published):
@@ -108,7 +108,7 @@ def test_psychopys_decibel_staircase_is_one_of_ours():
 
 def test_the_thirteenth_reversal_ends_the_run_and_a_further_answer_is_refused(published):
     run = states(published, S1)
-    assert [finished(published, state) for state in run] == [False] * 36 + [True]
+    assert [is_finished(published, state) for state in run] == [False] * 36 + [True]
     with pytest.raises(ValueError, match="this run is finished: no answer can follow"):
         step(published, run[-1], True)
 
@@ -116,7 +116,7 @@ def test_the_thirteenth_reversal_ends_the_run_and_a_further_answer_is_refused(pu
 def test_a_trial_limit_ends_a_run_without_its_reversals(published):
     rule = replace(published, trial_limit=5)
     run = states(rule, "11111")
-    assert [finished(rule, state) for state in run] == [False] * 5 + [True]
+    assert [is_finished(rule, state) for state in run] == [False] * 5 + [True]
 
 
 def test_three_right_answers_split_by_a_wrong_one_do_not_lower_the_level(published):

@@ -6,7 +6,7 @@ import pytest
 
 from study.cli.main import main
 from study.errors import ExitCode
-from study.store.formats.protocol_files import shipped_protocols
+from study.store.formats.protocol_files import list_shipped_protocols
 
 pytestmark = pytest.mark.usefixtures("validated_here")
 
@@ -61,7 +61,7 @@ def test_validate_says_what_is_wrong_and_fails(run, data, tmp_path):
 def test_protocols_are_listed_and_explained(run):
     code, out, _ = run("protocol", "list")
     assert code == 0
-    assert [line.split()[0] for line in out.splitlines()] == list(shipped_protocols())
+    assert [line.split()[0] for line in out.splitlines()] == list(list_shipped_protocols())
     code, out, _ = run("protocol", "show", "direction_threshold")
     assert "staircase.step_change = after_reversal" in out
     assert "stimulus at most 3 N, spring and damper 1.5 N, all together 4.5 N" in out

@@ -59,9 +59,11 @@ def test_a_late_bar_draws_nothing_before_there_is_progress(monkeypatch):
 def test_every_shipped_recording_is_named_in_the_help(capsys):
     from protocols.definition.recording_protocol import RecordingProtocol
     from study.cli.main import main
-    from study.store.formats.protocol_files import read_protocol, shipped_protocols
+    from study.store.formats.protocol_files import list_shipped_protocols, read_protocol
 
     assert main(["record", "--help"]) == 0
     words = capsys.readouterr().out.replace(",", " ").replace("(", " ").replace(")", " ").split()
-    recordings = {name for name in shipped_protocols() if isinstance(read_protocol(name).protocol, RecordingProtocol)}
+    recordings = {
+        name for name in list_shipped_protocols() if isinstance(read_protocol(name).protocol, RecordingProtocol)
+    }
     assert recordings <= set(words)

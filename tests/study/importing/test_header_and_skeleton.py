@@ -6,7 +6,7 @@ from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map, header_problems
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_toml import parse_map
-from study.importing.map_format.signal_words import named, proposed_roles, unit_in
+from study.importing.map_format.signal_words import name_signal, propose_roles, unit_in
 from study.importing.map_skeleton import map_skeleton
 from study.store.disk.file_errors import UnusableFileError
 
@@ -84,7 +84,7 @@ def test_arrays_of_several_lengths_are_not_guessed_at(tmp_path):
 
 def test_a_reference_is_no_response(tmp_path):
     held = arrays(tmp_path, "t_s,u_V,y_m,y_ref_m")
-    roles = dict(zip(held.by_name, proposed_roles([named(name) for name in held.by_name]), strict=True))
+    roles = dict(zip(held.by_name, propose_roles([name_signal(name) for name in held.by_name]), strict=True))
     assert (roles["u_V"], roles["y_m"], roles["y_ref_m"]) == ("command", "response", "helper")
 
 
@@ -171,7 +171,7 @@ def test_a_completed_skeleton_is_a_map(tmp_path):
     ],
 )  # fmt: skip
 def test_quantity_and_unit_are_read_out_of_a_name(name, unit, quantity, sure):
-    found = named(name)
+    found = name_signal(name)
     assert (found.unit, found.quantity, found.sure) == (unit, quantity, sure)
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from study.errors import WrongUseError
-from study.importing.map_library import find_map, map_of_files, read_map, shipped_maps
+from study.importing.map_library import find_map, list_shipped_maps, map_of_files, read_map
 from study.store.disk.file_errors import UnusableFileError
 
 OWN = """
@@ -24,7 +24,7 @@ unit = "m/s^2"
 """
 
 
-@pytest.mark.parametrize("name", shipped_maps())
+@pytest.mark.parametrize("name", list_shipped_maps())
 def test_every_shipped_map_is_sound_and_says_what_it_is_of(name):
     found = read_map(name)
     assert found.map.title

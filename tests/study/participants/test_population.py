@@ -9,7 +9,7 @@ from scipy.stats import tukey_hsd
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.loading import load_protocol
 from protocols.procedure.schedule import draw_trial, runs
-from protocols.procedure.staircase import begin, finished, level_n, step, to_newton
+from protocols.procedure.staircase import begin, is_finished, level_n, step, to_newton
 from protocols.trial import Phase
 from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.observer import Felt, Observer
@@ -24,7 +24,7 @@ def sitting(protocol: StudyProtocol, observer: Observer, seed: int) -> dict[floa
     found, answered = {}, 0
     for run in runs(protocol, seed, 0):
         state = begin(protocol.staircase)
-        while not finished(protocol.staircase, state):
+        while not is_finished(protocol.staircase, state):
             draw = draw_trial(protocol.schedule, "random", seed, run.index, state.trials, 0)
             level = level_n(protocol.staircase, state)
             felt = Felt(run.index, state.trials, 0, run.phase, run.frequency_hz, level, draw.direction, answered)

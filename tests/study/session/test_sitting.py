@@ -39,7 +39,7 @@ from study.session.state.machine import (
 )
 from study.session.state.progress import progress
 from study.session.state.vibration_dose import a8_mps2
-from study.session.views.form_views import FormKind, FormReply, missing
+from study.session.views.form_views import FormKind, FormReply, find_missing_fields
 from study.session.views.forms import form_of, judge_form
 
 UTC = "2026-01-01T00:00:00.000+00:00"
@@ -301,9 +301,9 @@ def test_a_set_up_that_is_not_the_protocols_is_said(full):
 
 def test_a_form_knows_what_is_missing(full):
     form = form_of(full, FormKind.DEBRIEF)
-    assert [field.key for field in missing(form, FormReply({}))] == ["felt"]
-    assert [field.key for field in missing(form, FormReply({"felt": "maybe"}))] == ["felt"]
-    assert missing(form, FormReply({"felt": "no", "strategy": ""})) == ()
+    assert [field.key for field in find_missing_fields(form, FormReply({}))] == ["felt"]
+    assert [field.key for field in find_missing_fields(form, FormReply({"felt": "maybe"}))] == ["felt"]
+    assert find_missing_fields(form, FormReply({"felt": "no", "strategy": ""})) == ()
 
 
 def test_a_protocol_that_asks_nothing_has_no_forms(small_protocol):

@@ -10,7 +10,7 @@ from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, F
 from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, simulate_study
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, evidence, pack, play_run
 from protocols.definition.staircase_rule import StaircaseRule, StepChange, StepPhase
-from protocols.procedure.staircase import begin, finished, step
+from protocols.procedure.staircase import begin, is_finished, step
 from tests.analysis.conftest import PUBLISHED
 
 THREE = (StepPhase(8.0, 1), StepPhase(4.0, 2), StepPhase(2.0, 5))
@@ -33,10 +33,10 @@ def test_levels_and_reversals_are_those_of_step(rule, threshold_n):
         trials, reversals = play_run(pack(rule), who, seed, Track(level, side, right, turns))
         state = begin(rule)
         for index in range(trials):
-            assert not finished(rule, state)
+            assert not is_finished(rule, state)
             assert level[index] == pytest.approx(state.level_db, abs=1e-9)
             state = step(rule, state, bool(right[index]))
-        assert finished(rule, state)
+        assert is_finished(rule, state)
         np.testing.assert_allclose(turns[:reversals], state.reversal_levels_db, atol=1e-9)
 
 

@@ -10,7 +10,7 @@ from study.errors import LeftError, StudyError
 from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
 from study.evaluation.real.real_summary import real_lines
-from study.importing.model_library import model_for, shipped_models
+from study.importing.model_library import list_shipped_models, model_for
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.real_answer_file import read_real_answer
 from study.workflows.files.validate import validate_file
@@ -209,7 +209,7 @@ def test_a_model_that_nobody_has_is_refused_with_those_that_are_there(tmp_path: 
     with pytest.raises(StudyError) as refusal:
         model_for("haptic_padle", tmp_path)
     assert "haptic_paddle" in refusal.value.happened
-    assert all(model_for(name, tmp_path).is_file() for name in shipped_models())
+    assert all(model_for(name, tmp_path).is_file() for name in list_shipped_models())
 
 
 def test_faults_are_injected_under_a_seal_and_counted(folder: Path, tmp_path: Path) -> None:

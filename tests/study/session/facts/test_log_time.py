@@ -8,7 +8,7 @@ import pytest
 
 from protocols.definition.exposure import SittingLimits
 from study.session.facts.events import DemoPlayed, NoteTaken, SessionInterrupted, SessionResumed
-from study.session.facts.log_time import ClockStep, Moment, clock_step, passed_s
+from study.session.facts.log_time import ClockStep, Moment, clock_step, elapsed_s
 from study.session.state.fold import apply, begin_session
 from study.session.state.machine import limit_reached
 from study.session.state.sitting_state import NIGHT_H, dose_now, pass_time
@@ -145,8 +145,8 @@ def test_small_corrections_of_the_clock_are_not_worth_a_word():
     before = Moment(START.isoformat(), 0.0)
     late = Moment((START + timedelta(seconds=4)).isoformat(), 1.0)
     assert clock_step(before, late) is None
-    assert passed_s(before, late) == 1.0
-    assert passed_s(late, before) == 0.0
+    assert elapsed_s(before, late) == 1.0
+    assert elapsed_s(late, before) == 0.0
 
 
 @pytest.mark.parametrize(

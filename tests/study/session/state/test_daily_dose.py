@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 
 from study.session.facts.log_time import Moment
 from study.session.state.daily_dose import dose_elsewhere, with_dose_elsewhere
-from study.session.state.sitting_state import SittingState, dose_now, moved, pass_time
+from study.session.state.sitting_state import SittingState, dose_now, pass_time, start_motion
 from study.session.state.vibration_dose import Dose
 
 MORNING = datetime.fromisoformat("2026-01-01T08:00:00.000+00:00")
@@ -17,8 +17,8 @@ def at(hours: float) -> str:
 
 def session(began_h: float, ended_h: float, vibrated_s: float) -> SittingState:
     """The handle moved at its begin and at its end."""
-    begun = moved(SittingState(last=Moment(at(began_h))))
-    over = moved(pass_time(begun, Moment(at(ended_h))))
+    begun = start_motion(SittingState(last=Moment(at(began_h))))
+    over = start_motion(pass_time(begun, Moment(at(ended_h))))
     return replace(over, dose=Dose(10.0 * vibrated_s, vibrated_s, 0.0))
 
 
@@ -50,7 +50,7 @@ def test_what_was_found_counts_until_the_hand_has_rested_for_a_night():
     found = dose_elsewhere({"P01_001": session(0, 1, 20.0)}, "P01_002", at(2))
     fresh = with_dose_elsewhere(SittingState(last=Moment(at(2))), found)
     assert dose_now(fresh).vibrated_s == 20.0
-    shaken = replace(moved(fresh), dose=Dose(5.0, 5.0, 0.0))
+    shaken = replace(start_motion(fresh), dose=Dose(5.0, 5.0, 0.0))
     assert dose_now(shaken).vibrated_s == 25.0
     assert dose_now(pass_time(shaken, Moment(at(12.5)))).vibrated_s == 0.0
     assert with_dose_elsewhere(shaken, None).elsewhere.vibrated_s == 0.0

@@ -5,7 +5,7 @@ import pytest
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
-from study.session.stimulus.delivered import delivered
+from study.session.stimulus.delivered import measure_delivered
 
 RATE_HZ = 1000.0
 DIRECTION = np.array([0.0, -1.0, 1.0]) / np.sqrt(2)
@@ -22,7 +22,7 @@ def recording(n: int, along: float, off: float, phase: float = 0.0) -> Recording
 
 @pytest.mark.parametrize("phase", [0.0, 1.0, np.pi / 2])
 def test_along_and_off_the_direction_come_apart_at_any_phase(phase):
-    values = delivered(recording(1000, 4.0, 1.5, phase), DIRECTION, 25.0)
+    values = measure_delivered(recording(1000, 4.0, 1.5, phase), DIRECTION, 25.0)
     assert values.along_mps2 == pytest.approx(4.0)
     assert values.off_axis_mps2 == pytest.approx(1.5)
     assert values.displacement_mm == pytest.approx(1000 * 4.0 / (2 * np.pi * 25.0) ** 2)
@@ -32,7 +32,7 @@ def test_missed_ticks_are_left_out():
     whole = recording(1000, 4.0, 1.5)
     gaps = whole.response.samples.copy()
     gaps[[3, 40, 41, 500]] = np.nan
-    values = delivered(replace(whole, response=replace(whole.response, samples=gaps)), DIRECTION, 25.0)
+    values = measure_delivered(replace(whole, response=replace(whole.response, samples=gaps)), DIRECTION, 25.0)
     assert values.along_mps2 == pytest.approx(4.0)
     assert values.off_axis_mps2 == pytest.approx(1.5)
 
@@ -40,8 +40,8 @@ def test_missed_ticks_are_left_out():
 def test_a_recording_of_nothing_but_gaps_is_no_measurement():
     whole = recording(1000, 4.0, 1.5)
     nothing = replace(whole.response, samples=np.full((1000, 3), np.nan))
-    assert delivered(replace(whole, response=nothing), DIRECTION, 25.0) is None
+    assert measure_delivered(replace(whole, response=nothing), DIRECTION, 25.0) is None
 
 
 def test_less_than_a_period_is_no_measurement():
-    assert delivered(recording(30, 4.0, 0.0), DIRECTION, 25.0) is None
+    assert measure_delivered(recording(30, 4.0, 0.0), DIRECTION, 25.0) is None

@@ -11,7 +11,7 @@ from study.session.views.form_entry import (
     press,
     reply_of,
 )
-from study.session.views.form_views import Form, FormField, FormKind, missing
+from study.session.views.form_views import Form, FormField, FormKind, find_missing_fields
 
 YES_NO = ("yes", "no")
 EXCLUSION = Form(FormKind.EXCLUSION, "T", "", tuple(FormField(f"q{i}", f"Question {i}", YES_NO) for i in range(3)))
@@ -87,6 +87,6 @@ def test_no_key_touches_an_answer_other_than_that_under_the_cursor(keys, stacked
         after = typed(EXCLUSION, key, stacked=stacked, entry=entry)
         changed = [i for i in range(3) if after.given[i] != entry.given[i]]
         assert changed in ([], [entry.at])
-        assert not after.sent or missing(EXCLUSION, reply_of(after)) == ()
+        assert not after.sent or find_missing_fields(EXCLUSION, reply_of(after)) == ()
         assert not entry.sent or after == entry
         entry = after

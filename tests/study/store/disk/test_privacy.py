@@ -12,7 +12,7 @@ from study.cli.main import app
 from study.session.watching.live import Live
 from study.session.watching.requests import NoteAsked
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.privacy import close_to_others, left_open, make_folder, open_to_others
+from study.store.disk.privacy import close_to_others, data_folder_warning, make_folder, open_to_others
 from study.store.sessions.archive import new_session_folder
 from study.store.sessions.live_file import write_live
 from study.store.sessions.request_inbox import RequestInbox
@@ -108,8 +108,10 @@ def test_a_folder_that_is_not_closed_is_said(opened, why, monkeypatch, tmp_path)
         opened.chmod(0o2775)
     else:
         monkeypatch.chdir(opened)
-    assert left_open(opened).endswith(f"A session leaves them: {why}. Take them away: chmod 700 {opened}")
-    assert plan_sitting(str(CORPUS / "corpus_study.toml"), "P09", None, 3, opened).notes == (left_open(opened),)
+    assert data_folder_warning(opened).endswith(f"A session leaves them: {why}. Take them away: chmod 700 {opened}")
+    assert plan_sitting(str(CORPUS / "corpus_study.toml"), "P09", None, 3, opened).notes == (
+        data_folder_warning(opened),
+    )
     folder = new_session_folder(opened, "P09")
     assert open_to_others(opened)
     assert exposed(folder.path) == []
@@ -117,7 +119,7 @@ def test_a_folder_that_is_not_closed_is_said(opened, why, monkeypatch, tmp_path)
 
 def test_going_on_in_a_folder_that_is_not_closed_says_so(opened):
     opened.chmod(0o2775)
-    assert f"Note: {left_open(opened)}" in run("resume", "P04_001", "--data", opened)
+    assert f"Note: {data_folder_warning(opened)}" in run("resume", "P04_001", "--data", opened)
     assert exposed(opened / "P04_001") == []
 
 

@@ -7,7 +7,7 @@ import pytest
 from study.store.disk.file_errors import CannotReadError
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import PACKAGES, command_line, gather_provenance, sha256_of, versions
-from study.store.sessions.written_elsewhere import note_written, written_elsewhere
+from study.store.sessions.written_elsewhere import folders_written_elsewhere, note_written
 
 
 def test_parents_are_named_without_their_folder_and_with_their_content(tmp_path):
@@ -61,4 +61,4 @@ def test_copies_are_found_again_whatever_their_names_are(tmp_path):
     (tmp_path / "data").mkdir()
     for out in outs:
         note_written(tmp_path / "data", out)
-    assert written_elsewhere(tmp_path / "data") == tuple(outs)
+    assert folders_written_elsewhere(tmp_path / "data") == tuple(outs)

@@ -30,7 +30,7 @@ from study.store.formats.trials_file import read_trials
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, read_log, readable_events
 from study.store.sessions.live_file import read_live
-from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.log_writer import is_log_locked
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
 from study.workflows.views.list_sessions import home_view
@@ -118,7 +118,7 @@ def test_a_folder_of_sessions_is_listed_although_a_log_a_model_and_a_protocol_ar
     assert (line.standing, view.models) == ("unreadable", ())
     assert not any(entry.name.startswith(str(tmp_path)) for entry in view.protocols)
     folder = SessionFolder(data / "P01_001")
-    assert somebody_writes(folder.log) is None
+    assert is_log_locked(folder.log) is None
     assert read_live(folder.path) is None
     assert readable_events(folder.log) == ()
     with pytest.raises(StudyError):

@@ -13,11 +13,11 @@ from study.store.disk.file_errors import CannotReadError, CannotWriteError, Unus
 from study.store.formats.protocol_files import (
     LockedProtocolChangedError,
     ProtocolRefusedError,
+    list_shipped_protocols,
     lock_protocol,
     read_protocol,
     read_recording_protocol,
     read_study_protocol,
-    shipped_protocols,
 )
 
 WHEN = "2024-05-01T09:00:00+00:00"
@@ -46,8 +46,8 @@ def change(path: Path) -> None:
 def test_the_shipped_protocols_are_listed_and_each_can_be_read():
     studies, recordings = {"direction_threshold", "direction_training", "equalized_threshold"}, {"ellipsoid", "sweep"}
     recordings |= {"sweep_band", "sweep_study", "sweep_hand", "multisine"}
-    assert studies | recordings <= set(shipped_protocols())
-    for name in shipped_protocols():
+    assert studies | recordings <= set(list_shipped_protocols())
+    for name in list_shipped_protocols():
         found = read_protocol(name)
         assert (found.protocol.name, found.path, found.locked) == (name, None, False)
         assert f'name = "{name}"' in found.text
@@ -70,7 +70,7 @@ def test_an_unknown_name_is_refused_with_a_guess_and_the_list():
     assert caught.value.happened == (
         "'direction_treshold' is neither a file nor a shipped protocol. Did you mean direction_threshold?"
     )
-    assert caught.value.do_now.endswith(f"one of {', '.join(shipped_protocols())}.")
+    assert caught.value.do_now.endswith(f"one of {', '.join(list_shipped_protocols())}.")
     assert caught.value.exit_code is ExitCode.WRONG_USE
 
 

@@ -2,7 +2,7 @@ import pytest
 
 from study.errors import StudyError, WrongUseError
 from study.store.sessions.archive import check_subject, find_session, new_session_folder, session_folders
-from study.store.sessions.session_lock import locked
+from study.store.sessions.session_lock import hold_session_lock
 
 
 def test_every_session_gets_a_folder_of_its_own(tmp_path):
@@ -56,10 +56,10 @@ def test_a_data_folder_that_cannot_be_made_is_said_so(tmp_path):
 def test_a_session_has_one_writer(tmp_path):
     folder = new_session_folder(tmp_path, "P01")
     with (
-        locked(folder.path),
+        hold_session_lock(folder.path),
         pytest.raises(StudyError, match="running elsewhere.*Another program is writing to P01_001"),
-        locked(folder.path),
+        hold_session_lock(folder.path),
     ):
         raise AssertionError("two writers")
-    with locked(folder.path):
+    with hold_session_lock(folder.path):
         pass

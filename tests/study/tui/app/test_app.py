@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input
 
-from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.log_writer import is_log_locked
 from study.tui.app.app import HapteqApp
 from study.tui.app.app_start import AppStart
 from study.tui.engine.from_engine import Failed, Finished
@@ -171,7 +171,7 @@ def test_ctrl_c_lets_go_says_what_is_safe_and_the_session_goes_on(sitting, log):
 
     app = sitting(story)
     assert app.return_code == 130
-    assert somebody_writes(log) is False
+    assert is_log_locked(log) is False
 
 
 def test_an_engine_that_dies_leaves_a_panel_and_a_way_on(sitting, log):

@@ -13,7 +13,7 @@ import pytest
 from study.session.facts.void_reasons import SCREEN_LATE, SCREEN_SILENT
 from study.session.views.views import Answered
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
-from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.log_writer import is_log_locked
 from study.tui.engine.from_engine import Ask, Call, Close, Failed, Finished, Home, Session, Withdrawn
 from study.tui.engine.to_engine import (
     AskBeside,
@@ -86,7 +86,7 @@ def test_letting_go_ends_the_sitting_and_it_can_be_resumed(begun, order, session
     assert failure.error.saved == "2 answers are on disk."
     assert failure.path == str(session)
     assert failure.error.exit_code == 130
-    assert somebody_writes(session / "events.jsonl") is False
+    assert is_log_locked(session / "events.jsonl") is False
     begun.send(Reply(trial.number, Answered(1, time.monotonic())))
     begun.send(Resume("P01_001", "simulated", order.data))
     assert begun.wait_for(asks(Call.WELCOME)).shown.resumed_after == 2
@@ -174,7 +174,7 @@ def test_a_killed_engine_says_what_is_safe_and_how_to_go_on(begun, session):
     assert f"hapteq resume {session}" in failure.error.do_now
     assert failure.error.exit_code == 3
     assert begun.engine.dead
-    assert somebody_writes(session / "events.jsonl") is False
+    assert is_log_locked(session / "events.jsonl") is False
 
 
 def test_the_engine_hears_no_key_of_the_terminal_and_writes_nowhere(screen, order, capfd):

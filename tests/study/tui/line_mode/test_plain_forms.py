@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from study.devices.clock import RealClock
-from study.session.views.form_views import Form, FormField, FormKind, missing
+from study.session.views.form_views import Form, FormField, FormKind, find_missing_fields
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.tui.line_mode.line_input import LineInput
 from study.tui.line_mode.plain import PlainDisplay
@@ -25,7 +25,7 @@ def form(*fields: FormField) -> Form:
 
 def filled(typed, *fields: FormField) -> dict[str, str]:
     reply = typed.display.fill_in(form(*fields))
-    assert missing(form(*fields), reply) == ()
+    assert find_missing_fields(form(*fields), reply) == ()
     return reply.answers
 
 

@@ -20,7 +20,7 @@ from study.errors import DeviceError, LeftError, StudyError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import read_recording
-from study.store.formats.repeats_file import beside, read_repeats
+from study.store.formats.repeats_file import read_repeats, repeats_path
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan
 from study.workflows.equalizer.repeat_trajectory import RepeatOrder, repeat_trajectory, repeated_lines, repeated_summary
@@ -79,7 +79,7 @@ def changed(plan, tmp_path, **more) -> EqualizePlan:
 def refusal(plan, order=ORDER, error=StudyError) -> StudyError:
     with pytest.raises(error) as caught:
         repeat_trajectory(plan, order, unheard)
-    assert not plan.out.exists() and not beside(plan.out).exists()
+    assert not plan.out.exists() and not repeats_path(plan.out).exists()
     return caught.value
 
 
@@ -106,8 +106,8 @@ def test_convergence_is_tested_before_anything_is_played(done):
 def test_forces_and_how_they_were_found_are_written(done):
     out = done.solved.plan.out
     assert len(read_trajectory(out).signal) == 2000
-    assert read_repeats(beside(out)).errors == pytest.approx(done.repeated.errors)
-    assert repeated_summary(done)["repeats"] == str(beside(out))
+    assert read_repeats(repeats_path(out)).errors == pytest.approx(done.repeated.errors)
+    assert repeated_summary(done)["repeats"] == str(repeats_path(out))
 
 
 def test_a_later_run_goes_on_from_them(done, plan):
@@ -131,7 +131,7 @@ def test_interrupted_the_best_so_far_is_written(plan):
     with pytest.raises(LeftError) as caught:
         repeat_trajectory(plan, ORDER, leave)
     assert f"in {plan.out}" in caught.value.saved
-    assert read_repeats(beside(plan.out)).interrupted
+    assert read_repeats(repeats_path(plan.out)).interrupted
 
 
 def test_a_model_from_a_hand_is_not_repeated(plan, tmp_path):
@@ -197,6 +197,6 @@ def test_a_device_that_is_not_there_is_named(plan):
 
 
 def test_names_that_are_taken_are_refused_before_any_work(plan):
-    beside(plan.out).write_text("mine")
+    repeats_path(plan.out).write_text("mine")
     with pytest.raises(StudyError, match="never overwritten"):
         repeat_trajectory(plan, ORDER, unheard)

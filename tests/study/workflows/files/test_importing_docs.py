@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import signal as sg
 
-from study.importing.map_library import shipped_maps
+from study.importing.map_library import list_shipped_maps
 from study.workflows.recording.import_recording import ImportPlan, import_recording
 
 PAGE = (Path(__file__).parents[4] / "docs" / "importing.md").read_text("utf-8")
@@ -47,4 +47,4 @@ def test_the_example_aligns_two_loggers_and_says_so(tmp_path, velocity_mm_per_s)
 
 
 def test_every_shipped_map_is_on_the_page():
-    assert all(f"| `{name}` |" in PAGE for name in shipped_maps())
+    assert all(f"| `{name}` |" in PAGE for name in list_shipped_maps())

@@ -11,7 +11,7 @@ from protocols.trial import Trial
 from study.store.disk.csv_rows import rows_to_csv
 from study.store.disk.json_document import write_json
 from study.store.formats.identified_model_file import write_identified_model
-from study.store.formats.protocol_files import shipped_protocols
+from study.store.formats.protocol_files import list_shipped_protocols
 from study.store.formats.recording_file import write_recording
 from study.store.formats.thresholds_file import write_thresholds
 from study.workflows.files.file_content import FileContent
@@ -82,7 +82,7 @@ def test_a_mechanical_model_is_described_with_its_effects(tmp_path):
     )
 
 
-@pytest.mark.parametrize("name", shipped_protocols())
+@pytest.mark.parametrize("name", list_shipped_protocols())
 def test_the_shipped_protocols_are_sound(name):
     assert f"protocol '{name}'" in sound(SHIPPED / f"{name}.toml")
 

@@ -11,7 +11,7 @@ from study.session.facts.events import TrialMeasured, TrialPresented, TrialSpoil
 from study.session.views.views import Unanswered
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import read_log
-from study.store.sessions.session_lock import locked
+from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import write_tables
@@ -212,7 +212,7 @@ def test_a_log_without_an_opening_line_says_that_nothing_is_lost(sitter):
 def test_a_session_that_runs_elsewhere_is_not_touched(sitter):
     left = sitter.interrupted(after=2)
     before = left.folder.log.read_bytes()
-    with locked(left.folder.path), pytest.raises(StudyError, match="running elsewhere"):
+    with hold_session_lock(left.folder.path), pytest.raises(StudyError, match="running elsewhere"):
         sitter.resumed(left.folder)
     assert left.folder.log.read_bytes() == before
 

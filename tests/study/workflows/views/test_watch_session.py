@@ -15,7 +15,7 @@ from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import LOG_NAME, EventLog, read_log
 from study.store.sessions.live_file import write_live
-from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
@@ -164,15 +164,15 @@ def test_a_killed_session_is_not_running_and_one_that_writes_is(sitter):
     assert follow(folder.path).look(now()).standing == "not running"
     log = EventLog.reopen(folder.log)
     try:
-        assert somebody_writes(folder.log) is True
+        assert is_log_locked(folder.log) is True
         assert follow(folder.path).look(now()).standing == "running"
     finally:
         log.close()
-    assert somebody_writes(folder.log) is False
+    assert is_log_locked(folder.log) is False
 
 
 def test_whether_somebody_writes_a_missing_log_is_not_known(tmp_path):
-    assert somebody_writes(tmp_path / "events.jsonl") is None
+    assert is_log_locked(tmp_path / "events.jsonl") is None
 
 
 def test_a_fresh_live_state_saves_the_look_at_the_lock(sitter):
