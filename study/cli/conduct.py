@@ -22,7 +22,7 @@ from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting, finish_closed
 from study.workflows.session.plan_sitting import plan_sitting
-from study.workflows.session.simulated_participant import simulated_participant
+from study.workflows.session.simulated_participant import make_simulated_participant
 from study.workflows.trial.display import PersonsHand
 from study.workflows.trial.requests_port import QueuedRequests
 
@@ -86,7 +86,7 @@ def _participant(observer: str | None, seed: int, keys: AnswerKeys, clock: Clock
         yield Participant(display=display, hand=PersonsHand(), clock=clock, requests=requests)
         return
     with answer_count(f"simulated participant '{observer}'") as show_question:
-        yield simulated_participant(observer, seed, clock, on_question=show_question)
+        yield make_simulated_participant(observer, seed, clock, on_question=show_question)
 
 
 def _say_wait(observer: str | None) -> None:
@@ -94,14 +94,14 @@ def _say_wait(observer: str | None) -> None:
         typer.echo("Preparing the device (some ten seconds the first time) …", err=True)
 
 
-def simulated_code(observer: str) -> str:
+def code_of_simulated(observer: str) -> str:
     """Each kind of simulated participant by its own name, so that their sessions stay apart."""
     return "".join(c for c in observer if c.isascii() and c.isalnum())[:15] + "1"
 
 
 def _ask_subject(sitter: Sitter) -> str:
     if sitter.observer is not None:
-        return simulated_code(sitter.observer)
+        return code_of_simulated(sitter.observer)
     if sys.stdin is None or not sys.stdin.isatty():
         raise WrongUseError(
             "Whose answers are these?",

@@ -81,18 +81,18 @@ def diagnose(
     Writes diagnosis.json, improved.toml, report.html and figures.
     """
     from study.cli.progress import steps
-    from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, answered, written
+    from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, find_answer, write_answer
     from study.workflows.diagnosis.diagnosed_summary import answer_lines, file_lines, new_remarks, summary
 
     plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare)
     plan = replace(plan, seconds=seconds, discovery=discovery, effect_files=tuple(effect_file or ()))
     plan = replace(plan, force_constants=tuple(force_constant or ()))
     with steps("Diagnosing") as show:
-        answer = answered(plan, show)
+        answer = find_answer(plan, show)
     found = answer.findings
     # Said before it is drawn: the page takes a while.
     typer.echo(json.dumps(summary(found), indent=2) if as_json else "\n".join(answer_lines(found)))
     with steps("Diagnosing") as show:
-        complete = written(answer, show)
+        complete = write_answer(answer, show)
     if not as_json:
         typer.echo("\n".join((*new_remarks(complete.findings, found), *file_lines(out))))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 
 if TYPE_CHECKING:
     from study.workflows.equalizer.equalize_trajectory import EqualizePlan
@@ -38,7 +38,7 @@ def equalize(
     earlier: Annotated[
         Path | None, typer.Option("--from", help="Forces of an earlier run with --repeat, to go on from.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, callback=checked_seed, help="Seed of the simulated device's noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Turn wanted accelerations (time_s,ax,ay,az) into forces (time_s,fx,fy,fz), row by row.
@@ -50,7 +50,9 @@ def equalize(
     _require_whole(files, repeat, device, earlier)
     *models, trajectory = files
     plan = EqualizePlan(tuple(models), trajectory, out, at, weight, cap, constrain, physics)
-    found, lines = _once(plan) if repeat is None or device is None else _repeated(plan, repeat, device, earlier, seed)
+    found, lines = (
+        _once(plan) if repeat is None or device is None else _play_repeatedly(plan, repeat, device, earlier, seed)
+    )
     typer.echo(json.dumps(found, indent=2) if as_json else "\n".join((str(out), *lines)))
 
 
@@ -79,18 +81,18 @@ def _once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ...]]":
     return summary(done), summary_lines(done)
 
 
-def _repeated(
+def _play_repeatedly(
     plan: "EqualizePlan", repeat: int, device: str, earlier: Path | None, seed: int
 ) -> "tuple[dict[str, Any], tuple[str, ...]]":
     from study.cli.progress import late_bar
     from study.workflows.equalizer.repeat_trajectory import (
         RepeatOrder,
+        repeat_lines,
+        repeat_summary,
         repeat_trajectory,
-        repeated_lines,
-        repeated_summary,
     )
 
     order = RepeatOrder(repeat, device, earlier, seed)
     with late_bar("Plays", total=repeat + 1) as show:
         done = repeat_trajectory(plan, order, lambda number, share: show(number + share))
-    return repeated_summary(done), repeated_lines(done)
+    return repeat_summary(done), repeat_lines(done)

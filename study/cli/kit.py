@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from study.cli.command_groups import CommandGroups
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 
 app = typer.Typer(
     cls=CommandGroups,
@@ -23,7 +23,7 @@ def draw(
     out: Annotated[Path, typer.Option(help="The table to write, LABELS.csv; for the one who changes the device.")],
     repeats: Annotated[int, typer.Option(min=1, max=20, help="Of each change; nothing is changed twice as often.")] = 2,
     seed: Annotated[
-        int | None, typer.Option(min=0, callback=checked_seed, help="Of the order [default: drawn at random].")
+        int | None, typer.Option(min=0, callback=check_seed, help="Of the order [default: drawn at random].")
     ] = None,
 ) -> None:
     """Draw the order of the changes. The person who diagnoses must not see it."""

@@ -38,14 +38,14 @@ def look(
 
 def look_lines(found: "Overview", everything: bool) -> Iterable[str]:
     from analysis.reports.look_report import brief
-    from study.tui.text_rows import hanging
+    from study.tui.text_rows import wrap_hanging
 
     yield brief(found)
     yield from recording_lines(found)
     yield ""
     for check in found.checks:
         if everything or check.level != "fine":
-            yield from hanging(f"{check.level:6s}  {check.name}: {check.seen} {check.do}".rstrip(), 8, columns())
+            yield from wrap_hanging(f"{check.level:6s}  {check.name}: {check.seen} {check.do}".rstrip(), 8, columns())
     fine = sum(check.level == "fine" for check in found.checks)
     if not everything and fine:
         yield f"fine    {fine} further checks (--all shows them)"
@@ -54,11 +54,11 @@ def look_lines(found: "Overview", everything: bool) -> Iterable[str]:
 
 def recording_lines(found: "Overview") -> Iterable[str]:
     """Courses, spectra, and tables of channels and segments."""
-    from study.tui.drawing.recording_drawing import course_lines, spectrum_lines
+    from study.tui.drawing.recording_drawing import spectrum_lines, time_series_lines
 
     yield ""
     for channel in found.channels:
-        yield from course_lines(channel)
+        yield from time_series_lines(channel)
     if found.spectra is not None:
         yield ""
         yield from spectrum_lines(found)
@@ -67,13 +67,13 @@ def recording_lines(found: "Overview") -> Iterable[str]:
 
 def _tables(found: "Overview") -> Iterable[str]:
     from analysis.wording import typeset
-    from study.tui.text_rows import aligned
+    from study.tui.text_rows import align_rows
 
     rows: list[tuple[str, ...]] = [("channel", "quantity", "unit", "lowest", "highest", "mean", "rms", "missing")]
     for summary in found.summaries:
         sizes = [typeset(f"{value:.4g}") for value in (summary.lowest, summary.highest, summary.mean, summary.rms)]
         rows.append((f"{summary.role} {summary.name}", summary.quantity, summary.unit, *sizes, str(summary.missing)))
-    yield from aligned(tuple(rows), columns())
+    yield from align_rows(tuple(rows), columns())
     segments = found.recording.segments
     if segments:
         yield ""
@@ -83,7 +83,7 @@ def _tables(found: "Overview") -> Iterable[str]:
             sizes = [f"{value:.4g}" for value in level.rms]
             times = (f"{level.start_s:.4g}", f"{level.duration_s:.4g}", str(level.period) if level.period else "")
             table.append((f"{level.number} {level.kind}", level.role, *times, *sizes))
-        yield from aligned(tuple(table), columns())
+        yield from align_rows(tuple(table), columns())
         if len(segments) > MOST_SEGMENTS:
             yield f"and {len(segments) - MOST_SEGMENTS} segments more"
 

@@ -202,7 +202,7 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:
         return ExitCode.ERROR
     except OSError as problem:
-        say(_refused_by_the_system(problem))
+        say(_system_error(problem))
         return ExitCode.ERROR
 
 
@@ -237,7 +237,7 @@ def as_typed(sentence: str) -> str:
     return re.sub(r"\bhapteq (?=[a-z]+ )", f"{started_as} ", sentence)
 
 
-def _refused_by_the_system(problem: OSError) -> StudyError:
+def _system_error(problem: OSError) -> StudyError:
     """What has no named error: a folder without rights, a full disk, a terminal that went away."""
     where = f" ({problem.filename})" if problem.filename else ""
     return StudyError(

@@ -5,14 +5,14 @@ from typing import Annotated
 
 import typer
 
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 
 
 def noise(
     out: Annotated[Path, typer.Argument(help="The sound to write, OUT.wav.")],
     minutes: Annotated[float, typer.Option(min=0.05, max=15, help="Length; it is made to be looped.")] = 5.0,
     seed: Annotated[
-        int, typer.Option(min=0, callback=checked_seed, help="Another seed gives other noise of the same kind.")
+        int, typer.Option(min=0, callback=check_seed, help="Another seed gives other noise of the same kind.")
     ] = 1,
     low_hz: Annotated[float, typer.Option(min=1, max=20_000, help="Lower corner.")] = 40.0,
     high_hz: Annotated[float, typer.Option(min=1, max=20_000, help="Upper corner.")] = 8000.0,

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 from study.errors import WrongUseError
 
 
@@ -24,7 +24,7 @@ def power(
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     protocol: Annotated[str, typer.Option(help="Protocol with staircase and frequencies.")] = "direction_threshold",
     out: Annotated[Path, typer.Option(help="Folder of the results; a broken run goes on there.")] = Path("power"),
-    seed: Annotated[int, typer.Option(min=0, callback=checked_seed, help="Seed of all draws.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of all draws.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate whole studies and count how often each analysis finds the difference. Run again, it goes on."""

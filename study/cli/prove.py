@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 
 if TYPE_CHECKING:
     from study.evaluation.bank.seal_cases import BankPlan
@@ -21,7 +21,7 @@ def prove(
     out: Annotated[Path, typer.Option(help="Folder of the bank and the results; new, or the one to go on with.")],
     cases: Annotated[int, typer.Option(min=1, max=100_000, help="How many devices are drawn.")] = 40,
     seed: Annotated[
-        int, typer.Option(min=0, callback=checked_seed, help="Seed of all draws but the salt of the labels.")
+        int, typer.Option(min=0, callback=check_seed, help="Seed of all draws but the salt of the labels.")
     ] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     brief: Annotated[bool, typer.Option("--brief", help="Short recordings: a quick look.")] = False,

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 
 
 def real(
@@ -30,7 +30,7 @@ def real(
             help="So many draws of faults, half of them of none, are injected under a seal, and looked for.",
         ),
     ] = 0,
-    seed: Annotated[int, typer.Option(min=0, callback=checked_seed, help="Of the draws of these faults.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Of the draws of these faults.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Diagnose a folder of real recordings: what was named, what is left, what an expert would object.

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 from study.cli.study import DeviceOption
 
 
@@ -25,7 +25,7 @@ def record(
         0.0,
         0.0,
     ),
-    seed: Annotated[int, typer.Option(min=0, callback=checked_seed, help="Seed of the simulated device's noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
 ) -> None:
     """Record the device's answer to an excitation. Interrupted, what is whole so far is written.
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption, show
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 from study.cli.study import ModelOption, ProtocolOption, protocol_or_default
 
 
@@ -14,9 +14,7 @@ def rehearse(
     subjects: Annotated[int, typer.Option(min=1, max=1000, help="How many simulated participants.")] = 10,
     out: Annotated[Path, typer.Option(help="Folder of the sessions and the report.")] = Path("rehearsal"),
     protocol: ProtocolOption = None,
-    seed: Annotated[
-        int, typer.Option(min=0, callback=checked_seed, help="Seed of the population and of all draws.")
-    ] = 1,
+    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the population and of all draws.")] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     model: ModelOption = None,
     as_json: JsonOption = False,

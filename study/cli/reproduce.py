@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 
 
 def reproduce(
@@ -15,7 +15,7 @@ def reproduce(
     ),
     subjects: Annotated[int, typer.Option(min=2, max=1000, help="How many simulated participants.")] = 10,
     seed: Annotated[
-        int, typer.Option(min=0, callback=checked_seed, help="Seed of the participants and of the sensor's noise.")
+        int, typer.Option(min=0, callback=check_seed, help="Seed of the participants and of the sensor's noise.")
     ] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     as_json: JsonOption = False,

@@ -26,7 +26,7 @@ def resume(
     from study.cli.screen import has_screen, open_screen
 
     answer_keys = parse_keys(keys)
-    if not plain and has_screen() and not _simulated(session, data):
+    if not plain and has_screen() and not _is_simulated(session, data):
         from study.tui.app.app_start import AppStart
         from study.tui.engine.to_engine import Resume
 
@@ -37,7 +37,7 @@ def resume(
     go_on(session, device=device, data=data, as_json=as_json, keys=answer_keys)
 
 
-def _simulated(session: str, data: Path) -> bool:
+def _is_simulated(session: str, data: Path) -> bool:
     """Whether its first line says that a simulated participant takes it: that one needs no screen."""
     from study.store.disk.regular_file import DOCUMENT_BYTES, open_regular
 

@@ -6,7 +6,7 @@ LARGEST_BITS = 128
 """`study.store.disk.strict_json` reads whole numbers of up to 40 digits."""
 
 
-def checked_seed(seed: int | None) -> int | None:
+def check_seed(seed: int | None) -> int | None:
     """Of an option. Raises WrongUseError."""
     if seed is not None and seed.bit_length() > LARGEST_BITS:
         raise WrongUseError(

@@ -39,7 +39,7 @@ def _table(lines: "tuple[SessionLine, ...]", remarks: bool, width: int | None) -
     from study.local_clock import machine_zone
     from study.session.views.local_time import local_column
     from study.tui.standing_words import standing_words
-    from study.tui.text_rows import aligned_rows
+    from study.tui.text_rows import lines_of_rows
 
     offset, begun = local_column([line.begun_utc for line in lines], machine_zone)
     header = ("session", "standing", f"begun ({offset})" if offset else "begun", "runs", "answers", "protocol")
@@ -54,7 +54,7 @@ def _table(lines: "tuple[SessionLine, ...]", remarks: bool, width: int | None) -
         )
         for line, when in zip(lines, begun, strict=True)
     ]
-    titles, *shown = aligned_rows((header, *rows), width)
+    titles, *shown = lines_of_rows((header, *rows), width)
     yield from titles
     for line, texts in zip(lines, shown, strict=True):
         yield from texts

@@ -75,13 +75,13 @@ def _folder(what: str, data: Path) -> Path:
 def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
     from study.tui.drawing.staircase_drawing import LEGEND
     from study.tui.standing_words import describe
-    from study.tui.text_rows import aligned
+    from study.tui.text_rows import align_rows
 
     yield describe(view.line)
     yield ""
-    yield from aligned(view.facts, columns())
+    yield from align_rows(view.facts, columns())
     if view.thresholds:
-        yield from ("", *aligned(view.thresholds, columns()))
+        yield from ("", *align_rows(view.thresholds, columns()))
     for warning in view.warnings:
         yield f"\nNote: {warning}"
     if view.staircases:
@@ -103,7 +103,7 @@ def _plot(staircase: "Staircase") -> Iterable[str]:
 
 
 def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
-    from study.tui.text_rows import aligned
+    from study.tui.text_rows import align_rows
 
     width = columns()
     inside = None if width is None else width - 2
@@ -118,7 +118,7 @@ def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
             yield from ("", title, *(f"  {sentence}" for sentence in sentences))
     for title, rows in (("Fit", view.fit), ("Mismatch", view.mismatch), ("What remains", view.remainder)):
         if rows:
-            yield from ("", title, *(f"  {row}" for row in aligned(rows, inside)))
+            yield from ("", title, *(f"  {row}" for row in align_rows(rows, inside)))
     yield ""
     yield from view.notes
     if view.next_experiment:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 from study.tui.keys.answer_keys import parse_keys
 
 DataOption = Annotated[Path, typer.Option("--data", help="Folder of all sessions.", show_default=True)]
@@ -45,7 +45,7 @@ def study(
     plain: PlainOption = False,
     data: DataOption = Path("data"),
     seed: Annotated[
-        int | None, typer.Option(min=0, callback=checked_seed, help="Seed of all draws; drawn and logged if not given.")
+        int | None, typer.Option(min=0, callback=check_seed, help="Seed of all draws; drawn and logged if not given.")
     ] = None,
     keys: KeysOption = "1,2",
     as_json: JsonOption = False,

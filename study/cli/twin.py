@@ -7,14 +7,14 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.seed import checked_seed
+from study.cli.seed import check_seed
 from study.cli.study import DeviceOption
 
 
 def twin(
     out: Annotated[Path, typer.Option(help="The mechanical model to write, MODEL.toml.")],
     device: DeviceOption = "simulated",
-    seed: Annotated[int, typer.Option(min=0, callback=checked_seed, help="Seed of the simulated device's noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
     protocol: Annotated[
         str, typer.Option(help="Recording protocol with multisines along x, y and z, or a file.")
     ] = "multisine",

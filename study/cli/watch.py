@@ -82,7 +82,7 @@ def _once(folder: Path, as_json: bool) -> None:
 
     from study.devices.clock import RealClock
     from study.errors import StudyError
-    from study.tui.text_rows import hanging
+    from study.tui.text_rows import wrap_hanging
     from study.tui.watch.watch_lines import LABEL_CELLS, changes
     from study.workflows.views.watch_session import follow
 
@@ -93,7 +93,7 @@ def _once(folder: Path, as_json: bool) -> None:
         typer.echo(json.dumps(asdict(view), indent=2))
         return
     for line in changes(None, view):
-        for text in hanging(line, LABEL_CELLS, columns()):
+        for text in wrap_hanging(line, LABEL_CELLS, columns()):
             typer.echo(text)
 
 

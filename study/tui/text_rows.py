@@ -9,33 +9,33 @@ LEAST_CELLS = 12
 """Width below which no column is narrowed: a line that is still too long is wrapped by the terminal."""
 
 
-def aligned(rows: Rows, columns: int | None = None) -> tuple[str, ...]:
+def align_rows(rows: Rows, columns: int | None = None) -> tuple[str, ...]:
     """A line per row, or several where cells wrap. Columns that hold numbers below the header stand on the right.
 
     columns: of the terminal, which the widest columns give way to; None = as wide as needed.
     """
-    return tuple(line for lines in aligned_rows(rows, columns) for line in lines)
+    return tuple(line for lines in lines_of_rows(rows, columns) for line in lines)
 
 
-def aligned_rows(rows: Rows, columns: int | None = None) -> Rows:
+def lines_of_rows(rows: Rows, columns: int | None = None) -> Rows:
     """As `aligned`, the lines of each row by themselves."""
     if not rows:
         return ()
     count = max(map(len, rows))
     full = [(*row, *("",) * (count - len(row))) for row in rows]
     right = [_are_numbers([row[place] for row in full[1:]]) for place in range(count)]
-    widths = _fitted([max(len(row[place]) for row in full) for place in range(count)], right, columns)
+    widths = _fit_widths([max(len(row[place]) for row in full) for place in range(count)], right, columns)
     return tuple(_lines(row, widths, right) for row in full)
 
 
-def hanging(line: str, indent: int, columns: int | None) -> tuple[str, ...]:
+def wrap_hanging(line: str, indent: int, columns: int | None) -> tuple[str, ...]:
     """One line wrapped to the terminal, what follows under the place `indent`."""
     if columns is None or len(line) <= columns:
         return (line,)
     return tuple(wrap(line, columns, subsequent_indent=" " * indent, break_on_hyphens=False))
 
 
-def _fitted(widths: list[int], right: list[bool], columns: int | None) -> list[int]:
+def _fit_widths(widths: list[int], right: list[bool], columns: int | None) -> list[int]:
     """The widest column of words gives way first, down to `LEAST_CELLS`."""
     widths = list(widths)
     while columns is not None and (excess := sum(widths) + len(GAP) * (len(widths) - 1) - columns) > 0:

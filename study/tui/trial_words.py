@@ -43,7 +43,7 @@ def plan(notice: Welcome) -> str:
     return f"There {'are' if notice.runs != 1 else 'is'} {runs}." if notice.runs else "This is a training session."
 
 
-def turned_away_words(outcome: Literal["refused", "excluded"]) -> tuple[str, ...]:
+def refusal_words(outcome: Literal["refused", "excluded"]) -> tuple[str, ...]:
     """The last words to a person who does not take part."""
     kept = "Nothing was played, and only this is kept."
     if outcome == "refused":

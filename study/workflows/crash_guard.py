@@ -1,11 +1,11 @@
-"""Whether a crash of one effect or one recording ends a run: not for people; for the project's own tests it does."""
+"""Whether a crash of one effect or recording ends a run: not for users, but in the project's own tests."""
 
 import os
 
 from analysis.diagnosis.search.guard import Guard
 
 STRICT = "HAPTEQ_STRICT"
-"""Set in the environment, a crash is an error."""
+"""If this environment variable is set, a crash is an error."""
 
 
 def crash_guard() -> Guard:

@@ -1,4 +1,4 @@
-"""What a study protocol asks of the device: limits, spring, what is kept of each recording."""
+"""Device settings of a study protocol: limits, spring, recorded part of each trial."""
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.device import DeviceSettings
@@ -6,6 +6,7 @@ from study.session.stimulus.limits import limits_of_study
 
 
 def device_settings(protocol: StudyProtocol, hand_on_handle: bool = True) -> DeviceSettings:
+    """The settings. hand_on_handle: whether a person holds the handle."""
     return DeviceSettings(
         limits=limits_of_study(protocol),
         spring_frequency_hz=protocol.spring.natural_frequency_hz,

@@ -1,9 +1,9 @@
-"""`map` over forked processes: a search hands compiled code little and Python much, so threads would wait for its lock.
+"""`map` over forked processes: for work in Python code, where threads would wait for the interpreter lock.
 
-A forked process has all that its work refers to, with nothing to be sent; results come back through a pipe. It takes
-the next piece whenever it is done with one, and so does the process that forked it. Work within work is done there.
+A forked process inherits all data; results come back through a pipe. Workers and the calling process take pieces one
+after another until none is left. Nested calls run serially.
 
-Forking beside numba is safe here: no kernel has `parallel=True` or `prange`, so numba starts no threads whose locks a
+Forking is safe beside numba here: no kernel has `parallel=True` or `prange`, so numba starts no threads whose locks a
 forked process would inherit.
 """
 
@@ -25,22 +25,22 @@ from equalizer.effects.effect import Effect, living_effects
 
 Result = TypeVar("Result")
 WORTH_S = 0.1
-"""Work that is shorter, as it was the last time, is done without forking: that takes a fifth of it."""
+"""Work that took less than this (s) the last time is done without forking: forking alone costs a fifth of it."""
 _TOKEN, _MOST_TOKENS = 4, 8192
-"""Bytes of a token in the pipe that pieces are taken from; and so many fit into it."""
+"""Bytes of a token in the pipe from which pieces are taken; number of tokens that fit into it."""
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""What may raise an exception in a program of ours, anywhere."""
+"""Signals that may raise an exception anywhere in our programs."""
 _mean_s: dict[CodeType | type, float] = {}
-"""How long a piece took, the last time that a function was mapped."""
+"""Mean duration of a piece (s) the last time a function was mapped."""
 _lost: set[CodeType | type] = set()
-"""Functions whose results could not be sent, or whose process died: forked again, they would be computed twice."""
+"""Functions whose results could not be sent, or whose process died: they are not forked again."""
 _spent_s = [0.0]
-"""By the processes that this one was forked from, until then."""
+"""Processor time of the processes from which this one was forked, until then."""
 _within: list[bool] = []
 
 
 def processor_s() -> float:
-    """Processor time of this work, in all processes that have ended and this one."""
+    """Processor time of this work (s), in this process and all ended children."""
     ended = os.times()
     return _spent_s[0] + process_time() + ended.children_user + ended.children_system
 
@@ -51,8 +51,8 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def forked_map(function: Callable[..., Result], *items: Iterable[Any], workers: int | None = None) -> list[Result]:
-    """As `map`, in the same order. What raises there raises here; left early, no process stays behind."""
+def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: int | None = None) -> list[Result]:
+    """As `map`, in the same order. Exceptions are raised here; no process is left behind."""
     pieces = list(zip(*items, strict=True))
     count = min(len(pieces), workers or cores())
     key = _key(function)
@@ -68,7 +68,7 @@ def forked_map(function: Callable[..., Result], *items: Iterable[Any], workers: 
 
 
 class _Shared:
-    """Pieces of work that several processes take one after the other."""
+    """Pieces of work that several processes take one after another."""
 
     def __init__(self, function: Callable[..., Any], pieces: Sequence[tuple[Any, ...]]) -> None:
         self._function, self._pieces = function, pieces
@@ -82,24 +82,24 @@ class _Shared:
     def with_others(self, others: int) -> list[Any]:
         children: list[tuple[int, int]] = []
         try:
-            while len(children) < others and self._forked(children):
+            while len(children) < others and self._fork_worker(children):
                 pass
             _within.append(True)
             try:
-                found = self._taken(guarded=False)
+                found = self._take_pieces(guarded=False)
             finally:
                 _within.pop()
             while children:
-                found.update(_received(children[0][1], self._known))
-                with _signals_held():
-                    _ended(*children.pop(0))
+                found.update(_receive(children[0][1], self._known))
+                with _hold_signals():
+                    _reap(*children.pop(0))
         finally:
-            with _signals_held():
+            with _hold_signals():
                 os.close(self._tokens)
                 for process, answers in children:
                     with suppress(ProcessLookupError):
                         os.kill(process, signal.SIGKILL)
-                    _ended(process, answers)
+                    _reap(process, answers)
         return self._in_order(found)
 
     def _in_order(self, found: dict[int, tuple[Any, Exception | None]]) -> list[Any]:
@@ -115,11 +115,11 @@ class _Shared:
             results.append(result)
         return results
 
-    def _forked(self, children: list[tuple[int, int]]) -> bool:
-        """Adds a process, and where its answers come from; False where the system gives no further one."""
+    def _fork_worker(self, children: list[tuple[int, int]]) -> bool:
+        """Start a process and append it with its pipe to `children`; False if the system refuses."""
         spent_s, parent = processor_s(), os.getpid()
         # An exception in between would leave a process that is in no list, or let it go on with its parent's work.
-        with _signals_held():
+        with _hold_signals():
             answers, end = os.pipe()
             try:
                 with warnings.catch_warnings():
@@ -149,12 +149,12 @@ class _Shared:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
         _within.append(True)
         _spent_s[0] = spent_s
-        sent = _packed(self._taken(guarded=True, parent=parent), self._known)
+        sent = _pack(self._take_pieces(guarded=True, parent=parent), self._known)
         with os.fdopen(end, "wb") as pipe:
             pipe.write(sent)
 
-    def _taken(self, guarded: bool, parent: int = 0) -> dict[int, tuple[Any, Exception | None]]:
-        """Results and errors, by number. guarded: an error is kept, and ends this share of the work."""
+    def _take_pieces(self, guarded: bool, parent: int = 0) -> dict[int, tuple[Any, Exception | None]]:
+        """Results and errors, by number. guarded: an error is kept and ends this process's share."""
         found: dict[int, tuple[Any, Exception | None]] = {}
         begun_s = perf_counter()
         while token := os.read(self._tokens, _TOKEN):
@@ -175,8 +175,8 @@ class _Shared:
 
 
 @contextmanager
-def _signals_held() -> Iterator[None]:
-    """They come when this is left."""
+def _hold_signals() -> Iterator[None]:
+    """Block the signals until the context is left."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
     try:
         yield
@@ -184,14 +184,14 @@ def _signals_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _ended(process: int, answers: int) -> None:
+def _reap(process: int, answers: int) -> None:
     os.close(answers)
     with suppress(ChildProcessError):
         os.waitpid(process, 0)
 
 
 def _key(function: Callable[..., Any]) -> CodeType | type:
-    """What functions have in common that are made anew for each map."""
+    """Identifies a function, also one that is created anew for each map."""
     inner = unwrap(function)
     while isinstance(inner, partial):
         inner = unwrap(inner.func)
@@ -199,7 +199,7 @@ def _key(function: Callable[..., Any]) -> CodeType | type:
 
 
 class _Pickler(pickle.Pickler):
-    """Effects stay what they are, however often they are sent: a forked process has them at the same addresses."""
+    """Effects are sent by their address, which is the same in a forked process."""
 
     def __init__(self, file: io.BytesIO, known: Mapping[int, Effect]) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
@@ -222,8 +222,8 @@ class _Unpickler(pickle.Unpickler):
         return self._known[pid]
 
 
-def _packed(found: dict[int, tuple[Any, Exception | None]], known: Mapping[int, Effect]) -> bytes:
-    """One after the other; what cannot be sent is left out."""
+def _pack(found: dict[int, tuple[Any, Exception | None]], known: Mapping[int, Effect]) -> bytes:
+    """Pickle the results one by one; those that cannot be pickled are left out."""
     whole = io.BytesIO()
     for number, answer in found.items():
         each = io.BytesIO()
@@ -235,7 +235,7 @@ def _packed(found: dict[int, tuple[Any, Exception | None]], known: Mapping[int, 
     return whole.getvalue()
 
 
-def _received(answers: int, known: Mapping[int, Effect]) -> dict[int, tuple[Any, Exception | None]]:
+def _receive(answers: int, known: Mapping[int, Effect]) -> dict[int, tuple[Any, Exception | None]]:
     with os.fdopen(answers, "rb", closefd=False) as pipe:
         sent = io.BytesIO(pipe.read())
     found: dict[int, tuple[Any, Exception | None]] = {}

@@ -1,4 +1,4 @@
-"""Before any work: nothing has the name yet under which its result is to be written, and there is a folder for it."""
+"""Check before any work that an output name is free and its folder exists."""
 
 from pathlib import Path
 
@@ -6,8 +6,8 @@ from study.errors import StudyError
 
 
 def require_free(out: Path, *beside: Path, title: str, kind: str, saved: str = "Nothing was written.") -> None:
-    """`beside`: what else is written into the same folder. title: what does not happen otherwise. kind: what is never
-    overwritten, in the plural. Raises StudyError."""
+    """Raise StudyError unless `out` is free. `beside`: what else is written into the same folder. title: what fails
+    otherwise. kind: what is never overwritten, in the plural."""
     for path in (out, *beside):
         if path.exists():
             happened = f"{path} exists already, and {kind} are never overwritten."

@@ -1,4 +1,4 @@
-"""Pictures of a report as files beside it: SVG for an editor, PNG for slides."""
+"""Figures of a report as files: SVG for editing, PNG for slides."""
 
 import io
 from collections.abc import Iterable, Sequence
@@ -10,14 +10,15 @@ from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import write_text
-from study.workflows.forked_map import forked_map
+from study.workflows.forked_map import map_forked
 
 FIGURE_DPI = 150
 
 
 def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
-    """Into `folder`, which is made. Folded pictures are too many for slides: SVG only. Raises CannotWriteError."""
-    drawn = forked_map(drawn_picture, pictures)
+    """Write into `folder`, which is created. Folded pictures are too many for slides and written as SVG only. Raises
+    CannotWriteError."""
+    drawn = map_forked(draw_picture, pictures)
     for picture, each in zip(pictures, drawn, strict=True):
         picture.drawn[:] = each.picture.drawn
     write_drawn(folder, drawn)
@@ -25,25 +26,26 @@ def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnPicture:
-    """Can be sent from another process."""
+    """A drawn picture that can be sent from another process."""
 
     picture: Picture
-    """Drawn; its figure is empty."""
+    """With its SVG text; its figure is empty."""
     png: bytes
 
 
-def drawn_picture(picture: Picture) -> DrawnPicture:
-    svg, png = _drawn(picture)
+def draw_picture(picture: Picture) -> DrawnPicture:
+    """Draw SVG and PNG; for a worker process."""
+    svg, png = _draw_files(picture)
     picture.drawn[:] = [svg]
     return DrawnPicture(without_figure(picture), png)
 
 
-def _drawn(picture: Picture) -> tuple[str, bytes]:
+def _draw_files(picture: Picture) -> tuple[str, bytes]:
     return picture_svg(picture), b"" if picture.folded else _png(picture)
 
 
 def write_drawn(folder: Path, drawn: Iterable[DrawnPicture]) -> None:
-    """As `write_pictures`."""
+    """Write pictures that are drawn already, as `write_pictures`. Raises CannotWriteError."""
     try:
         make_folder(folder)
     except OSError as problem:

@@ -1,4 +1,4 @@
-"""Processes for work that holds Python's lock: each begins clean, and what is being done is finished when left."""
+"""Worker processes for CPU-bound work, started clean (spawned); running work is finished on leaving."""
 
 import signal
 from collections.abc import Iterator
@@ -10,6 +10,7 @@ from multiprocessing import get_context
 @contextmanager
 def worker_processes(workers: int) -> Iterator[ProcessPoolExecutor]:
     # Forking a process with numba's threads in it is not safe; a spawned one starts clean.
+    """A process pool that ignores Ctrl-C in its workers."""
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _leave_ctrl_c_to_the_parent)
     try:
         yield pool
@@ -18,5 +19,5 @@ def worker_processes(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _leave_ctrl_c_to_the_parent() -> None:
-    """A terminal sends Ctrl-C to all."""
+    """Ignore Ctrl-C in a worker: a terminal sends it to all processes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

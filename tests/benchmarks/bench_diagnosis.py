@@ -15,7 +15,7 @@ from scipy.signal import StateSpace, lsim
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from equalizer.effects.catalogue import CATALOGUE
 from study.evaluation.challenge.draw_case import Case, draw_case
-from study.workflows.forked_map import forked_map, processor_s
+from study.workflows.forked_map import map_forked, processor_s
 
 SEED = 61
 EFFECTS = ((), ("sensor_lag",), ("force_saturation",), ("coulomb_friction",))
@@ -52,7 +52,7 @@ class Taken:
 
 def diagnosed(case: Case, without: tuple[str, ...] = (), times: int = 1) -> Taken:
     """times: of the recording, one after another."""
-    counted = Counted(forked_map)
+    counted = Counted(map_forked)
     wall, cpu = time.perf_counter(), processor_s()
     settings = DiagnosisSettings(without=without)
     found = diagnose([case.recording] * times, case.model, settings, counted, lambda what, share: None)

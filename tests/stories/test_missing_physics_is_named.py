@@ -15,7 +15,7 @@ from equalizer.effects.catalogue import CATALOGUE
 from equalizer.signals.recording import Recording
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import read_recording
-from study.workflows.forked_map import forked_map
+from study.workflows.forked_map import map_forked
 
 SEED = 11
 FRICTION = {"coulomb_friction": {"level": 0.1}}
@@ -118,7 +118,7 @@ def test_labelled_cases_are_named_right(shared, number):
     truth = json.loads((folder / f"open-{number:02d}.truth.json").read_text(encoding="utf-8"))
     recording = read_recording(folder / f"open-{number:02d}.h5")
     model = read_mechanical_model(folder / f"open-{number:02d}.toml")
-    found = diagnose([recording], model, DiagnosisSettings(), forked_map, quiet).diagnosis
+    found = diagnose([recording], model, DiagnosisSettings(), map_forked, quiet).diagnosis
     named = {(effect.effect, effect.axis) for effect in found.effects}
     assert {name for name, _ in named} == {each["effect"] for each in truth}
     assert {(name, axis) for name, axis in named if axis} <= {(each["effect"], each["axis"]) for each in truth}

@@ -27,9 +27,9 @@ from study.errors import StudyError
 from study.evaluation.real.real_folder import RealRecording
 from study.importing.build_recording import build_recording
 from study.importing.map_library import FoundMap
-from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, nothing_to_diagnose
-from study.workflows.diagnosis.fitted_first import first_model_of, fitted_model
-from study.workflows.forked_map import forked_map
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error
+from study.workflows.diagnosis.fitted_first import first_model_of, fit_linear_model
+from study.workflows.forked_map import map_forked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +72,7 @@ def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on
             time_left=time_left,
             guard=guard,
         )
-        found = diagnose((read.recording,), read.model, settings, forked_map, on_progress)
+        found = diagnose((read.recording,), read.model, settings, map_forked, on_progress)
         found = replace(found, remarks=(*read.remarks, *found.remarks))
         diagnosis = wanted.found.source.map.diagnosis
         names = (wanted.folder.name, wanted.name, wanted.found.source.map.title)
@@ -115,12 +115,12 @@ def _read(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: 
     diagnose."""
     on_progress("importing", 0.0)
     if why := wanted.found.source.map.diagnosis.skip:
-        raise nothing_to_diagnose((why,))
+        raise not_diagnosable_error((why,))
     # Of a real recording, for which there is no other, few cycles are a remark.
     try:
         ready = prepared((import_real_recording(wanted.found),), (wanted.name,), _is_plain(wanted), short=True)
     except NothingToDiagnose as refusal:
-        raise nothing_to_diagnose(refusal.problems) from refusal
+        raise not_diagnosable_error(refusal.problems) from refusal
     before = () if wanted.before is None else (import_real_recording(wanted.before),)
     every = same_position((*ready.recordings, *before))
     recording = every.recordings[0]
@@ -141,12 +141,14 @@ def _model(
     if given is None:
         alone = DiagnosisInput((recording,), (wanted.name,), wanted.found.files, ())
         if wanted.before is not None:
-            return FirstModel(*fitted_model(alone, lambda share: on_progress("fitting a linear model", 0.1 * share)))
+            return FirstModel(
+                *fit_linear_model(alone, lambda share: on_progress("fitting a linear model", 0.1 * share))
+            )
         return first_model_of(alone, (), bounds, lambda what, share: on_progress(what, 0.1 * share))
     try:
         require_model_of(given, (recording,))
     except NothingToDiagnose as refusal:
-        raise nothing_to_diagnose(refusal.problems) from refusal
+        raise not_diagnosable_error(refusal.problems) from refusal
     return FirstModel(given, ())
 
 

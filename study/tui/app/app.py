@@ -107,12 +107,12 @@ class HapteqApp(App[None]):
         said = event.said
         match said:
             case Finished():
-                self._end_sitting(outcomes.finished(said), said)
+                self._end_sitting(outcomes.completion_outcome(said), said)
             case Failed() if self._sitting is None:
                 self._archive.end_diagnosing()
-                self._panel(outcomes.failed(said, at_home=True), said.path)
+                self._panel(outcomes.failure_outcome(said, at_home=True), said.path)
             case Failed():
-                self._end_sitting(outcomes.failed(said, at_home=False), said)
+                self._end_sitting(outcomes.failure_outcome(said, at_home=False), said)
             case _ if self._sitting is not None:
                 await self._sitting.hear(said)
             case _:
@@ -214,7 +214,7 @@ class HapteqApp(App[None]):
     def on_trial_screen_replied(self, event: Any) -> None:
         reply: TrialReply = event.reply
         if self._sitting is not None:
-            self._sitting.replied(reply)
+            self._sitting.send_trial_reply(reply)
 
     async def on_begin_wanted(self, wanted: home_messages.BeginWanted) -> None:
         if self._sitting is not None:  # Enter twice: one sitting

@@ -25,7 +25,7 @@ UNHEARD = Outcome(
 )
 
 
-def failed(failure: Failed, at_home: bool) -> Outcome:
+def failure_outcome(failure: Failed, at_home: bool) -> Outcome:
     """at_home: it came up while nothing was going on, and the screen below goes on as before."""
     error = failure.error
     parts = (("What happened", error.happened), ("What is safe", error.saved), ("What to do now", error.do_now))
@@ -34,7 +34,7 @@ def failed(failure: Failed, at_home: bool) -> Outcome:
     return Outcome(error.title, told, ("resume", *way_on) if failure.path else way_on)
 
 
-def finished(end: Finished) -> Outcome:
+def completion_outcome(end: Finished) -> Outcome:
     results = end.results
     parts = (
         ("Thresholds", "\n".join(results.table)),

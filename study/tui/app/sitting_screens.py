@@ -101,7 +101,7 @@ class SittingScreens:
             case LookUpdate():
                 self._look(message)
             case Feedback(correct=correct) if self._trial is not None:
-                self._trial.saved()
+                self._trial.show_saved()
                 self._trial.show_feedback(correct)
             case Trouble(sentence=sentence):
                 self._trouble(sentence)
@@ -110,7 +110,7 @@ class SittingScreens:
             case Preparing(sentence=sentence):
                 await self.prepare(sentence)
 
-    def replied(self, reply: TrialReply) -> None:
+    def send_trial_reply(self, reply: TrialReply) -> None:
         """The trial's screen says so; it disarms itself."""
         self._reply(reply)
 
@@ -137,7 +137,7 @@ class SittingScreens:
             trial.arm(ask.shown)
             return
         self._shown = screen_for(ask, self._keys)
-        await self._app.push_screen(self._shown, partial(self._dismissed, ask.number))
+        await self._app.push_screen(self._shown, partial(self._reply_once_dismissed, ask.number))
         # Typed ahead, before what is asked here can have been read.
         self._forget_earlier()
 
@@ -156,7 +156,7 @@ class SittingScreens:
         if self._trial is None or self._shown is not None:
             self._app.notify(sentence, severity="warning", timeout=TROUBLE_FOR_S, markup=False)
 
-    def _dismissed(self, number: int, value: Any) -> None:
+    def _reply_once_dismissed(self, number: int, value: Any) -> None:
         if number == self._number:
             self._shown = None
             self._reply(value)
@@ -170,7 +170,7 @@ class SittingScreens:
         """Take off what was asked before, and whatever was opened over it (help, commands)."""
         self._number = 0
         if self._trial is not None:
-            self._trial.saved()  # the engine goes on only when the answer is on the disk
+            self._trial.show_saved()  # the engine goes on only when the answer is on the disk
             self._trial.disarm()
         shown, self._shown = self._shown, None
         while shown is not None and shown in self._app.screen_stack:

@@ -78,7 +78,7 @@ class Canvas:
         bottom = min(self.height - 1, math.floor(max(y for _, y in corners)))
         sides = list(zip(corners, [*corners[1:], corners[0]], strict=True))
         for y in range(top, bottom + 1):
-            crossings = [_crossing(a, b, y) for a, b in sides if min(a[1], b[1]) <= y <= max(a[1], b[1])]
+            crossings = [_edge_crossing_x(a, b, y) for a, b in sides if min(a[1], b[1]) <= y <= max(a[1], b[1])]
             for x in range(math.ceil(min(crossings)), math.floor(max(crossings)) + 1):
                 self.dot(x, y)
 
@@ -90,6 +90,6 @@ class Canvas:
         return self._cells[row * self.columns : (row + 1) * self.columns]
 
 
-def _crossing(a: Point, b: Point, y: float) -> float:
+def _edge_crossing_x(a: Point, b: Point, y: float) -> float:
     """x at which the side from a to b passes the height y."""
     return a[0] if a[1] == b[1] else a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])

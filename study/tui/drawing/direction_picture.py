@@ -23,16 +23,16 @@ def sentence(picture: DirectionPicture, number: int) -> str:
     return f"{number}: {_end(picture.plane, angle)} to {_end(picture.plane, angle + 180)}"
 
 
-def drawing(picture: DirectionPicture, columns: int = 18, rows: int = 9) -> list[str]:
+def draw_directions(picture: DirectionPicture, columns: int = 18, rows: int = 9) -> list[str]:
     """Both directions side by side: 1 solid, 2 dashed, each with its number below."""
-    left = _one(picture.plane, picture.angle_deg[0], columns, rows, dashed=False)
-    right = _one(picture.plane, picture.angle_deg[1], columns, rows, dashed=True)
+    left = _draw_direction(picture.plane, picture.angle_deg[0], columns, rows, dashed=False)
+    right = _draw_direction(picture.plane, picture.angle_deg[1], columns, rows, dashed=True)
     numbers = f"{'1'.center(columns)}    {'2'.center(columns)}"
     return [f"{a}    {b}".rstrip() for a, b in zip(left, right, strict=True)] + [numbers.rstrip()]
 
 
 @lru_cache(maxsize=64)
-def large_drawing(picture: DirectionPicture, number: int, columns: int, rows: int) -> tuple[str, ...]:
+def draw_large_direction(picture: DirectionPicture, number: int, columns: int, rows: int) -> tuple[str, ...]:
     """One direction as large as fits: a thick segment with a head at both ends; 1 is solid, 2 is dashed."""
     canvas = Canvas(columns, rows)
     right, up = _on_screen(picture.plane, picture.angle_deg[number - 1])
@@ -68,7 +68,7 @@ def _dashes(half_length: float, dash: float, gap: float) -> list[tuple[float, fl
     return [(begin, begin + stretch * dash) for begin in begins]
 
 
-def _one(plane: str, angle_deg: float, columns: int, rows: int, dashed: bool) -> list[str]:
+def _draw_direction(plane: str, angle_deg: float, columns: int, rows: int, dashed: bool) -> list[str]:
     canvas = Canvas(columns, rows)
     right, up = _on_screen(plane, angle_deg)
     cx, cy = (canvas.width - 1) / 2, (canvas.height - 1) / 2

@@ -15,11 +15,11 @@ _DECADES = 4.0
 """Of a spectrum's amplitude, below its highest."""
 
 
-def course_lines(channel: Channel) -> Iterable[str]:
+def time_series_lines(channel: Channel) -> Iterable[str]:
     """From the lowest to the highest sample of each column of dots, with both ends beside it."""
     known = channel.known
     if not known.size:
-        yield f"{_named(channel)} {'':{COLUMNS}} no samples"
+        yield f"{_channel_label(channel)} {'':{COLUMNS}} no samples"
         return
     canvas = Canvas(COLUMNS, ROWS)
     low, high = float(known.min()), float(known.max())
@@ -29,7 +29,7 @@ def course_lines(channel: Channel) -> Iterable[str]:
             from_y, to_y = (round((high - value) / span * (canvas.height - 1)) for value in (top, bottom))
             canvas.line((x, from_y), (x, to_y))
     first, last = canvas.lines()
-    yield f"{_named(channel)} {first:{COLUMNS}} {in_unit(high, channel.unit)}".rstrip()
+    yield f"{_channel_label(channel)} {first:{COLUMNS}} {in_unit(high, channel.unit)}".rstrip()
     yield f"{'':{LABEL}} {last:{COLUMNS}} {in_unit(low, channel.unit)}".rstrip()
 
 
@@ -61,11 +61,11 @@ def spectrum_lines(found: Overview) -> Iterable[str]:
             if down <= 1:
                 canvas.line((x, round(down * (canvas.height - 1))), (x, canvas.height - 1))
         first, last = canvas.lines()
-        yield f"{_named(channel)} {first:{COLUMNS}} amplitude, {_DECADES:g} decades"
+        yield f"{_channel_label(channel)} {first:{COLUMNS}} amplitude, {_DECADES:g} decades"
         span = f"{frequency_hz[0]:.3g} to {frequency_hz[-1]:.4g} Hz"
         yield f"{'':{LABEL}} {last:{COLUMNS}} {span}"
 
 
-def _named(channel: Channel) -> str:
+def _channel_label(channel: Channel) -> str:
     name = f"{channel.role} {channel.name}"
     return f"{name[: LABEL - 1]:{LABEL}}"

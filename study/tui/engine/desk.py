@@ -71,7 +71,7 @@ class Desk:
             raise KeyboardInterrupt
         match command:
             case ShowHome() | ShowSession() | ShowDiagnosis():
-                self._link.send(_looked_up(command))
+                self._link.send(_read_view(command))
             case Begin(order=order):
                 self._begin(order)
             case Resume():
@@ -161,10 +161,10 @@ class Desk:
         self._link.send(_diagnosis(written))
 
 
-def _looked_up(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Session | Diagnosis:
+def _read_view(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Session | Diagnosis:
     match command:
         case ShowHome():
-            return Home(_offered(command))
+            return Home(_home_view(command))
         case ShowSession(path=path):
             return Session(session_view(Path(path), machine_zone))
         case ShowDiagnosis(path=path):
@@ -178,7 +178,7 @@ def _diagnosis(path: Path) -> Diagnosis:
     return Diagnosis(diagnosis_view(path))
 
 
-def _offered(wanted: ShowHome) -> HomeView:
+def _home_view(wanted: ShowHome) -> HomeView:
     """The start screen, with what the command line named in the first place."""
     view = home_view(Path(wanted.data))
     line = protocol_line(wanted.protocol, Path(wanted.data)) if wanted.protocol else None

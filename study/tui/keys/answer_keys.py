@@ -35,21 +35,21 @@ def parse_keys(text: str) -> AnswerKeys:
     """From "f,j": the key for 1, then the key for 2. Raises WrongUseError."""
     keys = [part.strip().casefold() for part in text.split(",")]
     if len(keys) != 2:
-        raise _refused(f"'{text}' names {len(keys)} of them")
+        raise _refusal(f"'{text}' names {len(keys)} of them")
     first, second = keys
     for key in keys:
         if len(key) != 1 or not key.isprintable():
-            raise _refused(f"'{key}' is {'nothing' if not key else 'more than one character'}")
+            raise _refusal(f"'{key}' is {'nothing' if not key else 'more than one character'}")
         if key in RESERVED:
-            raise _refused(f"'{key}' has another meaning in a trial")
+            raise _refusal(f"'{key}' has another meaning in a trial")
     if first == second:
-        raise _refused(f"'{first}' cannot stand for both")
+        raise _refusal(f"'{first}' cannot stand for both")
     if first == "2" or second == "1":
-        raise _refused("the digits 1 and 2 always stand for themselves")
+        raise _refusal("the digits 1 and 2 always stand for themselves")
     return AnswerKeys(first, second)
 
 
-def _refused(why: str) -> WrongUseError:
+def _refusal(why: str) -> WrongUseError:
     return WrongUseError(
         "These answer keys cannot be used",
         f"{why[0].upper()}{why[1:]}.",

@@ -72,7 +72,7 @@ class Conversation:
 
     def answer(self) -> Line:
         """The next line while nothing is played. Raises KeyboardInterrupt where no line can come any more."""
-        reply = self.wait(_nothing_is_played)
+        reply = self.wait(_keep_waiting)
         if isinstance(reply, WaitOver):
             raise KeyboardInterrupt
         return reply
@@ -84,7 +84,7 @@ class Conversation:
             raise KeyboardInterrupt
         return line
 
-    def overheard(self) -> Line | None:
+    def poll_line(self) -> Line | None:
         """A line that was typed meanwhile, without waiting for it. From a pipe never: the writer planned its
         lines for the questions that follow."""
         if not self._lines.interactive:
@@ -95,7 +95,7 @@ class Conversation:
             raise KeyboardInterrupt from None
         return None if text is None else Line(text, self.clock.now_s())
 
-    def nobody_left(self) -> bool:
+    def input_is_over(self) -> bool:
         """Whether the input has ended with no line left in it."""
         return self._lines.ended()
 
@@ -111,5 +111,5 @@ def shown(line: Line) -> str:
     return f"'{plain}'" if plain else "Enter alone"
 
 
-def _nothing_is_played() -> bool:
+def _keep_waiting() -> bool:
     return True

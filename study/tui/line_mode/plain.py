@@ -28,7 +28,7 @@ from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_mode import plain_demo, plain_forms, plain_pause, plain_question
 from study.tui.line_mode.conversation import Conversation
 from study.tui.line_mode.line_input import LineInput
-from study.tui.trial_words import progress_sentence, run_name, turned_away_words
+from study.tui.trial_words import progress_sentence, refusal_words, run_name
 from study.workflows.trial.display import SignOfLife
 
 
@@ -60,7 +60,9 @@ class PlainDisplay:
 
     def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
         if not self._demo_shown:
-            self._talk.say("", "Feel both directions, as often as you like:", *plain_question.pictured(menu.picture))
+            self._talk.say(
+                "", "Feel both directions, as often as you like:", *plain_question.picture_lines(menu.picture)
+            )
             self._demo_shown = True
         return plain_demo.choose_demo(menu, self._talk, self._keys, sign_of_life)
 
@@ -97,7 +99,7 @@ class PlainDisplay:
 
     def goodbye(self, notice: Goodbye) -> None:
         if notice.outcome:
-            self._talk.say("", *turned_away_words(notice.outcome))
+            self._talk.say("", *refusal_words(notice.outcome))
         elif notice.finished:
             self._talk.say("", f"Finished: {notice.answers} answers. Thank you.")
         else:

@@ -31,7 +31,7 @@ def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_li
         if line.word in ("", "done"):
             return DemoDone()
         if line.word in ("n", "b"):
-            vibration, said = _turned(menu, vibration, 1 if line.word == "n" else -1)
+            vibration, said = _step_vibration(menu, vibration, 1 if line.word == "n" else -1)
             talk.say(said)
             continue
         number = keys.answer(line.text)
@@ -62,7 +62,7 @@ def await_handle(look: Callable[[], HandleView], talk: Conversation, sign_of_lif
         if view.sentence != said and now_s - said_at_s >= SAY_AGAIN_S:
             talk.say(view.sentence)
             said, said_at_s = view.sentence, now_s
-        cut = NOBODY if talk.nobody_left() else _glance(talk, sign_of_life, GLANCE_S)
+        cut = NOBODY if talk.input_is_over() else _glance(talk, sign_of_life, GLANCE_S)
         if cut is not None:
             return cut
     return None
@@ -72,11 +72,11 @@ def _glance(talk: Conversation, sign_of_life: SignOfLife, seconds: float) -> Una
     talk.clock.sleep(seconds)
     if not sign_of_life():
         return CUT_SHORT
-    line = talk.overheard()
+    line = talk.poll_line()
     return {"q": LEFT, "p": PAUSE}.get(line.word) if line is not None else None
 
 
-def _turned(menu: DemoMenu, vibration: int, step: int) -> tuple[int, str]:
+def _step_vibration(menu: DemoMenu, vibration: int, step: int) -> tuple[int, str]:
     turned = vibration + step
     if turned < 1:
         return vibration, "This is the first vibration."

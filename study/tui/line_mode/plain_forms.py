@@ -16,7 +16,7 @@ def fill_in(form: Form, talk: Conversation) -> FormReply:
     at, changed = 0, False
     while True:
         if at == len(form.fields):
-            if not changed or _changes_confirmed(form, answers, talk):
+            if not changed or _confirm_changes(form, answers, talk):
                 return FormReply(answers)
             at, changed = 0, False
         field = form.fields[at]
@@ -29,7 +29,7 @@ def fill_in(form: Form, talk: Conversation) -> FormReply:
         at += 1
 
 
-def _changes_confirmed(form: Form, answers: dict[str, str], talk: Conversation) -> bool:
+def _confirm_changes(form: Form, answers: dict[str, str], talk: Conversation) -> bool:
     """False: they are asked again from the first."""
     talk.forget()
     told = ", ".join(f"{number} {answers[field.key]}" for number, field in enumerate(form.fields, start=1))
@@ -68,7 +68,7 @@ def _ask(field: FormField, place: str, talk: Conversation) -> str | None:
     while True:
         talk.prompt(_prompt(field, numbered))
         line = talk.answer()
-        answer = _understood(field, line, numbered)
+        answer = _parse_answer(field, line, numbered)
         if answer is not None:
             return answer
         if line.word == "q":
@@ -79,7 +79,7 @@ def _ask(field: FormField, place: str, talk: Conversation) -> str | None:
         talk.say(_refusal(field, line, numbered))
 
 
-def _understood(field: FormField, line: Line, numbered: bool) -> str | None:
+def _parse_answer(field: FormField, line: Line, numbered: bool) -> str | None:
     """None: no answer to this question."""
     text = printable(line.text)
     if not text:

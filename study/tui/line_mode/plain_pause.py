@@ -18,7 +18,7 @@ def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> fl
     if notice.progress is not None:
         talk.say(progress_sentence(notice.progress))
     started_s = talk.clock.now_s()
-    if _counted_down(started_s + notice.seconds, talk, sign_of_life):
+    if _count_down(started_s + notice.seconds, talk, sign_of_life):
         talk.forget()
         talk.say("Press Enter to go on.")
         line = talk.wait(sign_of_life)
@@ -80,7 +80,7 @@ def _take_note(adverse: bool, talk: Conversation, note: Callable[[NoteAsked], No
     talk.say("Written into the log.")
 
 
-def _counted_down(until_s: float, talk: Conversation, sign_of_life: SignOfLife) -> bool:
+def _count_down(until_s: float, talk: Conversation, sign_of_life: SignOfLife) -> bool:
     """Says every ten seconds how long it takes. False where the sign of life ended it."""
     say_at_s = float("-inf")
     while (left_s := until_s - talk.clock.now_s()) > 1e-9:

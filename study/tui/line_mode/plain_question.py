@@ -12,7 +12,7 @@ from study.session.views.views import (
     Unanswered,
     Welcome,
 )
-from study.tui.drawing.direction_picture import drawing, sentence
+from study.tui.drawing.direction_picture import draw_directions, sentence
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.line_mode.conversation import Conversation, Line, WaitOver, shown
 from study.tui.trial_replies import NO_REPEATS, PAUSE, REPEAT, repeat_words
@@ -30,9 +30,9 @@ def keys_sentence(keys: AnswerKeys) -> str:
     )
 
 
-def pictured(picture: DirectionPicture) -> tuple[str, ...]:
+def picture_lines(picture: DirectionPicture) -> tuple[str, ...]:
     """The drawing, and both directions in words."""
-    return (*drawing(picture), sentence(picture, 1), sentence(picture, 2))
+    return (*draw_directions(picture), sentence(picture, 1), sentence(picture, 2))
 
 
 def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
@@ -43,7 +43,7 @@ def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
     talk.say(
         "Hold the handle with a constant, comfortable grip. In each trial it shakes along one of two directions:",
         "",
-        *pictured(notice.picture),
+        *picture_lines(notice.picture),
         "",
         "Feel as long as you like, then type its number and Enter. When in doubt, guess.",
         plan(notice),
@@ -67,7 +67,7 @@ def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: 
         if isinstance(line, WaitOver):
             cause = VoidCause.LATE if line is WaitOver.TIME_LIMIT else VoidCause.FAULT
             return Unanswered(line.value, leave=line is WaitOver.INPUT_ENDED, cause=cause)
-        reply = understood(line, keys)
+        reply = parse_reply(line, keys)
         if reply is REPEAT:
             if question.repeats_left == 0:
                 talk.say(f"{NO_REPEATS} Type {keys.choice} and Enter; ? for help.")
@@ -76,13 +76,13 @@ def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: 
         if reply is not None:
             return reply
         if line.word == "?":
-            explanation = (INTERVALS,) if question.task is Task.INTERVAL else pictured(question.picture)
+            explanation = (INTERVALS,) if question.task is Task.INTERVAL else picture_lines(question.picture)
             talk.say(*explanation, keys_sentence(keys))
         else:
             talk.say(f"{shown(line)} is no answer. Type {keys.choice} and Enter; ? for help.")
 
 
-def understood(line: Line, keys: AnswerKeys) -> Reply | None:
+def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
     answer = keys.answer(line.text)
     if answer is not None:
         return Answered(answer, line.at_s)

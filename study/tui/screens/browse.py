@@ -85,7 +85,7 @@ class BrowseScreen(ModalScreen[None]):
             self._say(f"There is nothing at {path}.")
 
     @on(DirectoryTree.FileSelected)
-    def _picked(self, selected: DirectoryTree.FileSelected) -> None:
+    def _open_selected(self, selected: DirectoryTree.FileSelected) -> None:
         self._open(selected.path)
 
     def action_help(self) -> None:

@@ -81,13 +81,13 @@ class DiagnoseForm(ModalScreen[None]):
         named: dict[str, tuple[str, ...]] = {}
         for field in ("sources", "clean"):
             try:
-                named[field] = tuple(str(Path(word).expanduser()) for word in shlex.split(self._typed(field)))
+                named[field] = tuple(str(Path(word).expanduser()) for word in shlex.split(self._text_of(field)))
             except ValueError:
                 self._say("A quotation mark is open.", field)
                 return
         sources = named["sources"]
         model, out = (
-            str(Path(typed).expanduser()) if (typed := self._typed(name)) else "" for name in ("model", "out")
+            str(Path(typed).expanduser()) if (typed := self._text_of(name)) else "" for name in ("model", "out")
         )
         missing = next(((f, path) for f, paths in named.items() for path in paths if not Path(path).exists()), None)
         if not sources:
@@ -106,7 +106,7 @@ class DiagnoseForm(ModalScreen[None]):
     def action_leave(self) -> None:
         take_off(self, None)
 
-    def _typed(self, name: str) -> str:
+    def _text_of(self, name: str) -> str:
         return self.query_one(f"#{name}", Input).value.strip()
 
     def _say(self, text: str, field: str) -> None:

@@ -10,7 +10,7 @@ from textual.containers import Vertical
 from textual.screen import Screen
 from textual.widgets import Footer, ProgressBar, Static
 
-from study.tui.screens.preparing import TICK_S, elapsed
+from study.tui.screens.preparing import TICK_S, elapsed_words
 from study.tui.take_off import take_off
 
 HELP = """\
@@ -50,7 +50,7 @@ class DiagnosingScreen(Screen[bool]):
             box.border_title = "Diagnosing"
             yield Static(self._what, id="what", markup=False)
             yield ProgressBar(total=1.0, show_eta=False)
-            yield Static(elapsed(0.0), id="elapsed", markup=False)
+            yield Static(elapsed_words(0.0), id="elapsed", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -65,4 +65,4 @@ class DiagnosingScreen(Screen[bool]):
         take_off(self, True)
 
     def _tick(self) -> None:
-        self.query_one("#elapsed", Static).update(elapsed(self._now_s() - self._began_s))
+        self.query_one("#elapsed", Static).update(elapsed_words(self._now_s() - self._began_s))

@@ -142,12 +142,12 @@ class FormScreen(Screen[FormReply]):
 
     def _forward_event(self, event: Event) -> None:
         """A click comes to the same queue as the keys, with what it hit: nothing overtakes it on the way."""
-        if isinstance(event, Click) and not event.is_forwarded and (pointed := self._pointed(event)) is not None:
+        if isinstance(event, Click) and not event.is_forwarded and (pointed := self._locate_click(event)) is not None:
             self.post_message(pointed)
             return
         super()._forward_event(event)
 
-    def _pointed(self, click: Click) -> Pointed | None:
+    def _locate_click(self, click: Click) -> Pointed | None:
         try:
             widget, region = self.get_widget_at(click.screen_x, click.screen_y)
         except NoWidget:
@@ -200,7 +200,7 @@ def _said(entry: FormEntry, all_answered: bool) -> str:
     if entry.open:
         left = len(entry.open) - 1
         more = "" if not left else " 1 more is open." if left == 1 else f" {left} more are open."
-        return f"Please answer {entry.open[0] + 1}: {_quoted(entry.form.fields[entry.open[0]].label)}{more}"
+        return f"Please answer {entry.open[0] + 1}: {_quote(entry.form.fields[entry.open[0]].label)}{more}"
     if entry.check:
         changed = ", ".join(f"{index + 1} is “{entry.given[index].answer}”" for index in entry.check)
         return f"Changed: {changed}. If that is right, go to Continue once more."
@@ -212,5 +212,5 @@ def _origin(form: Form) -> str:
     return ". ".join(part for part in parts if part) + "." if any(parts) else ""
 
 
-def _quoted(label: str) -> str:
+def _quote(label: str) -> str:
     return f"“{label}”" if len(label) <= LONGEST_QUOTE else f"“{label[: LONGEST_QUOTE - 1].rstrip()}…”"

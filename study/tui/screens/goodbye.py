@@ -10,7 +10,7 @@ from textual.widgets import Footer
 from study.session.views.counted import answers_are
 from study.session.views.views import Goodbye
 from study.tui.take_off import take_off
-from study.tui.trial_words import turned_away_words
+from study.tui.trial_words import refusal_words
 from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
 
@@ -34,7 +34,7 @@ class GoodbyeScreen(Screen[None]):
         notice = self._notice
         with Card("Thank you" if notice.outcome else "Finished" if notice.finished else "The end of this sitting"):
             if notice.outcome:
-                for sentence in turned_away_words(notice.outcome):
+                for sentence in refusal_words(notice.outcome):
                     yield Said(sentence, classes="strong")
             elif notice.finished:
                 yield Said("Thank you! This was the last trial.", classes="strong")

@@ -40,7 +40,7 @@ class PreparingScreen(Screen[None]):
         with Vertical() as box:
             box.border_title = "One moment"
             yield Static(self._sentence, id="sentence", markup=False)
-            yield Static(elapsed(0.0), id="elapsed", markup=False)
+            yield Static(elapsed_words(0.0), id="elapsed", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -55,9 +55,9 @@ class PreparingScreen(Screen[None]):
             self.query_one("#sentence", Static).update(sentence)
 
     def _tick(self) -> None:
-        self.query_one("#elapsed", Static).update(elapsed(self._now_s() - self._began_s))
+        self.query_one("#elapsed", Static).update(elapsed_words(self._now_s() - self._began_s))
 
 
-def elapsed(seconds: float) -> str:
+def elapsed_words(seconds: float) -> str:
     whole = int(seconds)
     return f"{whole} s so far" if whole < 60 else f"{whole // 60} min {whole % 60} s so far"

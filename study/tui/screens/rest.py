@@ -65,18 +65,18 @@ class RestScreen(Screen[float]):
 
     def action_go_on(self) -> None:
         if self._over():
-            take_off(self, self._rested_s())
+            take_off(self, self._seconds_rested())
 
     def _tick(self) -> None:
-        left_s = max(0, math.ceil(self._notice.seconds - self._rested_s()))
+        left_s = max(0, math.ceil(self._notice.seconds - self._seconds_rested()))
         self.query_one(Digits).update(f"{left_s // 60}:{left_s % 60:02d}")
         self.query_one("#said", Said).update(READY if self._over() else RESTING)
         if self._over():
             self._ticking.stop()
             self.refresh_bindings()
 
-    def _rested_s(self) -> float:
+    def _seconds_rested(self) -> float:
         return time.monotonic() - self._began_s
 
     def _over(self) -> bool:
-        return self._rested_s() >= self._notice.seconds
+        return self._seconds_rested() >= self._notice.seconds

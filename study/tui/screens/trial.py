@@ -128,7 +128,7 @@ class TrialScreen(Screen[None]):
         if not self._taken:
             self._say(WAIT)
 
-    def saved(self) -> None:
+    def show_saved(self) -> None:
         """The answer is on the disk."""
         if self._taken:
             self._mark("saved")

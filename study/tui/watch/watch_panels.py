@@ -97,10 +97,10 @@ def details(view: WatchView) -> Content:
     answers = "1 answer" if view.answers == 1 else f"{view.answers} answers"
     parts: list[Piece] = [
         *_section("Session", [f"{view.subject}, {who}, {answers}", view.protocol, f"Device: {view.device}"]),
-        *_section("Forms", [f"{clock_time(f.utc)}  {f.form}: {_passed(f.passed)}" for f in view.forms]),
+        *_section("Forms", [f"{clock_time(f.utc)}  {f.form}: {_outcome_words(f.passed)}" for f in view.forms]),
         *_section(
             "Practice",
-            [f"{p.frequency_hz:g} Hz: {p.right} right of {p.of}, {_passed(p.passed)}" for p in view.practice],
+            [f"{p.frequency_hz:g} Hz: {p.right} right of {p.of}, {_outcome_words(p.passed)}" for p in view.practice],
         ),
         *_section(
             "Notes",
@@ -114,7 +114,7 @@ def _section(title: str, lines: Sequence[str]) -> list[Piece]:
     return [(f"{title}\n", "bold"), *(f"{line}\n" for line in lines or ["none so far"]), "\n"]
 
 
-def _passed(passed: bool) -> str:
+def _outcome_words(passed: bool) -> str:
     return "passed" if passed else "NOT passed"
 
 

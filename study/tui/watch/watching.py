@@ -57,7 +57,7 @@ class Watching:
             try:
                 feed = WatchFeed(path)
             except OSError as problem:
-                self._app.call_from_thread(self._refused, problem)
+                self._app.call_from_thread(self._report_refusal, problem)
             else:
                 self._app.call_from_thread(self._show, feed, ask)
 
@@ -76,7 +76,7 @@ class Watching:
         if feed is not None:
             threading.Thread(target=feed.close, name="watch-end", daemon=True).start()
 
-    def _refused(self, problem: OSError) -> None:
+    def _report_refusal(self, problem: OSError) -> None:
         self._starting = False
         self._app.notify(f"The view cannot be opened: {problem.strerror or problem}.", severity="error", markup=False)
 

@@ -61,7 +61,7 @@ class ChoiceRow(Widget, can_focus=True):
         return "" if self.chosen is None else self._choices[self.chosen]
 
     def on_key(self, event: Key) -> None:
-        if event.key in ("up", "down") and self._moved_within(1 if event.key == "down" else -1):
+        if event.key in ("up", "down") and self._move_within(1 if event.key == "down" else -1):
             event.stop()
         elif event.character and (named := find_choice(self._choices, event.character)) is not None:
             event.stop()
@@ -127,7 +127,7 @@ class ChoiceRow(Widget, can_focus=True):
             return [(0, index) for index in range(len(lengths))]
         return [(sum(lengths[:index]) + GAP * index, 0) for index in range(len(lengths))]
 
-    def _moved_within(self, step: int) -> bool:
+    def _move_within(self, step: int) -> bool:
         """Up and down go through choices that lie below each other, and at their ends to the next question."""
         there = move_mark(self.cursor, step, len(self._choices), stay=False) if self.stacked else None
         if there is None:

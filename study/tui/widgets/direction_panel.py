@@ -10,7 +10,7 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from study.session.views.views import DirectionPicture
-from study.tui.drawing.direction_picture import large_drawing, sentence
+from study.tui.drawing.direction_picture import draw_large_direction, sentence
 from study.tui.drawing.number_picture import large_number
 
 NUMBERS = {1: ("╺┓ ", " ┃ ", "╺┻╸"), 2: ("┏━┓", "┏━┛", "┗━╸")}
@@ -57,20 +57,20 @@ class DirectionPanel(Widget):
         )
         if y == height - 1:
             return Strip([Segment(self._words().center(width)[:width], plain + Style(bold=True))], width)
-        drawing, beside = self._drawing()
+        drawing, beside = self._make_drawing()
         row = y - (height - 1 - len(drawing)) // 2
         drawn = drawing[row] if 0 <= row < len(drawing) else ""
         number = NUMBERS[self.number][y] if y < 3 and self.picture is not None else ""
         text = f" {number}".ljust(beside) + drawn
         return Strip([Segment(text.ljust(width)[:width], coloured)], width)
 
-    def _drawing(self) -> tuple[tuple[str, ...], int]:
+    def _make_drawing(self) -> tuple[tuple[str, ...], int]:
         """The rows, and how many columns are free to their left."""
         room = _room(self.size)
         if self.picture is None:
             drawing = large_number(self.number, room.width, room.height)
         else:
-            drawing = large_drawing(self.picture, self.number, room.width, room.height)
+            drawing = draw_large_direction(self.picture, self.number, room.width, room.height)
         return drawing, (self.size.width - room.width) // 2
 
     def _words(self) -> str:

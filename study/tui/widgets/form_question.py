@@ -49,9 +49,9 @@ class FormQuestion(Vertical):
             row.cursor, row.at = given.marked, at
             row.chosen = self.field.choices.index(given.answer) if given.answer else None
         else:
-            self.query_one(".written", Static).update(self._written(given, at))
+            self.query_one(".written", Static).update(self._answer_text(given, at))
 
-    def _written(self, given: Given, at: bool) -> Text:
+    def _answer_text(self, given: Given, at: bool) -> Text:
         if not given.answer:
             hint = "type your answer" if self.field.needed else "type your answer, or leave it empty"
             text = Text(hint, "dim")

@@ -24,7 +24,7 @@ class HandleTarget(Widget):
     def render_line(self, y: int) -> Strip:
         width, height = self.size
         rows = max(1, min(height, width // 2))
-        drawing = _drawn(self.view, 2 * rows, rows) if self.view is not None else []
+        drawing = _draw_target(self.view, 2 * rows, rows) if self.view is not None else []
         row = y - (height - rows) // 2
         text = drawing[row] if 0 <= row < len(drawing) else ""
         return Strip([Segment((" " * ((width - 2 * rows) // 2) + text).ljust(width), self.rich_style + BOLD)], width)
@@ -33,7 +33,7 @@ class HandleTarget(Widget):
 BOLD = Style(bold=True)
 
 
-def _drawn(view: HandleView, columns: int, rows: int) -> list[str]:
+def _draw_target(view: HandleView, columns: int, rows: int) -> list[str]:
     canvas = Canvas(columns, rows)
     x, y = canvas.middle
     edge = min(x, y)

@@ -78,8 +78,8 @@ class NewSessionForm(Vertical):
             self._about(problem or self._model_problem, "-problem")
             self.query_one("#code" if problem else "#protocol").focus()
             return
-        model = self._chosen("#model") if self._equalized else ""
-        self.post_message(BeginWanted(code, self._chosen("#protocol"), self._chosen("#device"), model))
+        model = self._selected_value("#model") if self._equalized else ""
+        self.post_message(BeginWanted(code, self._selected_value("#protocol"), self._selected_value("#device"), model))
 
     @on(Input.Changed, "#code")
     @on(Select.Changed)
@@ -97,17 +97,17 @@ class NewSessionForm(Vertical):
         elif notice := self._notice(code):
             self._about(notice, "-notice")
         else:
-            protocol = self._chosen("#protocol")
+            protocol = self._selected_value("#protocol")
             self._about(next((p.title for p in self._home.protocols if p.name == protocol), ""), "")
 
     @property
     def _equalized(self) -> bool:
-        chosen = self._chosen("#protocol")
+        chosen = self._selected_value("#protocol")
         return self._home is not None and any(p.equalized for p in self._home.protocols if p.name == chosen)
 
     @property
     def _model_problem(self) -> str:
-        if not self._equalized or self._chosen("#model"):
+        if not self._equalized or self._selected_value("#model"):
             return ""
         return "This protocol needs a model beside the data: hapteq record, hapteq identify."
 
@@ -121,7 +121,7 @@ class NewSessionForm(Vertical):
                      if line.standing == "withdrawn"), "")  # fmt: skip
 
     def _notice(self, code: str) -> str:
-        lines, protocol = self._sessions(code), self._chosen("#protocol")
+        lines, protocol = self._sessions(code), self._selected_value("#protocol")
         for line in lines:
             if line.standing == "unfinished" and line.protocol == _name(protocol, self._home):
                 return (
@@ -135,7 +135,7 @@ class NewSessionForm(Vertical):
     def _sessions(self, code: str) -> list[SessionLine]:
         return [line for line in self._home.sessions if line.subject == code] if self._home and code else []
 
-    def _chosen(self, which: str) -> str:
+    def _selected_value(self, which: str) -> str:
         value = self.query_one(which, Select).value
         return value if isinstance(value, str) else ""
 

@@ -54,7 +54,7 @@ class SessionTable(DataTable[Content | str]):
         chosen = self._chosen
         self._lines = lines
         offset, self._begun = local_column([line.begun_utc for line in lines], machine_zone)
-        self._widths = self._fitted(f"{_BEGUN} ({offset})" if offset else _BEGUN)
+        self._widths = self._fit_columns(f"{_BEGUN} ({offset})" if offset else _BEGUN)
         self.clear(columns=True)
         for title, width in self._widths.items():
             self.add_column(title, width=width)
@@ -65,7 +65,7 @@ class SessionTable(DataTable[Content | str]):
         if self._lines and event.size.width != self._fitted_to:
             self.show(self._lines)
 
-    def _fitted(self, begun: str) -> dict[str, int]:
+    def _fit_columns(self, begun: str) -> dict[str, int]:
         """By title. Answers, and then runs, give way to the protocol: the sentence below the list has them too."""
         self._fitted_to = self.size.width
         names, protocols = ([getattr(line, which) for line in self._lines] for which in ("name", "protocol"))

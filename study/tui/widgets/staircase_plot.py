@@ -27,13 +27,13 @@ class StaircasePlot(Widget):
         return Content("\n").join(
             [
                 Content.styled(self._staircase.title, "bold"),
-                *map(_styled, drawn),
+                *map(_apply_styles, drawn),
                 Content.styled(summary(self._staircase), MUTED),
             ]
         )
 
 
-def _styled(line: str) -> Content:
+def _apply_styles(line: str) -> Content:
     """Marks of one kind beside each other are one piece: fewer pieces are drawn faster."""
     parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], MUTED)]
     for style, characters in itertools.groupby(line[LABEL_COLUMNS:], key=_STYLES.get):

@@ -3,12 +3,12 @@
 from textual.content import Content
 from textual.widgets import Static
 
-from study.tui.text_rows import Rows, aligned
+from study.tui.text_rows import Rows, align_rows
 
 
 class TextTable(Static):
     DEFAULT_CSS = "TextTable { width: auto; height: auto; }"
 
     def __init__(self, rows: Rows, *, id: str | None = None) -> None:
-        header, *body = aligned(rows) or ("",)
+        header, *body = align_rows(rows) or ("",)
         super().__init__(Content("\n").join([Content.styled(header, "bold"), *map(Content, body)]), id=id)

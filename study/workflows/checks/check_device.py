@@ -1,4 +1,4 @@
-"""Whether a device is fit for a sitting: it is watched for half a second, and never told to do anything."""
+"""Check whether a device is fit for a sitting: read it for half a second without commanding anything."""
 
 import math
 
@@ -15,10 +15,10 @@ LOOKS = 50
 EVERY_S = 0.01
 
 ENOUGH = 0.9
-"""Of the looks must be answered: a busy computer is late now and then."""
+"""Fraction of the reads that must succeed: a busy computer is late now and then."""
 
 FAR_MM = 20.0
-"""From there the centring spring of the shipped protocols pulls with a few newtons."""
+"""Offset at which the centring spring of the shipped protocols pulls with a few newtons."""
 
 NOISY_MPS2 = 1.0
 """An accelerometer at rest has about 0.1 m/s² (its noise over 500 Hz); a trembling hand on the handle, up to 0.5."""
@@ -40,8 +40,7 @@ def check_device(
 ) -> DeviceReport:
     """Findings of an idle device; takes `LOOKS` times `EVERY_S`. Commands no force and raises nothing.
 
-    place_m: where trials start. total_cap_n: the largest force that will be asked for, if it is known; safety: what it
-    is made of.
+    place_m: where trials start. total_cap_n: the largest force that will be requested, if known; safety: its parts.
     """
     looks = []
     for _ in range(LOOKS):
@@ -82,9 +81,9 @@ def _accelerometer(looks: list[Look]) -> DeviceFinding:
     readings = np.array([look.acceleration_mps2 for look in looks if look.acceleration_mps2 is not None])
     clipped = sum(look.sensor_clipped for look in looks)
     if len(readings) < ENOUGH * len(looks):
-        return _broken("its reading is no number", "Check the sensor's cable and its power.")
+        return _accelerometer_problem("its reading is no number", "Check the sensor's cable and its power.")
     if clipped:
-        return _broken(
+        return _accelerometer_problem(
             f"at its limit in {clipped} of {len(looks)} readings",
             "Lay the handle at rest. If that does not help, check the sensor's range, cable and mounting.",
         )
@@ -95,20 +94,20 @@ def _noise(readings_mps2: FloatArray) -> DeviceFinding:
     """readings_mps2 (n, 3)."""
     dead = [axis for axis, channel in zip("xyz", readings_mps2.T, strict=True) if np.ptp(channel) == 0.0]
     if dead:
-        return _broken(
+        return _accelerometer_problem(
             f"always exactly the same along {' and '.join(dead)}",
             "The sensor is dead, or not plugged in: check its cable and its power.",
         )
     rms_mps2 = float(np.sqrt(readings_mps2.var(axis=0).sum()))
     if rms_mps2 > NOISY_MPS2:
-        return _broken(
+        return _accelerometer_problem(
             f"{rms_mps2:.2f} m/s² rms at rest, more than {NOISY_MPS2:g}",
             "Let go of the handle and check again. If it stays, check the sensor's cable, shield and mounting.",
         )
     return DeviceFinding("Accelerometer", f"{rms_mps2:.2f} m/s² rms at rest", fine=True)
 
 
-def _broken(value: str, advice: str) -> DeviceFinding:
+def _accelerometer_problem(value: str, advice: str) -> DeviceFinding:
     return DeviceFinding("Accelerometer", value, fine=False, advice=advice)
 
 

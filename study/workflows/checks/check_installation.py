@@ -1,4 +1,4 @@
-"""Whether this computer has what a study needs: Python, packages, their names, a terminal, a folder to write to."""
+"""Check that this computer has what a study needs: Python, packages, a terminal, a folder to write to."""
 
 import importlib.util
 import locale
@@ -39,7 +39,8 @@ class Terminal:
 
 
 def check_installation(data: Path, terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
-    """`terminal`: `this_terminal()`. Writes one empty file into `data`, or into the folder it would be made in."""
+    """All findings. `terminal`: from `this_terminal()`. Writes one empty file into `data`, or into the folder that
+    would contain it."""
     owners, home = packages_distributions(), Path(study.__file__).parents[1]
     return (
         *check_packages(),
@@ -65,6 +66,7 @@ def check_packages() -> tuple[DeviceFinding, ...]:
 
 
 def check_requirement(requirement: Requirement) -> DeviceFinding:
+    """Whether an installed package satisfies a requirement."""
     try:
         return check_version(requirement.name, version(requirement.name), requirement.specifier)
     except PackageNotFoundError:
@@ -72,13 +74,14 @@ def check_requirement(requirement: Requirement) -> DeviceFinding:
 
 
 def check_version(name: str, found: str, wanted: SpecifierSet) -> DeviceFinding:
+    """Whether a version satisfies a specifier."""
     fine = wanted.contains(found, prereleases=True)
     needs = f" (needs {wanted})" if str(wanted) else ""
     return DeviceFinding(name, f"{found}{needs}", fine, "" if fine else _INSTALL)
 
 
 def check_name(name: str, owners: Mapping[str, Sequence[str]], home: Path) -> DeviceFinding:
-    """Whether hapteq's package of this generic name is its own. owners: distributions that install it."""
+    """Whether the package of this generic name is hapteq's own. owners: distributions that install it."""
     others = sorted(set(owners.get(name, ())) - {HAPTEQ})
     if others:
         advice = f"Install hapteq into an environment of its own: {', '.join(others)} must not share one with it."
@@ -92,7 +95,7 @@ def check_name(name: str, owners: Mapping[str, Sequence[str]], home: Path) -> De
 
 
 def this_terminal() -> Terminal | None:
-    """The one that output or talk goes to; None where there is none."""
+    """The terminal of stdout or stderr; None if neither is one."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None and stream.isatty():
             size = os.get_terminal_size(stream.fileno())
@@ -102,6 +105,7 @@ def this_terminal() -> Terminal | None:
 
 
 def check_terminal(terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
+    """Encoding, colours and size of the terminal."""
     if terminal is None:
         return (DeviceFinding("Terminal", "none here, so it was not checked", fine=True),)
     unicode = terminal.encoding.lower().replace("-", "") == "utf8"
@@ -122,7 +126,7 @@ def check_terminal(terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
 
 
 def check_folder(data: Path) -> DeviceFinding:
-    """Whether sessions can be written below it. A folder that is not there yet is made by the first session."""
+    """Whether sessions can be written below it. A missing folder is created by the first session."""
     name = "Data folder"
     folder = next(place for place in (data.absolute(), *data.absolute().parents) if place.exists())
     try:
@@ -137,7 +141,7 @@ def check_folder(data: Path) -> DeviceFinding:
 
 
 def check_privacy(data: Path) -> DeviceFinding:
-    """Whether others on this computer can read what is recorded."""
+    """Whether other accounts of this computer can read the data folder."""
     name = "Data rights"
     if not data.exists():
         return DeviceFinding(name, f"{data}: not there yet; it will be for this account alone", fine=True)

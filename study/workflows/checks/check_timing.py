@@ -1,4 +1,4 @@
-"""How well this computer keeps 1 kHz: a stimulus of zero force is held in real time, and what came late is counted."""
+"""Measure how well this computer keeps 1 kHz: hold a stimulus of zero force in real time and count late ticks."""
 
 import threading
 from collections.abc import Callable
@@ -28,7 +28,8 @@ FADE_S = 0.05
 SIGN_OF_LIFE_EVERY = 50
 
 SITTING_S = 1.0
-"""A thousand wake-ups at 1 kHz: the 99th percentile is then the tenth of them."""
+"""Duration of the check before a sitting: a thousand wake-ups at 1 kHz, of which the 99th percentile is the tenth
+latest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +42,9 @@ class Timing:
 
 
 def check_timing(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
-    """Hold zero force for so long, which the device's settings must allow. `on_progress(seconds)` now and then.
+    """Hold zero force for this long, which the device's settings must allow. `on_progress(seconds)` now and then.
 
-    Only zero force where the device was opened without a centring spring. Raises DeviceError for a lost device.
+    The force is zero only if the device was opened without a centring spring. Raises DeviceError for a lost device.
     """
     rate_hz = device.info.sample_rate_hz
     zeros = Signal(np.zeros((round(LOOP_S * rate_hz), 3)), rate_hz, "force", "N", ("fx", "fy", "fz"))
@@ -59,14 +60,14 @@ def check_timing(device: Device, clock: Clock, seconds: float, on_progress: Call
 def check_computer(
     clock: Clock, rate_hz: float, simulated: bool, load_per_processor: float | None
 ) -> tuple[DeviceFinding, ...]:
-    """Before a sitting: takes `SITTING_S`, and commands nothing. load_per_processor: None where it is not known."""
+    """Findings before a sitting: takes `SITTING_S`, commands nothing. load_per_processor: None if unknown."""
     late_s = wake_at_every_tick(clock, rate_hz, SITTING_S, lambda done_s: True)
     lateness = judge_lateness(lateness_of(np.array(late_s), rate_hz), simulated)
     return (lateness, judge_load(load_per_processor), *(() if simulated else (loop_priority(),)))
 
 
 def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Callable[[float], bool]) -> list[float]:
-    """How late each wake-up was, s. `go_on(done_s)` now and then; ends early where it is False."""
+    """How late each wake-up was (s). `go_on(done_s)` is called now and then; stops early if it returns False."""
     late_s: list[float] = []
     tick_s = 1.0 / rate_hz
     started_s = clock.now_s()
@@ -80,7 +81,7 @@ def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Call
 
 
 def _wake_as_its_loop(device: Device, clock: Clock, seconds: float, go_on: Callable[[float], bool]) -> list[float]:
-    """In a thread that goes before other programs where the device's loop does."""
+    """In a thread of real-time priority if the device's loop has one."""
     rate_hz = device.info.sample_rate_hz
     if device.info.simulated:
         return wake_at_every_tick(clock, rate_hz, seconds, go_on)

@@ -1,11 +1,11 @@
-"""How busy this computer is, as its system counts it."""
+"""Load of this computer."""
 
 import os
 
 
 def load_per_processor() -> float | None:
-    """Processes that ran or waited for a processor, averaged over the last minute, for each processor that this program
-    may use. None where the system does not tell."""
+    """Load average of the last minute divided by the number of processors that this program may use; None if
+    unknown."""
     try:
         load = os.getloadavg()[0]
     except (AttributeError, OSError):  # not on every system

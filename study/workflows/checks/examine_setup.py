@@ -1,4 +1,4 @@
-"""All that can be checked before a study day: the installation, the device, and how well 1 kHz is kept."""
+"""All checks before a study day: installation, device, and 1 kHz timing."""
 
 import contextlib
 from collections.abc import Callable
@@ -19,13 +19,13 @@ from study.workflows.checks.computer_load import load_per_processor
 from study.workflows.device_settings import device_settings
 
 PROTOCOL = "direction_threshold"
-"""Its limits are those that the device is opened with."""
+"""The device is opened with the limits of this protocol."""
 
 NOT_NEEDED = ("Accelerometer",)
-"""It measures, and nothing of the force depends on it."""
+"""Findings that do not affect the force."""
 
 SPARE_S = 5.0
-"""Beyond the timing's length, before the safety layer ends it."""
+"""Margin (s) beyond the timing's length before the safety layer ends it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Examination:
     installation: tuple[DeviceFinding, ...]
     device: DeviceReport
     timing: Timing | None
-    """None where it was not asked for, or the device could not be used."""
+    """None if not asked for, or if the device could not be used."""
 
     @property
     def findings(self) -> tuple[DeviceFinding, ...]:
@@ -42,7 +42,7 @@ class Examination:
 
     @property
     def exit_code(self) -> ExitCode:
-        """By the worst verdict: DEVICE where device or timing is wrong, whatever else is. A warning changes nothing."""
+        """By the worst finding: DEVICE if device or timing is wrong, whatever else is. Warnings are ignored."""
         timing = self.timing.findings if self.timing is not None else ()
         if any(finding.wrong for finding in (*self.device.findings, *timing)):
             return ExitCode.DEVICE
@@ -52,7 +52,8 @@ class Examination:
 def examine_setup(
     device: str, data: Path, timing_s: float, terminal: Terminal | None, on_progress: Callable[[float], None]
 ) -> Examination:
-    """In real time. timing_s: 0 for none. A device that cannot be opened, or is lost, is a finding and no error."""
+    """All findings, in real time. timing_s: 0 for no timing. A device that cannot be opened, or is lost, is a
+    finding, not an error."""
     installation = check_installation(data, terminal)
     report, timing = _examine_device(device, timing_s, on_progress)
     return Examination(installation, report, timing)
@@ -85,7 +86,7 @@ def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[f
 
 
 def _settings(name: str, timing_s: float) -> DeviceSettings:
-    """As for a study, but without the centring spring: nothing is to move while the loop is timed."""
+    """As for a study, but without the centring spring: nothing may move while the loop is timed."""
     settings = device_settings(read_study_protocol(PROTOCOL).protocol)
     longest_s = max(settings.limits.longest_hold_s, timing_s + SPARE_S)
     limits = replace(settings.limits, longest_hold_s=longest_s)
@@ -94,7 +95,7 @@ def _settings(name: str, timing_s: float) -> DeviceSettings:
 
 
 def accept(name: str, examination: Examination, operator: str) -> str:
-    """Sign that the device may be held, after an examination with its timing. Raises `DeviceError`, WrongUseError."""
+    """Sign that the device may be held, after an examination with timing. Raises DeviceError, WrongUseError."""
     if not needs_real_time(name):
         raise WrongUseError("There is nothing to accept", f"{name!r} moves no hand.", "Leave --accept out.")
     timing = examination.timing

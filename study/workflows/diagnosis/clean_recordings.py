@@ -1,4 +1,4 @@
-"""Recordings of the device when it was in order, beside those to diagnose."""
+"""Reference recordings of the intact device, beside those to diagnose."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ from pathlib import Path
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_alike
 from analysis.diagnosis.prepare_recordings import same_position
 from study.errors import StudyError
-from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, nothing_to_diagnose, read_input
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error, read_input
 
 NOT_ALIKE = "Give clean recordings of the same device, with the same channels, units and rate, or leave --clean out."
 
@@ -19,7 +19,8 @@ class WithClean:
 
 
 def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[Path], seed: int) -> WithClean:
-    """sources: what was found is from. clean: recordings, or one session's folder. Raises StudyError."""
+    """Both inputs with matching channels, units and rate. sources: origin of `found`; clean: reference recordings,
+    or one session's folder. Raises StudyError."""
     known = {source.resolve() for source in sources}
     if (both := next((path for path in clean if path.resolve() in known), None)) is not None:
         raise StudyError(
@@ -36,7 +37,7 @@ def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[P
             "one says nothing of the other",
         )
     except NothingToDiagnose as refusal:
-        raise nothing_to_diagnose(refusal.problems, NOT_ALIKE) from refusal
+        raise not_diagnosable_error(refusal.problems, NOT_ALIKE) from refusal
     number = len(found.recordings)
     every = same_position((*found.recordings, *beside.recordings))
     return WithClean(

@@ -1,4 +1,4 @@
-"""A diagnosis that was started on the screen, and may stop there."""
+"""A diagnosis started from the screen, which can be stopped there."""
 
 from collections.abc import Callable
 from itertools import count
@@ -10,7 +10,7 @@ from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose
 
 
 def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], None]) -> Path:
-    """Of the diagnosis.json. Raises StudyError; LeftError where it was stopped."""
+    """Run it and return the path of diagnosis.json. Raises StudyError; LeftError if it was stopped."""
     try:
         return diagnose_recordings(plan, on_progress).out / DIAGNOSIS_NAME
     except KeyboardInterrupt as stopped:
@@ -23,7 +23,7 @@ def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], N
 
 
 def free_out(source: Path) -> Path:
-    """A new folder in a session's, or beside a recording."""
+    """An unused folder name in a session's folder, or beside a recording."""
     folder, name = (source, "diagnosis") if source.is_dir() else (source.parent, f"{source.stem}-diagnosis")
     numbered = (folder / (name if number == 1 else f"{name}-{number}") for number in count(1))
     return next(path for path in numbered if not path.exists())

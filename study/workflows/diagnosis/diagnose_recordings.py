@@ -1,4 +1,4 @@
-"""From recordings and a model to a folder that says what physics the model lacks."""
+"""Diagnose recordings against a model: find the missing physics and write the result folder."""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -26,17 +26,17 @@ from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.clean_recordings import with_clean
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
-    given_model,
-    nothing_to_diagnose,
+    not_diagnosable_error,
+    read_given_model,
     read_input,
 )
 from study.workflows.diagnosis.effect_file import read_entry
-from study.workflows.diagnosis.fitted_first import first_model_of, fitted_model
+from study.workflows.diagnosis.fitted_first import first_model_of, fit_linear_model
 from study.workflows.diagnosis.spring_in_model import spring_words, with_spring
-from study.workflows.forked_map import forked_map, processor_s
+from study.workflows.forked_map import map_forked, processor_s
 
 READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
-"""Shares of the work at which the recordings are read, a model is fitted where none was given, and all is computed."""
+"""Progress after reading, after fitting a model where none was given, and after the diagnosis."""
 
 TWIN_SAID = (
     "No model was given. The session was compared with the simulated device's twin: a linear model, identified from "
@@ -49,23 +49,23 @@ class DiagnosePlan:
     sources: tuple[Path, ...]
     """Recordings, or one session's folder."""
     out: Path
-    """A folder that is not there yet, or is empty."""
+    """A new or empty folder."""
     model: Path | None = None
     without: tuple[str, ...] = ()
-    """Effects that are not to be considered."""
+    """Effects that are not considered."""
     clean: tuple[Path, ...] = ()
-    """Recordings of the device when it was in order, or one session's folder."""
+    """Reference recordings of the intact device, or one session's folder."""
     seed: int = 1
-    """Of what is drawn: which trials of a session are taken, and which are kept for the test."""
+    """Seed of the draws: which trials of a session are used, and which are kept for the test."""
     compare: Compared = "auto"
     effect_files: tuple[Path, ...] = ()
-    """Of laws that were found elsewhere and are kept, as `hapteq effect` writes them."""
+    """Files of laws found elsewhere, as `hapteq effect` writes them."""
     seconds: float | None = None
-    """Of processor time, after which the search ends with what it has."""
+    """Processor time after which the search ends with its best result."""
     discovery: bool = False
-    """Laws that have no name are looked for, too."""
+    """Also search for laws outside the catalogue."""
     force_constants: tuple[float, ...] = ()
-    """Of all commands, or each command's own, where these are no forces."""
+    """One for all commands or one per command, where these are not forces."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,12 +76,12 @@ class DiagnosedRecordings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """What is found, before any of it is written."""
+    """A diagnosis that is not written yet."""
 
     findings: Findings
     plan: DiagnosePlan
     parents: tuple[Path, ...]
-    """Files that it was made from."""
+    """Input files."""
 
 
 class Engine(Protocol):
@@ -96,12 +96,12 @@ class Engine(Protocol):
 
 
 def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> DiagnosedRecordings:
-    """`on_progress(what is being done, share)`. Interrupted or refused (StudyError), nothing is written."""
-    return written(answered(plan, on_progress, engine), on_progress)
+    """Diagnose and write. `on_progress(step, share)`. If interrupted or refused (StudyError), nothing is written."""
+    return write_answer(find_answer(plan, on_progress, engine), on_progress)
 
 
-def answered(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> Answer:
-    """The first part, which writes nothing: figures and page take seconds that an answer need not wait for."""
+def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> Answer:
+    """First part of `diagnose_recordings`: the diagnosis, without writing. Figures and page take seconds more."""
     check_names(plan.without)
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
@@ -115,20 +115,20 @@ def answered(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnos
     time_left = _time_budget(plan)
     guard = crash_guard()
     first = _model(plan, found, clean, (time_left, guard), on_progress)
-    # A model that was fitted to these recordings has the spring in it.
+    # A model that was fitted to these recordings already contains the spring.
     spring = found.spring_n_per_m if plan.model is not None or found.simulated else 0.0
     held = with_spring(first.model, spring)
     begun = FITTED if plan.model is None else READ
     _check_compared(plan, found, held)
     settings = replace(_settings(plan, found, clean, first.balances), time_left=time_left, guard=guard)
     try:
-        findings = engine(found.recordings, held, settings, forked_map, _within(on_progress, begun, DIAGNOSED))
+        findings = engine(found.recordings, held, settings, map_forked, _within(on_progress, begun, DIAGNOSED))
     except NothingLearned as refusal:
-        raise nothing_to_diagnose(
+        raise not_diagnosable_error(
             (str(refusal),), "Leave --clean out, or record the device in order in the same way."
         ) from refusal
     except np.linalg.LinAlgError as problem:
-        raise nothing_to_diagnose(
+        raise not_diagnosable_error(
             (f"The fits broke down ({problem}): near the given numbers the model runs away from what was recorded",),
             "State narrower tolerances in the model, or give one that is nearer to the device.",
         ) from problem
@@ -142,9 +142,9 @@ def answered(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnos
     )
 
 
-def written(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
-    """The second part: document, improved model, figures and page, whole or not at all."""
-    # Here, for drawing takes long to import, and the answer comes first.
+def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
+    """Second part of `diagnose_recordings`: write document, improved model, figures and page atomically."""
+    # Imported here because plotting is slow to import, and the answer comes first.
     from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 
     on_progress("writing the report", DIAGNOSED)
@@ -183,7 +183,7 @@ def _settings(
 
 
 def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: MechanicalModel) -> None:
-    """Raises WrongUseError."""
+    """Raise WrongUseError if the requested comparison is not possible."""
     if plan.compare == "force" and plan.clean:
         happened = "Beside clean recordings errors are measured by the rule, so that both are measured alike."
     elif plan.compare == "force" and not all(has_motion(each, model) for each in found.recordings):
@@ -216,14 +216,14 @@ def _model(
 ) -> FirstModel:
     within = _within(on_progress, READ, FITTED)
     if plan.model is not None:
-        return FirstModel(given_model(plan.model, found), ())
+        return FirstModel(read_given_model(plan.model, found), ())
     if found.simulated:
         return FirstModel(_twin(within), (TWIN_SAID,))
     if clean is None:
         return first_model_of(found, plan.without, bounds, within)
     what = "fitting a linear model, as none was given"
     on_progress(what, READ)
-    return FirstModel(*fitted_model(clean, lambda share: within(what, share), "the clean recordings"))
+    return FirstModel(*fit_linear_model(clean, lambda share: within(what, share), "the clean recordings"))
 
 
 def _twin(on_progress: Progress) -> MechanicalModel:

@@ -1,4 +1,4 @@
-"""What is said of a diagnosis at its end: lines for a person, the document for a program."""
+"""Summary of a diagnosis: lines for a person, the document for a program."""
 
 from pathlib import Path
 from typing import Any
@@ -11,12 +11,12 @@ from study.store.formats.diagnosis_file import MODEL_NAME, PAGE_NAME
 
 
 def summary(findings: Findings) -> dict[str, Any]:
-    """As diagnosis.json has it."""
+    """As in diagnosis.json."""
     return {"format": FORMAT, "version": VERSION, **diagnosis_to_json(findings.diagnosis)}
 
 
 def answer_lines(findings: Findings) -> tuple[str, ...]:
-    """The verdict first."""
+    """Result as terminal lines, verdict first."""
     found = findings.diagnosis
     return (
         *summary_lines(findings),
@@ -28,12 +28,12 @@ def answer_lines(findings: Findings) -> tuple[str, ...]:
 
 
 def new_remarks(written: Findings, said: Findings) -> tuple[str, ...]:
-    """What the figures added since the answer was said."""
+    """Remarks that were added after the answer was printed."""
     return tuple(remark for remark in written.remarks if remark not in said.remarks)
 
 
 def file_lines(out: Path) -> tuple[str, ...]:
-    """Where everything is."""
+    """Paths of the written files."""
     return ("", f"Report: {out / PAGE_NAME}", f"Improved model: {out / MODEL_NAME}")
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis starts from: recordings or a session's trials, and the model that they are compared with."""
+"""Input of a diagnosis: recordings or a session's trials, and the model to compare with."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
-from study.workflows.recording.recording_from import recording_from
+from study.workflows.recording.recording_from import read_any_recording
 
 Checked = TypeVar("Checked")
 
@@ -23,24 +23,24 @@ class DiagnosisInput:
     recordings: tuple[Recording, ...]
     names: tuple[str, ...]
     parents: tuple[Path, ...]
-    """Files that it was read from."""
+    """Input files."""
     remarks: tuple[str, ...]
     simulated: bool = False
     """A session on the simulated omega.3."""
     spring_n_per_m: float = 0.0
-    """Of the virtual spring that held the handle and is no part of the commands: a session's."""
+    """Stiffness of the virtual spring that held the handle and is not part of the commands (sessions only)."""
     constants: tuple[float, ...] = ()
-    """Force constants that were stated."""
+    """Stated force constants."""
 
 
 def read_input(
     sources: Sequence[Path], seed: int, plain: bool = False, constants: tuple[float, ...] = ()
 ) -> DiagnosisInput:
-    """Recordings, or one session's folder. plain: recordings in the form in which forces can be balanced, see
+    """Read recordings, or one session's folder. plain: in the form in which forces can be balanced, see
     `plain_form`. constants: see `with_force_constant`. Raises StudyError."""
     folders = [source for source in sources if source.is_dir()]
     if folders and len(sources) > 1:
-        raise nothing_to_diagnose(
+        raise not_diagnosable_error(
             (f"{folders[0]} is a folder: a session is diagnosed by itself",), "Give recordings, or one session."
         )
     if folders:
@@ -48,32 +48,32 @@ def read_input(
         from study.workflows.diagnosis.session_as_recordings import session_recordings
 
         session = session_recordings(folders[0], seed)
-        kept = _refusing(lambda: comparable((session.recording,), (session.name,), plain))
+        kept = _translate_refusal(lambda: comparable((session.recording,), (session.name,), plain))
         return DiagnosisInput(
             kept.recordings, (session.name,), session.parents, (*session.remarks, *kept.remarks), session.simulated,
             session.spring_n_per_m,
         )  # fmt: skip
-    taken = [recording_from(source) for source in sources]
+    taken = [read_any_recording(source) for source in sources]
     read, names = tuple(recording for recording, _ in taken), _names(sources)
-    _refusing(lambda: require_alike(read, names))
+    _translate_refusal(lambda: require_alike(read, names))
     forces, stated = _as_forces(read, constants)
-    ready = _refusing(lambda: prepared(forces, names, plain))
+    ready = _translate_refusal(lambda: prepared(forces, names, plain))
     remarks = (*_notes(taken), *stated, *ready.remarks)
     return DiagnosisInput(ready.recordings, names, tuple(sources), remarks, constants=constants)
 
 
-def _refusing(checked: Callable[[], Checked]) -> Checked:
-    """What it returns. Raises StudyError where it finds nothing to diagnose."""
+def _translate_refusal(checked: Callable[[], Checked]) -> Checked:
+    """The result of `checked`; its refusal becomes a StudyError."""
     try:
         return checked()
     except NothingToDiagnose as refusal:
-        raise nothing_to_diagnose(refusal.problems) from refusal
+        raise not_diagnosable_error(refusal.problems) from refusal
 
 
 def _as_forces(
     recordings: tuple[Recording, ...], constants: Sequence[float]
 ) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """Raises WrongUseError."""
+    """The recordings with commands as forces, and remarks. Raises WrongUseError."""
     if not constants:
         return recordings, ()
     try:
@@ -90,8 +90,8 @@ def _notes(taken: Sequence[tuple[Recording, tuple[str, ...]]]) -> tuple[str, ...
     return tuple(dict.fromkeys(note for _, notes in taken for note in notes))
 
 
-def given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
-    """Raises StudyError where it cannot be of the recordings' device."""
+def read_given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
+    """Read the given model. Raises StudyError if it does not fit the recordings' device."""
     model = read_mechanical_model(path)
     try:
         require_model_of(model, found.recordings)
@@ -106,7 +106,8 @@ def given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
     return model
 
 
-def nothing_to_diagnose(problems: Sequence[str], do_now: str = "Correct them, or record again.") -> StudyError:
+def not_diagnosable_error(problems: Sequence[str], do_now: str = "Correct them, or record again.") -> StudyError:
+    """The error for input that cannot be diagnosed."""
     return StudyError(
         "These recordings cannot be diagnosed", _sentences(problems), do_now, saved="Nothing was written."
     )
@@ -117,7 +118,7 @@ def _sentences(problems: Sequence[str]) -> str:
 
 
 def _names(sources: Sequence[Path]) -> tuple[str, ...]:
-    """File names; with their folders where they are not enough."""
+    """File names; with their folders where these are not unique."""
     names = tuple(source.name for source in sources)
     if len(set(names)) == len(names):
         return names

@@ -1,4 +1,4 @@
-"""Laws that were discovered, kept as Python files of a user's own, which a diagnosis looks for beside the catalogue."""
+"""Discovered laws saved as Python files, which a later diagnosis considers beside the catalogue."""
 
 import importlib.util
 import re
@@ -37,13 +37,14 @@ ENTRY = LawEntry(
 
 
 def write_entry(found: Path, out: Path, number: int = 1) -> LawEntry:
-    """number: which law, from 1. Raises StudyError where there is none, or where the file's name is no name."""
+    """Write a law of a diagnosis or model as a file. number: which law, from 1. Raises StudyError if there is none,
+    or if the file's name is not a valid name."""
     laws = _laws(found)
     if number > len(laws):
         has = f"holds {len(laws)} law{'s' if len(laws) > 1 else ''}" if laws else "holds no discovered law"
-        raise _refused(f"{found} {has}.", "Give a diagnosis or model that has one, or another --number.")
+        raise _refusal(f"{found} {has}.", "Give a diagnosis or model that has one, or another --number.")
     if out.suffix != ".py" or not NAME.fullmatch(out.stem) or out.stem in (*EFFECTS_BY_NAME, DISCOVERED_LAW):
-        raise _refused(
+        raise _refusal(
             f"'{out.name}' cannot be an effect's name.",
             "Choose a name of small letters, digits and _ that is not in the catalogue, such as my_effect.py.",
         )
@@ -62,18 +63,18 @@ def write_entry(found: Path, out: Path, number: int = 1) -> LawEntry:
 
 
 def read_entry(path: Path) -> LawEntry:
-    """Runs the file. Raises StudyError where it defines no ENTRY."""
+    """Load an effect file by running it. Raises StudyError if it defines no ENTRY."""
     spec = importlib.util.spec_from_file_location(f"hapteq_effect_{path.stem}", path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise _refused(f"{path} is not there.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")
+        raise _refusal(f"{path} is not there.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise _refused(f"{path} fails: {error}.", "Correct it, or leave --effect-file out.") from error
+        raise _refusal(f"{path} fails: {error}.", "Correct it, or leave --effect-file out.") from error
     entry = getattr(module, "ENTRY", None)
     if not isinstance(entry, LawEntry) or entry.name in EFFECTS_BY_NAME or not NAME.fullmatch(entry.name):
-        raise _refused(
+        raise _refusal(
             f"{path} defines no ENTRY, or one by a name of the catalogue.",
             "Write one with `hapteq effect FOUND --out EFFECT.py`, and change that.",
         )
@@ -88,5 +89,5 @@ def _laws(found: Path) -> list[Law]:
     return [law_of(law.expression, law.acts_on, law.axis) for law in laws if law is not None]
 
 
-def _refused(happened: str, do: str) -> StudyError:
+def _refusal(happened: str, do: str) -> StudyError:
     return StudyError("There is no effect of your own", happened, do, saved="Nothing was written.")

@@ -1,4 +1,4 @@
-"""`hapteq model`: a first mechanical model from recordings, written with its tolerances."""
+"""`hapteq model`: fit a first mechanical model to recordings and write it with tolerances."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ class FirstModelPlan:
     out: Path
     structure: str = "auto"
     force_constants: tuple[float, ...] = ()
-    """Of all commands, or each command's own, where these are no forces."""
+    """One for all commands or one per command, where these are not forces."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,8 +38,8 @@ class FirstModel:
 
 
 def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) -> FirstModel:
-    """Fits and writes. `on_progress(share)`. Raises StudyError; nothing is written then."""
-    wanted = _wanted(plan.structure)
+    """Fit and write. `on_progress(share)`. Raises StudyError; nothing is written then."""
+    wanted = _parse_structure(plan.structure)
     require_free(plan.out, title=TITLE, kind="models")
     if folders := [path for path in plan.recordings if path.is_dir()]:
         raise StudyError(
@@ -48,12 +48,12 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
         )  # fmt: skip
     found = read_input(plan.recordings, 1, True, plan.force_constants)
     if has_carried_weight(found.recordings):
-        raise _refused("A recording was made with a weight on, and the model would hold the weight.")
+        raise _refusal("A recording was made with a weight on, and the model would hold the weight.")
     try:
         choice = first_structure(found.recordings, wanted, on_progress)
     except StructureRefused as refusal:
         what = "no structure" if wanted is None else f"the structure {wanted}"
-        raise _refused(f"The recordings do not carry {what}: {refusal}.") from refusal
+        raise _refusal(f"The recordings do not carry {what}: {refusal}.") from refusal
     origin = {
         **gather_provenance(parents=found.parents).as_dict(),
         "structure": choice.fit.kind,
@@ -69,7 +69,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
 
 
 def first_model_lines(done: FirstModel) -> tuple[str, ...]:
-    """For a person: what was chosen and why, the numbers, and what remains."""
+    """For a person: the chosen structure and why, the parameters, the residual."""
     choice, fit = done.choice, done.choice.fit
     rows = [_row(number) for number in fit.numbers]
     errors = [
@@ -111,7 +111,8 @@ def _row(number: Number) -> str:
     return f"  {number.name}: {value} {number.unit} (95 %: {low} to {high})"
 
 
-def _wanted(structure: str) -> Kind | None:
+def _parse_structure(structure: str) -> Kind | None:
+    """The requested structure; None for "auto". Raises WrongUseError."""
     if structure == "auto":
         return None
     for kind in KINDS:
@@ -125,7 +126,7 @@ def _wanted(structure: str) -> Kind | None:
     )
 
 
-def _refused(happened: str) -> StudyError:
+def _refusal(happened: str) -> StudyError:
     return StudyError(
         TITLE, happened, "Choose another --structure, or record positions or velocities along every command.",
         saved="Nothing was written.",

@@ -1,4 +1,4 @@
-"""The model that a diagnosis starts from where none was given, with refusals as a person reads them."""
+"""First model for a diagnosis without a given one; refusals become errors for a person."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,7 +10,7 @@ from analysis.diagnosis.first_model.fitted_first import FirstModel
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModel
-from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, nothing_to_diagnose
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error
 
 GIVE_ONE = "Give a model of the device alone with --model, or a recording that carries one."
 
@@ -18,28 +18,28 @@ GIVE_ONE = "Give a model of the device alone with --model, or a recording that c
 def first_model_of(
     found: DiagnosisInput, without: Sequence[str], bounds: tuple[TimeBudget, Guard], on_progress: Progress
 ) -> FirstModel:
-    """As in `analysis`; where the force balance crashes, by a fit to spectra. Raises StudyError."""
+    """As in `analysis`; if the force balance crashes, by a fit to spectra. Raises StudyError."""
     time_left, guard = bounds
 
     def weighed() -> FirstModel | None:
         return fitted_first.first_model_of(found.recordings, without, time_left, on_progress)
 
-    with _refused():
+    with _translate_refusals():
         first = guard.part(BALANCE, "the first model", weighed, None, (NothingToDiagnose,))
-    return first or FirstModel(*fitted_model(found, lambda share: on_progress("fitting a linear model", share)), ())
+    return first or FirstModel(*fit_linear_model(found, lambda share: on_progress("fitting a linear model", share)), ())
 
 
-def fitted_model(
+def fit_linear_model(
     found: DiagnosisInput, on_progress: Callable[[float], None], whose: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """As in `analysis`. Raises StudyError."""
-    with _refused():
+    """A linear model fitted to the spectra, and remarks, as in `analysis`. Raises StudyError."""
+    with _translate_refusals():
         return fitted_first.fitted_model(found.recordings, on_progress, whose)
 
 
 @contextmanager
-def _refused() -> Iterator[None]:
+def _translate_refusals() -> Iterator[None]:
     try:
         yield
     except NothingToDiagnose as refusal:
-        raise nothing_to_diagnose(refusal.problems, GIVE_ONE) from refusal
+        raise not_diagnosable_error(refusal.problems, GIVE_ONE) from refusal

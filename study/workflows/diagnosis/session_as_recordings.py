@@ -1,11 +1,11 @@
-"""The trials of a session as one recording to be diagnosed, one after the other, by frequency and level.
+"""The trials of a session as one recording for a diagnosis, concatenated by frequency and level.
 
-A trial's recording holds the middle of a vibration that was on before. A simulation starts from rest, so before each
-trial a full cycle of its own command is played, over and over and fading in, with nothing to compare with.
+A trial's recording begins in the middle of a vibration, whereas a simulation starts from rest. So a lead is put before
+each trial: its own command repeated periodically and faded in, with unknown response.
 
-What is played is what was decided beforehand. The virtual spring that held the handle at its place goes into the model:
-a simulation by forces that a spring made of what really happened would drift away from it. Positions are left out: they
-are encoders', in front of the cables, and where a handle that sticks comes to rest is chance.
+The command is the excitation, which was decided beforehand. The virtual spring that held the handle goes into the
+model: a simulation driven by the spring's recorded force would drift. Positions are left out: they come from encoders
+in front of the cables, and the resting place of a handle with friction is random.
 """
 
 import math
@@ -27,15 +27,15 @@ from study.store.sessions.archive import SessionFolder, find_session
 from study.workflows.results.fold_session import fold_session
 
 MOST_S = 60.0
-"""Of vibration, over all trials that are taken: more would cost time without telling much more."""
+"""Largest total duration of the trials (s): more would cost time and add little information."""
 LEAD_S = 0.4
-"""Before each trial: a handle that is held settles in less."""
+"""Lead before each trial (s): a held handle settles in less."""
 REPEAT_S = 0.2
-"""Cycles are counted in groups so long where they fit: more of what was played is then compared."""
+"""Cycles are grouped into periods of this length (s) where they fit, so that more of the signal is compared."""
 LEVEL_STEP_DB = 4.0
-"""Levels within so many decibels count as one: a staircase's own are too many to be compared one by one."""
+"""Levels within this step are treated as one: a staircase has too many to compare individually."""
 TESTED_OF = 4
-"""Every so many-th trial of a frequency and a level is kept for the test."""
+"""One in this many trials of a frequency and level is kept for the test."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,9 +45,9 @@ class SessionRecordings:
     parents: tuple[Path, ...]
     remarks: tuple[str, ...]
     simulated: bool
-    """The device was the simulated omega.3."""
+    """Whether the device was the simulated omega.3."""
     spring_n_per_m: float
-    """Of the virtual spring, which is no part of the recording's command; 0 = none."""
+    """Stiffness of the virtual spring, which is not in the recording's command; 0 = none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +59,8 @@ class _Trial:
 
 
 def session_recordings(session: Path, seed: int) -> SessionRecordings:
-    """seed: draws which trials are taken where there are many, and which are kept for the test. Raises StudyError."""
+    """Read the session. seed: draws the trials if there are too many, and those kept for the test. Raises
+    StudyError."""
     folder = find_session(str(session), session.absolute().parent)
     folded = fold_session(folder)
     opened = folded.state.opened
@@ -74,10 +75,10 @@ def session_recordings(session: Path, seed: int) -> SessionRecordings:
             saved="Nothing was written.",
         )
     draw = np.random.default_rng(seed)
-    taken = _taken(usable, draw)
-    spring = spring_of([trial.recording for trial in taken])
+    taken = _draw_trials(usable, draw)
+    spring = estimate_spring([trial.recording for trial in taken])
     return SessionRecordings(
-        recording=_merged(taken, folder, draw),
+        recording=_concatenate_trials(taken, folder, draw),
         name=folder.name,
         parents=(folder.log, *(trial.path for trial in taken)),
         remarks=tuple(_remarks(folder, found, usable, taken)),
@@ -87,8 +88,8 @@ def session_recordings(session: Path, seed: int) -> SessionRecordings:
 
 
 def _trial(path: Path, logged: Mapping[str, str | None]) -> _Trial | None:
-    """None where samples are missing, something was wrong while it was played, or it is not the file that was written
-    under its name."""
+    """The trial; None if samples are missing, something was wrong during playback, or the file is not the one
+    logged."""
     name = f"{path.parent.name}/{path.name}"
     if name in logged and sha256_of(path) != logged[name]:
         return None
@@ -102,8 +103,8 @@ def _trial(path: Path, logged: Mapping[str, str | None]) -> _Trial | None:
     return _Trial(path, recording, float(meta["frequency_hz"]), float(meta["level_n"]))
 
 
-def _taken(trials: Sequence[_Trial], draw: np.random.Generator) -> list[_Trial]:
-    """By frequency and level. Where there are too many, the same share of each group is drawn, and one at least."""
+def _draw_trials(trials: Sequence[_Trial], draw: np.random.Generator) -> list[_Trial]:
+    """Stratified random sample by frequency and level, at least one trial of each group."""
     seconds = sum(trial.recording.response.duration_s for trial in trials)
     share = min(1.0, MOST_S / seconds)
     taken: list[_Trial] = []
@@ -122,7 +123,7 @@ def _rung(level_n: float) -> int:
     return round(20 * math.log10(max(level_n, 1e-6)) / LEVEL_STEP_DB)
 
 
-def _merged(trials: Sequence[_Trial], folder: SessionFolder, draw: np.random.Generator) -> Recording:
+def _concatenate_trials(trials: Sequence[_Trial], folder: SessionFolder, draw: np.random.Generator) -> Recording:
     first = trials[0].recording
     lead = round(LEAD_S * first.sample_rate_hz)
     parts: list[Mapping[str, FloatArray]] = []
@@ -136,14 +137,14 @@ def _merged(trials: Sequence[_Trial], folder: SessionFolder, draw: np.random.Gen
             own = trial.recording.segments[0]
             start, stop = begin + lead + own.start, begin + lead + own.stop
             role = "test" if place in tested else "fit"
-            period = _repeating(own.period, trial.recording.sample_rate_hz)
+            period = _group_period(own.period, trial.recording.sample_rate_hz)
             segments.append(Segment(start, stop, "sine", 10 ** (rung * LEVEL_STEP_DB / 20), period, role))
             begin += lead + len(trial.recording)
-    decided = _joined("command", parts, _decided(first))
+    decided = _concatenate_signal("command", parts, _excitation(first))
     return Recording(
         device=first.device,
         command=decided,
-        response=_joined("response", parts, first.response),
+        response=_concatenate_signal("response", parts, first.response),
         excitation=decided,
         hold=first.hold,
         segments=tuple(segments),
@@ -151,18 +152,18 @@ def _merged(trials: Sequence[_Trial], folder: SessionFolder, draw: np.random.Gen
     )
 
 
-def _decided(recording: Recording) -> Signal:
+def _excitation(recording: Recording) -> Signal:
     return recording.command if recording.excitation is None else recording.excitation
 
 
-def _repeating(period: int, sample_rate_hz: float) -> int:
+def _group_period(period: int, sample_rate_hz: float) -> int:
     longer = round(REPEAT_S * sample_rate_hz)
     return longer if period > 0 and longer % period == 0 else period
 
 
 def _with_lead(recording: Recording, lead: int) -> dict[str, FloatArray]:
-    """Both signals, (lead + n, channels): what was commanded goes on backwards, what came out is not known there."""
-    played, answered = _decided(recording).samples, recording.response.samples
+    """Both signals, (lead + n, channels): the command extended backwards, the response unknown (NaN) there."""
+    played, answered = _excitation(recording).samples, recording.response.samples
     period = recording.segments[0].period or len(recording)
     fade = np.minimum(1.0, np.arange(lead) / max(1, lead // 2))[:, None]
     before = fade * played[np.arange(-lead, 0) % min(period, len(played))]
@@ -172,8 +173,8 @@ def _with_lead(recording: Recording, lead: int) -> dict[str, FloatArray]:
     }
 
 
-def spring_of(recordings: Sequence[Recording]) -> float:
-    """N/m, from what was commanded beyond what was decided, over the way; 0 where that is not known."""
+def estimate_spring(recordings: Sequence[Recording]) -> float:
+    """Stiffness (N/m) by least squares: command minus excitation over position; 0 if unknown."""
     pushed, way = 0.0, 0.0
     for recording in recordings:
         if recording.excitation is None or recording.position is None:
@@ -186,7 +187,7 @@ def spring_of(recordings: Sequence[Recording]) -> float:
     return pushed / way if way > 0 else 0.0
 
 
-def _joined(name: str, parts: Sequence[Mapping[str, FloatArray]], like: Signal) -> Signal:
+def _concatenate_signal(name: str, parts: Sequence[Mapping[str, FloatArray]], like: Signal) -> Signal:
     return replace(like, samples=np.vstack([part[name] for part in parts]))
 
 

@@ -1,4 +1,4 @@
-"""A virtual spring that held the handle while it was recorded, as a part of the model that is compared."""
+"""A virtual spring that held the handle during recording, added to the model."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 
 
 def with_spring(model: MechanicalModel, spring_n_per_m: float) -> MechanicalModel:
-    """Alike along every driven axis; a negative one is taken off again."""
+    """The model with this stiffness added along every driven axis; a negative one is subtracted."""
     if spring_n_per_m == 0:
         return model
     axes = driven_axes(model)
@@ -15,6 +15,7 @@ def with_spring(model: MechanicalModel, spring_n_per_m: float) -> MechanicalMode
 
 
 def spring_words(spring_n_per_m: float) -> tuple[str, ...]:
+    """Remark about the spring; empty if there is none."""
     if spring_n_per_m == 0:
         return ()
     return (

@@ -1,4 +1,4 @@
-"""What `hapteq twin` says: the numbers of the model, and how well it predicts."""
+"""Summary of `hapteq twin`: parameters of the model, and its prediction error."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The folder of a diagnosis: the document, the improved model, the figures and the page."""
+"""Write the folder of a diagnosis: document, improved model, figures and page."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -16,12 +16,12 @@ from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.crash_guard import crash_guard
 from study.workflows.forked_map import forked_map
-from study.workflows.picture_files import DrawnPicture, drawn_picture, write_drawn
+from study.workflows.picture_files import DrawnPicture, draw_picture, write_drawn
 
 
 def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> Findings:
-    """parents: files that it was made from. The findings, with a remark for each figure whose drawing crashed. Raises
-    StudyError."""
+    """Write everything into `folder`. parents: input files. Returns the findings with a remark for each figure that
+    could not be drawn. Raises StudyError."""
     origin = gather_provenance(parents=parents)
     write_diagnosis(folder / DIAGNOSIS_NAME, findings.diagnosis, origin)
     improved = replace(findings.improved, provenance=origin.as_dict())
@@ -37,7 +37,7 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
 
 
 def _drawn(draw: Callable[[], Sequence[Picture]]) -> list[DrawnPicture]:
-    return [drawn_picture(picture) for picture in draw()]
+    return [draw_picture(picture) for picture in draw()]
 
 
 def _shown(origin: Provenance) -> dict[str, str]:

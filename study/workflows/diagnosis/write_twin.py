@@ -1,5 +1,5 @@
-"""A device's nominal mechanical model, as a laboratory would write it down: excited well above friction, fitted, freed
-of what friction put into its dampers, and given tolerances."""
+"""Nominal mechanical model of a device, as a laboratory would make it: excite well above friction, fit, subtract the
+damping equivalent of friction, add tolerances."""
 
 import math
 import tempfile
@@ -29,11 +29,11 @@ from study.workflows.recording.record_device import RecordingPlan, record_device
 TITLE = "The model was not made"
 STANDARD_GRAVITY = 9.80665
 SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY)
-"""ADXL335 as its data sheet has it, behind the capacitors of its board."""
+"""ADXL335 by its data sheet, with the capacitors of its board."""
 ACTUATOR = ActuatorLimits(bandwidth_hz=600.0)
-"""Current loops as they commonly are."""
+"""Typical bandwidth of current loops."""
 LOWER_LEVEL = 0.6
-"""Of the protocol's: what the damping grows by at less force is friction's."""
+"""Second level relative to the protocol's: damping that grows at lower force is friction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class TwinPlan:
     protocol: str = "multisine"
     """Multisines along every axis: a shipped recording protocol's name, or a file."""
     band_hz: tuple[float, float] = (3.0, 60.0)
-    """The study's stimuli with room about them; modes above would cost time at each simulation."""
+    """The study's frequencies with a margin; higher modes would cost time in each simulation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +55,7 @@ class WrittenTwin:
     fit: MechanicalFit
     piece: AsOnePiece
     notes: tuple[str, ...]
-    """Sentences: what was assumed, what friction did."""
+    """Sentences: assumptions, effect of friction."""
 
 
 def write_twin(
@@ -63,7 +63,7 @@ def write_twin(
     on_progress: Callable[[float], None],
     before_moving: Callable[[str], None] = lambda notice: None,
 ) -> WrittenTwin:
-    """Records, fits and writes. `on_progress(share)`; before_moving as for `record_device`. Raises StudyError; no model
+    """Record, fit and write. `on_progress(share)`; before_moving as for `record_device`. Raises StudyError; no model
     is written then."""
     check_free(plan)
     protocol = read_recording_protocol(plan.protocol).protocol
@@ -71,10 +71,10 @@ def write_twin(
     with tempfile.TemporaryDirectory() as folder:
         ways = [
             RecordingPlan(level, plan.device, (0.0, 0.0, 0.0), plan.seed, Path(folder) / f"{name}.h5")
-            for name, level in (("strong", protocol), ("weaker", _lowered(protocol)))
+            for name, level in (("strong", protocol), ("weaker", _reduce_amplitudes(protocol)))
         ]
-        strong = _recorded(ways[0], lambda share: on_progress(0.15 * share), before_moving)
-        weaker = _recorded(ways[1], lambda share: on_progress(0.15 + 0.15 * share), before_moving)
+        strong = _record(ways[0], lambda share: on_progress(0.15 * share), before_moving)
+        weaker = _record(ways[1], lambda share: on_progress(0.15 + 0.15 * share), before_moving)
     settings = MechanicalFitSettings(
         band_hz=plan.band_hz, sensor=SENSOR, actuator=ACTUATOR, joint=True, fit_delay=False
     )
@@ -100,7 +100,7 @@ def write_twin(
 
 
 def check_free(plan: TwinPlan) -> None:
-    """Before anything moves. Raises StudyError."""
+    """Check the output path before anything moves. Raises StudyError."""
     require_free(plan.out, title=TITLE, kind="models", saved="Nothing moved and nothing was written.")
     low, high = plan.band_hz
     if not (math.isfinite(low) and math.isfinite(high) and 0 < low < high):
@@ -124,12 +124,12 @@ def _check_protocol(plan: TwinPlan, protocol: RecordingProtocol) -> None:
         )
 
 
-def _lowered(protocol: RecordingProtocol) -> RecordingProtocol:
+def _reduce_amplitudes(protocol: RecordingProtocol) -> RecordingProtocol:
     segments = tuple(replace(segment, amplitude_n=LOWER_LEVEL * segment.amplitude_n) for segment in protocol.segments)
     return replace(protocol, segments=segments)
 
 
-def _recorded(
+def _record(
     plan: RecordingPlan, on_progress: Callable[[float], None], before_moving: Callable[[str], None]
 ) -> Recording:
     total = max(plan.total_s, 1e-9)
@@ -138,7 +138,7 @@ def _recorded(
 
 
 def _last_realisation_tests(recording: Recording) -> Recording:
-    """Of every direction the last realisation is kept for the test, where there is more than one."""
+    """Mark the last realisation of every direction as test, where there are several."""
     facts: list[Mapping[str, Any]] = recording.meta["segments"]
     last: dict[str, int] = {}
     for fact in facts:

@@ -1,4 +1,4 @@
-"""From a table of wanted accelerations and models of the device to a table of forces."""
+"""Compute a table of forces from a table of wanted accelerations and models of the device."""
 
 import math
 from dataclasses import dataclass, replace
@@ -21,11 +21,11 @@ from study.workflows.equalizer.models_for_playing import ModelsForPlaying, Vecto
 from study.workflows.free_name import require_free
 
 HIGHEST_MPS2 = 1e4
-"""A thousand times gravity: what is wanted beyond it is a slip of the pen."""
+"""Largest accepted acceleration, a thousand times gravity: beyond it the table is wrong."""
 NOT_REACHED = 0.5
-"""Predicted error beyond which forces are no answer to what is wanted."""
+"""Predicted error above which the forces do not reproduce the wanted signal."""
 NO_WEIGHT = 1e-7
-"""Root of the weight over the model's gain below which it is lost in rounding."""
+"""Ratio of the root of the weight to the model's gain below which the weight is lost in rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +46,10 @@ class EqualizedTrajectory:
     plan: EqualizePlan
     wanted: Trajectory
     forces: Trajectory
-    """All that enters the device: a spring's share is still in them."""
+    """Total forces on the device, including a spring's share."""
     models: ModelsForPlaying
     solved: Feedforward
-    """By the models alone."""
+    """Feedforward from the linear models alone."""
     peaks: Peaks
     """Of `forces`."""
     bands: BandFacts | None
@@ -57,7 +57,7 @@ class EqualizedTrajectory:
 
 
 def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
-    """Reads, solves and writes. Raises StudyError; nothing is written then."""
+    """Read, solve and write. Raises StudyError; nothing is written then."""
     check_free(plan.out)
     solved = solve_trajectory(plan)
     write_trajectory(plan.out, solved.forces)
@@ -65,14 +65,14 @@ def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
 
 
 def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
-    """Without writing. Raises StudyError."""
-    wanted = _wanted(plan.trajectory)
+    """Read and solve without writing. Raises StudyError."""
+    wanted = _read_wanted(plan.trajectory)
     models = models_for_playing(plan.models, plan.at_m, plan.weight)
     physics = None if plan.physics is None else read_mechanical_model(plan.physics)
     amplitude_n = None if physics is None else _amplitude_n(models.nearest)
     try:
         require_rate(wanted, models.largest.sample_rate_hz)
-        solved, bands = _solved(plan, wanted, models)
+        solved, bands = _solve(plan, wanted, models)
     except ForceLimitError as limit:
         raise StudyError(
             "The forces would be too strong",
@@ -86,7 +86,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     _require_reached(plan, solved, in_bands=bands is not None)
     compensation = None
     if physics is not None:
-        compensation = _compensated(plan, solved, models.largest, physics, amplitude_n)
+        compensation = _compensate(plan, solved, models.largest, physics, amplitude_n)
     samples = solved.forces.samples if compensation is None else compensation.forces
     forces = replace(solved.forces, samples=samples)
     peaks = require_within(samples, plan.cap_n, forces.sample_rate_hz)
@@ -96,11 +96,11 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
 
 
 def check_free(out: Path, *more: Path) -> None:
-    """Before any work. Raises StudyError."""
+    """Check the output paths before any work. Raises StudyError."""
     require_free(out, *more, title="The forces were not computed", kind="tables")
 
 
-def _wanted(path: Path) -> Trajectory:
+def _read_wanted(path: Path) -> Trajectory:
     trajectory = read_trajectory(path)
     if trajectory.kind is not TRAJECTORY:
         raise WrongUseError(
@@ -131,7 +131,8 @@ def _require_weight(plan: EqualizePlan, models: ModelsForPlaying) -> None:
 
 
 def _require_reached(plan: EqualizePlan, solved: Feedforward, in_bands: bool) -> None:
-    """Where the cap costs something the loss is stated: without the cap what is wanted must be in reach."""
+    """Raise if the models cannot reproduce the wanted signal. Where the cap costs accuracy, the error without the
+    cap decides."""
     missed = solved.error if solved.loss is None else solved.loss.error_free
     if not missed <= NOT_REACHED and in_bands:
         raise StudyError(
@@ -151,7 +152,7 @@ def _require_reached(plan: EqualizePlan, solved: Feedforward, in_bands: bool) ->
         )
 
 
-def _solved(plan: EqualizePlan, wanted: Trajectory, models: ModelsForPlaying) -> tuple[Feedforward, BandFacts | None]:
+def _solve(plan: EqualizePlan, wanted: Trajectory, models: ModelsForPlaying) -> tuple[Feedforward, BandFacts | None]:
     settings = FeedforwardSettings(plan.weight, plan.cap_n, plan.constrain)
     if models.two is None:
         return feedforward_at(models.at, wanted.signal, settings), None
@@ -160,7 +161,7 @@ def _solved(plan: EqualizePlan, wanted: Trajectory, models: ModelsForPlaying) ->
 
 
 def _amplitude_n(model: IdentifiedModel) -> float | None:
-    """With which force the model was identified; None = on recordings that were freed of the effects."""
+    """Force amplitude of the identification; None if the effects were removed from its recordings."""
     found = model.provenance.get("amplitude_n", 0.0)
     if found is None:
         return None
@@ -175,7 +176,7 @@ def _amplitude_n(model: IdentifiedModel) -> float | None:
     return float(found)
 
 
-def _compensated(
+def _compensate(
     plan: EqualizePlan,
     solved: Feedforward,
     model: IdentifiedModel,

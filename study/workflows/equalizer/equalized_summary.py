@@ -1,4 +1,4 @@
-"""What an equalized table is worth, for a person's lines and a program's JSON alike."""
+"""Summary of an equalized table, for a person's lines and a program's JSON."""
 
 from typing import Any
 
@@ -9,10 +9,11 @@ from equalizer.tracking.feedforward.feedforward import within_band
 from study.workflows.equalizer.equalize_trajectory import EqualizedTrajectory
 
 WORTH_SAYING = 0.01
-"""Share of what is wanted that may be left out without a word."""
+"""Fraction of the wanted signal outside the band above which it is mentioned."""
 
 
 def summary(done: EqualizedTrajectory) -> dict[str, Any]:
+    """The figures as plain values."""
     solved, bands, compensation = done.solved, done.bands, done.compensation
     found: dict[str, Any] = {
         "forces": str(done.plan.out),
@@ -33,7 +34,7 @@ def summary(done: EqualizedTrajectory) -> dict[str, Any]:
             "error_capped": solved.loss.error_capped,
             "error_clipped": solved.loss.error_clipped,
         }
-    found |= _interpolated(done)
+    found |= _interpolation_facts(done)
     if bands is not None:
         found["bands"] = {
             "edges_hz": list(bands.edges_hz),
@@ -50,7 +51,7 @@ def summary(done: EqualizedTrajectory) -> dict[str, Any]:
     return found
 
 
-def _interpolated(done: EqualizedTrajectory) -> dict[str, Any]:
+def _interpolation_facts(done: EqualizedTrajectory) -> dict[str, Any]:
     choice = done.models.choice
     if choice is None:
         return {}
@@ -68,8 +69,9 @@ def _interpolated(done: EqualizedTrajectory) -> dict[str, Any]:
 
 
 def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
+    """The figures as terminal lines."""
     solved = done.solved
-    lines = [*_quality_lines(done), *done.models.held_out, _predicted_line(done), *done.models.remarks]
+    lines = [*_quality_lines(done), *done.models.held_out, _prediction_line(done), *done.models.remarks]
     lines += _band_lines(done)
     if solved.left_out > WORTH_SAYING:
         lines.append(
@@ -87,7 +89,7 @@ def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
 
 
 def _quality_lines(done: EqualizedTrajectory) -> list[str]:
-    """What was measured of the models comes before what they predict of themselves."""
+    """Measured quality of the models, before their own prediction."""
     models = done.models
     known = models.quality
     if len(models.given) == 1:
@@ -101,12 +103,13 @@ def _quality_lines(done: EqualizedTrajectory) -> list[str]:
 
 
 def predicted_error(done: EqualizedTrajectory) -> float:
-    """Under a cap that costs something, the figure that can be compared with those without it: corners count too."""
+    """Relative error as the model predicts it; under an active cap, the one comparable with the error without cap
+    (corners included)."""
     loss = done.solved.loss
     return done.solved.error if loss is None else loss.error_capped
 
 
-def _predicted_line(done: EqualizedTrajectory) -> str:
+def _prediction_line(done: EqualizedTrajectory) -> str:
     loss, (low, high) = done.solved.loss, done.models.band_hz
     who = "the model itself predicts" if len(done.models.given) == 1 else "the models themselves predict"
     cost = ""

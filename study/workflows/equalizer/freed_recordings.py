@@ -1,4 +1,4 @@
-"""Recordings freed of the effects that a mechanical model names, so that a model of the linear rest is made of them."""
+"""Remove known effects from recordings, so that a linear model of the remainder can be identified."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,23 +12,23 @@ from equalizer.tracking.compensation.without_effects import without_effects
 from study.errors import StudyError
 
 LEFT_OUT = 0.005
-"""Of the excitation's power, below the band that it is said to fill, and above."""
+"""Fraction of the excitation's power below its band, and above it."""
 
 
-def freed_recordings(recordings: Sequence[Recording], physics: MechanicalModel, path: Path) -> tuple[Recording, ...]:
-    """path: of the mechanical model, for what is said. Raises StudyError where it names nothing that can be taken off,
-    or where a recording does not show the motion."""
-    if not freed_of(physics):
+def remove_effects(recordings: Sequence[Recording], physics: MechanicalModel, path: Path) -> tuple[Recording, ...]:
+    """The recordings without the effects of `physics`. path: of the mechanical model, for messages. Raises
+    StudyError if it names no removable effect, or if a recording does not measure the motion."""
+    if not removable_effects(physics):
         left = "".join(f" {effect.kind}: {why_not(effect)}." for effect in physics.effects)
-        raise _not_freed(f"{path.name} names no effect that can be taken off a recording.{left}")
+        raise _not_removable(f"{path.name} names no effect that can be taken off a recording.{left}")
     try:
-        return tuple(without_effects(recording, physics, excited_band_hz(recording)) for recording in recordings)
+        return tuple(without_effects(recording, physics, excitation_band_hz(recording)) for recording in recordings)
     except ValueError as problem:
-        raise _not_freed(f"{path.name}: {problem}.") from problem
+        raise _not_removable(f"{path.name}: {problem}.") from problem
 
 
-def freed_of(physics: MechanicalModel) -> list[str]:
-    """What is taken off, in words."""
+def removable_effects(physics: MechanicalModel) -> list[str]:
+    """The removable effects in words."""
     return [
         f"{effect.kind}{f' on {effect.axis}' if effect.axis else ''} ({_numbers(effect)})"
         for effect in physics.effects
@@ -42,8 +42,8 @@ def _numbers(effect: ModelEffect) -> str:
     return ", ".join(f"{name} {value:g}" for name, value in effect.parameters.items())
 
 
-def excited_band_hz(recording: Recording) -> tuple[float, float]:
-    """Where all but a hundredth of the power of what was decided beforehand lies."""
+def excitation_band_hz(recording: Recording) -> tuple[float, float]:
+    """Band with 99 % of the excitation's power, low and high (Hz). Raises ValueError without excitation."""
     driven = recording.excitation or recording.command
     samples = np.nan_to_num(driven.samples)
     if not np.ptp(samples, axis=0).any():
@@ -55,7 +55,7 @@ def excited_band_hz(recording: Recording) -> tuple[float, float]:
     return low, high
 
 
-def _not_freed(happened: str) -> StudyError:
+def _not_removable(happened: str) -> StudyError:
     return StudyError(
         "The recordings cannot be freed of known physics",
         happened,

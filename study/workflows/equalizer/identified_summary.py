@@ -1,4 +1,4 @@
-"""What is said of an identified device: lines for a person, a document for a program."""
+"""Summary of an identified device: lines for a person, a document for a program."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""From recordings to a model file: estimate, fit, test on what was kept for it, and a page that shows it all."""
+"""Identify a model from recordings: estimate, fit, held-out test, and a page."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -24,11 +24,11 @@ from study.store.disk.provenance import gather_provenance
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import read_recording
-from study.workflows.equalizer.freed_recordings import freed_of, freed_recordings
+from study.workflows.equalizer.freed_recordings import removable_effects, remove_effects
 from study.workflows.free_name import require_free
 
 NEAR_M = 0.001
-"""Places farther apart than this are two places, and a model is of one."""
+"""Places farther apart than this are different; a model is of one place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,20 +38,21 @@ class IdentifyPlan:
     band_hz: tuple[float, float] = (5.0, 35.0)
     order: int = 26
     smooth: bool | None = None
-    """Local polynomials over neighbouring lines before the fit; None: where lines scatter more than their noise, as
-    they do on a device that is not linear, whose distortions are no noise."""
+    """Local polynomial smoothing over neighbouring lines before the fit; None: where lines scatter more than their
+    noise, as on a nonlinear device."""
     with_spring: bool = False
-    """From the excitation, with the spring's force a part of the device: for playing under the same spring, without
-    trusting encoders to see what the handle does."""
+    """From the excitation, with the spring as part of the device: for playing under the same spring without relying
+    on encoders."""
     physics: Path | None = None
-    """Mechanical model whose named effects are taken off the recordings: the model is then of the linear rest."""
+    """Mechanical model whose named effects are removed from the recordings: the model is then of the linear
+    remainder."""
     longest_decay_s: float | None = None
-    """No pole dies out slower; None: the ordinary bound, and longer where the recordings ask for it."""
+    """Upper bound of the decay time of a pole; None: the default bound, longer where the recordings need it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentifiedDevice:
-    """What was written, and everything that a page about it needs."""
+    """What was written, and the data for a page about it."""
 
     plan: IdentifyPlan
     recordings: tuple[Recording, ...]
@@ -61,7 +62,7 @@ class IdentifiedDevice:
     identified: Identified
     model: IdentifiedModel
     tested: HeldOut | None
-    """On recordings that are as those that were fitted: freed of known physics, where there are such."""
+    """Held-out test on recordings processed like the fitted ones."""
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -71,7 +72,7 @@ class IdentifiedDevice:
 
 
 def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> IdentifiedDevice:
-    """Reads, estimates, fits and writes. `on_progress(share)`. Raises StudyError; nothing is written then."""
+    """Read, estimate, fit and write. `on_progress(share)`. Raises StudyError; nothing is written then."""
     settings = _settings(plan)
     check_free(plan.out)
     recordings = tuple(read_recording(path) for path in plan.recordings)
@@ -80,7 +81,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
         recordings = tuple(_from_excitation(recording) for recording in recordings)
     physics = None if plan.physics is None else read_mechanical_model(plan.physics)
     if plan.physics is not None and physics is not None:
-        recordings = freed_recordings(recordings, physics, plan.physics)
+        recordings = remove_effects(recordings, physics, plan.physics)
     try:
         found = identify_recordings(recordings, settings, plan.smooth, on_progress)
         model = _at_place(plan, recordings, found.identified.model, physics)
@@ -100,7 +101,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
 
 
 def _quality(found: IdentifiedRecordings, recordings: Sequence[Recording], tested: HeldOut | None) -> ModelQuality:
-    """The misfit is that of the lines themselves, even where the fit was made to local averages."""
+    """Quality figures; the misfit is that of the lines themselves, even if the fit used local averages."""
     identified, estimate = found.identified, found.estimate
     misfit = misfit_of_estimate(identified.model, estimate)
     remarks = (*identified.remarks, *held_out_remarks(tested, identified.cost, misfit, recordings))
@@ -114,7 +115,7 @@ def _sentence(remark: str) -> str:
 
 
 def check_free(out: Path) -> None:
-    """Before any work. Raises StudyError."""
+    """Check the output path before any work. Raises StudyError."""
     require_free(out, title="The model was not made", kind="models")
 
 
@@ -133,7 +134,7 @@ def _settings(plan: IdentifyPlan) -> IdentificationSettings:
 def _at_place(
     plan: IdentifyPlan, recordings: Sequence[Recording], model: IdentifiedModel, physics: MechanicalModel | None
 ) -> IdentifiedModel:
-    """With the place where all recordings were made, and where they come from."""
+    """The model with the place of its recordings and its provenance."""
     provenance = {
         **model.provenance,
         **gather_provenance(parents=(*plan.recordings, *([plan.physics] if plan.physics else []))).as_dict(),
@@ -141,21 +142,22 @@ def _at_place(
         "hand": sorted({str(recording.meta.get("hand", "")) for recording in recordings}),
         "feedback": recordings[0].meta.get("feedback"),
         "input": "excitation" if plan.with_spring else "command",
-        # None: compensation of these effects adds them whole, for nothing of them is in the model.
+        # None: these effects are compensated fully, because the model contains nothing of them.
         "amplitude_n": _amplitude_n(recordings) if physics is None else None,
-        "freed_of": [] if physics is None else freed_of(physics),
+        "freed_of": [] if physics is None else removable_effects(physics),
     }
     return replace(model, place_m=_place(recordings), provenance=provenance)
 
 
 def _amplitude_n(recordings: Sequence[Recording]) -> float:
-    """The largest of the segments that were fitted: friction left its equivalent at that amplitude in the model."""
+    """Largest amplitude of the fitted segments: at this amplitude friction has its equivalent in the model."""
     segments = (segment for recording in recordings for segment in recording.segments if segment.role != "test")
     return max((segment.amplitude for segment in segments), default=0.0)
 
 
 def _check_alike(recordings: Sequence[Recording], with_spring: bool) -> None:
-    """One model is of one device: with a hand or without, and under one spring where that is a part of it."""
+    """Raise unless all recordings are of one device: with or without a hand, and under one spring where it is part
+    of the device."""
     found = {"the hand on the handle": {str(r.meta["hand"]) for r in recordings if r.meta.get("hand") is not None}}
     if with_spring:
         found["the spring"] = {_spring_words(r.meta.get("feedback")) for r in recordings}
@@ -172,7 +174,7 @@ def _spring_words(feedback: object) -> str:
 
 
 def _from_excitation(recording: Recording) -> Recording:
-    """As if the feedback were a part of the device: what was decided beforehand is what enters it."""
+    """The recording with the excitation as input, so that the feedback is part of the device."""
     if recording.excitation is None:
         raise _no_model("The recording does not hold its excitation, so the spring's share is not known.")
     return replace(recording, command=recording.excitation)

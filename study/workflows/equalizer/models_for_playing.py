@@ -1,4 +1,4 @@
-"""Model files sorted by what they are together: one model, several places of one device, or two bands of one place."""
+"""Combine model files for playback: one model, several places of one device, or two bands at one place."""
 
 import hashlib
 import math
@@ -25,9 +25,9 @@ from study.store.formats.identified_model_file import read_identified_model
 SAME_PLACE_M = 0.001
 GAIN_LINES = 100
 HIGHEST_GAIN = 1e6
-"""m/s² per N: no handle weighs a milligram."""
+"""Largest plausible gain (m/s^2 per N): no handle weighs a milligram."""
 FAR_M = 0.005
-"""From where a single model was identified: farther, and the user is told."""
+"""Distance from the place of a single model beyond which the user is warned."""
 
 Vector = tuple[float, float, float]
 
@@ -36,25 +36,25 @@ Vector = tuple[float, float, float]
 class ModelsForPlaying:
     given: tuple[IdentifiedModel, ...]
     at: ModelsAtPlace
-    """For two bands: the narrow model alone."""
+    """For two bands: the narrow model only."""
     two: TwoModels | None
     choice: InterpolationChoice | None
     """None for models of one place."""
     remarks: tuple[str, ...]
     """Sentences."""
     held_out: tuple[str, ...]
-    """Sentences: the error at places that were left out and predicted from the others."""
+    """Sentences: the error at places that were left out and interpolated from the others."""
     sha256: str
-    """Of all files, and of the place where it matters which forces they give."""
+    """Hash of all files, and of the place where it affects the forces."""
 
     @property
     def quality(self) -> ModelQuality | None:
-        """Of the worst of them; None where one does not say."""
+        """Of the worst model; None if any has none."""
         return worst_quality(tuple(model.quality for model in self.given))
 
     @property
     def nearest(self) -> IdentifiedModel:
-        """Of those given: what was recorded how. For two bands the narrow one."""
+        """The given model nearest to the place; for two bands the narrow one."""
         if self.two is not None:
             return self.two.narrow
         place_m = self.at.place_m
@@ -62,17 +62,18 @@ class ModelsForPlaying:
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """For which an error is predicted: what all models that are used cover."""
+        """Band for which an error is predicted: common to all models used."""
         return used_models(self.at)[0][1].band_hz
 
     @property
     def largest(self) -> IdentifiedModel:
-        """The one that counts most at the place."""
+        """The model with the largest weight at the place."""
         return self.at.models[int(np.argmax(self.at.weights))]
 
 
 def models_for_playing(paths: tuple[Path, ...], at_m: Vector | None, weight: float) -> ModelsForPlaying:
-    """Raises StudyError for files that are no models, models that cannot play a table, or do not go together."""
+    """Read and combine the models. Raises StudyError for files that are not models, cannot play a table, or do not
+    go together."""
     if at_m is not None and not all(map(math.isfinite, at_m)):
         raise WrongUseError(
             "There is no such place",
@@ -154,7 +155,7 @@ def _held_out(check: PlaceCheck) -> str:
 
 
 def _readable(path: Path) -> IdentifiedModel:
-    """With its channels named as a table's: others may name them otherwise, such as x, y, z, or by numbers."""
+    """Read a model and give its channels a table's names; files may use others, such as x, y, z, or numbers."""
     model = read_identified_model(path)
     in_order = all(_in_order(names) for names in (model.input_channels, model.output_channels))
     if not in_order or (model.input_unit, model.output_unit) != (FORCES.unit, TRAJECTORY.unit):
@@ -179,13 +180,13 @@ def _readable(path: Path) -> IdentifiedModel:
 
 
 def _in_order(names: tuple[str, ...]) -> bool:
-    """Three, and none says that it is another axis than its place says."""
+    """Whether there are three names, none of which contradicts its position."""
     letters = [name[-1:].lower() for name in names]
     return len(names) == 3 and (letters == ["x", "y", "z"] or not set(letters) & set("xyz"))
 
 
 def peak_gain(model: IdentifiedModel) -> float:
-    """Largest answer of one output to one input in the band."""
+    """Largest gain of one output to one input in the band."""
     with np.errstate(over="ignore", invalid="ignore"):
         return float(np.abs(model_response(model, np.geomspace(*model.band_hz, GAIN_LINES))).max())
 
@@ -213,7 +214,7 @@ def _far(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, 
 
 
 def _sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
-    """A single file keeps its own, so that it can be compared by hand."""
+    """Hash of the files; a single file keeps its own, so that it can be compared by hand."""
     each = [sha256_of(path) for path in paths]
     if len(each) == 1:
         return each[0]

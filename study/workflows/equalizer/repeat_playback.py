@@ -1,4 +1,5 @@
-"""Play forces, compare what was measured with what was wanted, correct, play again: `hapteq equalize --repeat N`."""
+"""Iterative learning on the device: play forces, compare with the wanted signal, correct, play again (`hapteq
+equalize --repeat N`)."""
 
 import contextlib
 from collections.abc import Callable
@@ -18,20 +19,21 @@ from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
 from study.store.formats.repeats_file import repeats_path
-from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, repeated, write_repeated
+from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, make_result, write_repeated
 
 REST_S = 2.0
-"""At rest before the first play, to hear the sensor's noise."""
+"""Rest (s) before the first play, to measure the sensor's noise."""
 AGAIN = "Start again; a run for the same trajectory and model can go on from forces that were written."
 
 OnProgress = Callable[[int, float], None]
-"""Told the play, from 0, and the share of it that is over."""
+"""Called with the number of the play, from 0, and the share of it that is done."""
 
 
 def repeat_playback(plan: RepeatPlan, on_progress: OnProgress) -> Repeated:
-    """Interrupted (KeyboardInterrupt) or left by the device, the best so far is written and the error says so.
+    """Play and correct. If interrupted (KeyboardInterrupt) or stopped by the device, the best result so far is written
+    and the error says so.
 
-    Raises StudyError before anything moves for a person on the handle, forces above the cap, a name that is taken.
+    Raises StudyError before anything moves if a person holds the handle, forces exceed the cap, or a name is taken.
     """
     _check(plan)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
@@ -50,25 +52,25 @@ def repeat_playback(plan: RepeatPlan, on_progress: OnProgress) -> Repeated:
             error.saved = _write_best(plan, states, played)
             raise
         write_repeated(plan, states[-1], interrupted=False)
-        return repeated(plan, states[-1], played)
+        return make_result(plan, states[-1], played)
 
 
 def _check(plan: RepeatPlan) -> None:
     if plan.settings.hand_on_handle:
-        raise _refused(
+        raise _refusal(
             "A person would hold the handle. Repeats learn what one hand did in one play, and play it to the next.",
             "Take the hand off the handle and open the device without one.",
         )
     if plan.repeats < 1:
-        raise _refused(f"{plan.repeats} repeats were asked for.", "Ask for one or more with --repeat N.")
+        raise _refusal(f"{plan.repeats} repeats were asked for.", "Ask for one or more with --repeat N.")
     for path in () if plan.out is None else (plan.out, repeats_path(plan.out)):
         if path.exists():
-            raise _refused(f"{path} exists already, and results are never overwritten.", "Choose another --out.")
+            raise _refusal(f"{path} exists already, and results are never overwritten.", "Choose another --out.")
     if plan.out is not None and not plan.out.absolute().parent.is_dir():
-        raise _refused(f"There is no folder {plan.out.parent} to write {plan.out.name} into.", "Make it first.")
+        raise _refusal(f"There is no folder {plan.out.parent} to write {plan.out.name} into.", "Make it first.")
 
 
-def _refused(happened: str, do_now: str) -> StudyError:
+def _refusal(happened: str, do_now: str) -> StudyError:
     return StudyError("Nothing was repeated", happened, do_now, saved="Nothing moved.")
 
 
@@ -79,22 +81,22 @@ def _play_all(
     played: list[Played],
     on_progress: OnProgress,
 ) -> None:
-    begun = _begun(plan, device)
-    rest = _measured(_play(device, np.zeros((round(REST_S * device.info.sample_rate_hz), 3)), lambda _: None))
+    begun = _start_iteration(plan, device)
+    rest = _usable_response(_play(device, np.zeros((round(REST_S * device.info.sample_rate_hz), 3)), lambda _: None))
     repetition = replace(begun.repetition, noise_floor=noise_of_rest(rest, begun.repetition))
     states.append(replace(begun, repetition=repetition, noise_floor=repetition.noise_floor))
     while states[-1].verdict is Verdict.CONTINUE and len(played) <= plan.repeats:
         number = len(played)
         one = _play(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
-        measured = _measured(one)
+        measured = _usable_response(one)
         played.append(one)
         states.append(next_forces(states[-1], measured))
 
 
-def _begun(plan: RepeatPlan, device: Device) -> IterationState:
+def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
     signal, rate_hz = plan.wanted.signal, device.info.sample_rate_hz
     if signal.sample_rate_hz != rate_hz:
-        raise _refused(
+        raise _refusal(
             f"The trajectory is at {signal.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz.",
             "Resample the trajectory to the device's rate.",
         )
@@ -120,7 +122,7 @@ def _begun(plan: RepeatPlan, device: Device) -> IterationState:
         # What follows the last row is in no table: the model's own.
         return begin(repetition, np.vstack([plan.first, invert(inside)[len(signal) :]]))
     except ValueError as error:
-        raise _refused(
+        raise _refusal(
             f"{str(error)[:1].upper()}{str(error)[1:]}.", "Make the trajectory smaller, or correct it."
         ) from error
 
@@ -130,8 +132,8 @@ def _play(device: Device, forces: FloatArray, on_progress: Callable[[float], Non
     return device.play(commands, on_progress)
 
 
-def _measured(played: Played) -> FloatArray:
-    """The accelerometer's own rows. Raises DeviceError where corrections from them would be wrong."""
+def _usable_response(played: Played) -> FloatArray:
+    """The accelerometer's samples. Raises DeviceError where corrections from them would be wrong."""
     health = played.health
     if played.recording is None or health.fault is not Fault.NONE:
         raise DeviceError("The device let go", f"While repeating: {health.fault.value}.", "Check the device.")

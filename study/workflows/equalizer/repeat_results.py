@@ -1,4 +1,4 @@
-"""What repeating is asked for and what it found, kept as a table of forces with a document beside it."""
+"""Order and result of repeated playback, stored as a table of forces with a document beside it."""
 
 import hashlib
 from dataclasses import dataclass
@@ -21,43 +21,44 @@ from study.store.formats.trajectory_file import read_trajectory, write_trajector
 @dataclass(frozen=True, slots=True, eq=False)
 class RepeatPlan:
     wanted: Trajectory
-    """Accelerations, from rest to rest; their part in the band is played."""
+    """Accelerations, from rest to rest; only their part in the band is played."""
     inverse: InverseOfLength
     band_hz: tuple[float, float]
     model_sha256: str
-    """Of what the inverse was made from: forces are taken up again for the same only."""
+    """Of the models behind the inverse: forces are reused for the same ones only."""
     settings: DeviceSettings
-    """Without a hand on the handle. The stimulus' cap is kept by every correction."""
+    """Without a hand on the handle. Every correction respects the stimulus' cap."""
     device: str
     repeats: int = 10
     """After the first play."""
     first_gain: float = 1.0
     """See `equalizer.tracking.learning.convergence`."""
     spring: VirtualSpring = NO_SPRING
-    """What acts on the device and is not in the model already."""
+    """Spring that acts on the device and is not in the model already."""
     first: FloatArray | None = None
-    """(N, 3): forces to begin with, one to one with what is wanted; None = the model's."""
+    """(N, 3): forces to start from, one to one with the wanted signal; None = the model's."""
     seed: int = 0
     out: Path | None = None
-    """Table of forces to write; the repeats are written beside it."""
+    """Table of forces to write; the document is written beside it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Repeated:
     forces: Trajectory
-    """The best, one to one with what is wanted."""
+    """The best forces, one to one with the wanted signal."""
     errors: tuple[float, ...]
-    """Of each play as the accelerometer has it, in the band, relative; noise included."""
+    """Relative error in the band of each play as measured, noise included."""
     noise_floor: float
-    """Likewise, of noise alone."""
+    """The same of noise alone."""
     verdict: Verdict
     kept: int
-    """Which play's forces these are, from 0."""
+    """Number of the play with these forces, from 0."""
     remark: str
     played: tuple[Played, ...]
 
 
-def repeated(plan: RepeatPlan, state: IterationState, played: list[Played]) -> Repeated:
+def make_result(plan: RepeatPlan, state: IterationState, played: list[Played]) -> Repeated:
+    """The result after the last play."""
     verdict = Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
     return Repeated(
         forces=_table(plan, state),
@@ -81,6 +82,7 @@ def _floor(state: IterationState) -> float:
 
 
 def write_repeated(plan: RepeatPlan, state: IterationState, interrupted: bool) -> None:
+    """Write forces and document."""
     if plan.out is None:
         return
     table = _table(plan, state)
@@ -106,7 +108,7 @@ def write_repeated(plan: RepeatPlan, state: IterationState, interrupted: bool) -
 
 
 def earlier_forces(forces: Path, wanted: Trajectory, model_sha256: str) -> FloatArray:
-    """(N, 3): what an earlier run found for the same trajectory and model. Raises StudyError for any other."""
+    """(N, 3): forces that an earlier run found for the same trajectory and model. Raises StudyError for others."""
     document, table = read_repeats(repeats_path(forces)), read_trajectory(forces)
     found = {
         "another trajectory": document.trajectory_sha256 == trajectory_sha256(wanted),

@@ -1,4 +1,4 @@
-"""Forces for a table, corrected on the device: solved by the model, tested for convergence, played, improved."""
+"""Forces for a table, corrected on the device: solve by the model, check convergence, play, improve."""
 
 import math
 from dataclasses import dataclass
@@ -29,14 +29,14 @@ from study.workflows.equalizer.equalized_summary import summary, summary_lines
 from study.workflows.equalizer.models_for_playing import ModelsForPlaying
 from study.workflows.equalizer.repeat_playback import OnProgress, repeat_playback
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, earlier_forces
-from study.workflows.equalizer.spring_beside_model import spring_beside
+from study.workflows.equalizer.spring_beside_model import spring_outside_model
 
 SPRING_HZ = 3.5
-"""As in the shipped recordings, for a model that does not say under which spring it was recorded."""
+"""As in the shipped recordings, for a model that does not state its spring."""
 SPRING_ROOM_N = 1.5
 HAND_CAP_N = 3.0
 SAFE_SHARE = 0.9
-"""Of the largest gain with which every error shrinks."""
+"""Fraction of the largest gain with which every error shrinks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class RepeatOrder:
     repeats: int
     device: str
     earlier: Path | None = None
-    """Table of forces of an earlier run, to go on from."""
+    """Table of forces of an earlier run to continue from."""
     seed: int = 1
 
 
@@ -54,17 +54,17 @@ class RepeatedTrajectory:
     order: RepeatOrder
     repeated: Repeated
     tested: Convergence | None
-    """None where the models do not say how well they are known."""
+    """Convergence test; None if the models do not state their uncertainty."""
     gain: float
 
 
 def repeat_trajectory(plan: EqualizePlan, order: RepeatOrder, on_progress: OnProgress) -> RepeatedTrajectory:
-    """Writes forces and repeats. Raises StudyError, before anything moves for what could not be repeated."""
+    """Solve, play, correct and write. Raises StudyError, before anything moves if repeating is not possible."""
     check_free(plan.out, repeats_path(plan.out))
     solved = solve_trajectory(plan)
     _require_repeatable(solved.models)
     if solved.solved.loss is not None:
-        raise _refused(
+        raise _refusal(
             "The forces are at the cap already, so that there is no room to correct them.",
             "Scale the accelerations, or leave out --constrain or --repeat.",
         )
@@ -88,7 +88,8 @@ def repeat_trajectory(plan: EqualizePlan, order: RepeatOrder, on_progress: OnPro
     return RepeatedTrajectory(solved, order, repeat_playback(repeat_plan, on_progress), tested, gain)
 
 
-def repeated_summary(done: RepeatedTrajectory) -> dict[str, Any]:
+def repeat_summary(done: RepeatedTrajectory) -> dict[str, Any]:
+    """The figures as plain values."""
     found = done.repeated
     return {
         **summary(done.solved),
@@ -104,10 +105,11 @@ def repeated_summary(done: RepeatedTrajectory) -> dict[str, Any]:
     }
 
 
-def repeated_lines(done: RepeatedTrajectory) -> tuple[str, ...]:
+def repeat_lines(done: RepeatedTrajectory) -> tuple[str, ...]:
+    """The figures as terminal lines."""
     found = done.repeated
     *alone, _ = summary_lines(done.solved)  # the last is about forces that no spring adds to
-    lines = [*alone, _tested_line(done)]
+    lines = [*alone, _convergence_line(done)]
     for number, error in enumerate(found.errors):
         kept = ", kept" if number == found.kept else ""
         lines.append(f"Play {number}: error {100 * error:.2f} % as measured{kept}.")
@@ -129,7 +131,7 @@ def _verdict(done: RepeatedTrajectory) -> str:
     return f"{found.verdict.value[:1].upper()}{found.verdict.value[1:]}."
 
 
-def _tested_line(done: RepeatedTrajectory) -> str:
+def _convergence_line(done: RepeatedTrajectory) -> str:
     if done.tested is None:
         return "Convergence was not tested before playing: the model does not hold how well it is known."
     return (
@@ -140,12 +142,12 @@ def _tested_line(done: RepeatedTrajectory) -> str:
 
 def _require_repeatable(models: ModelsForPlaying) -> None:
     if models.two is not None:
-        raise _refused(
+        raise _refusal(
             "Two bands of one place were given, and what is felt of the upper one is no waveform to be corrected.",
             "Give the one model whose band shall be repeated.",
         )
     if any("held" in model.provenance.get("hand", ()) for model in models.given):
-        raise _refused(
+        raise _refusal(
             "The model was recorded with a hand on the handle. Repeats learn what one hand did in one play, and play "
             "it to the next.",
             "Take a model of the device alone, and leave the handle alone.",
@@ -153,16 +155,16 @@ def _require_repeatable(models: ModelsForPlaying) -> None:
 
 
 def _acting_spring(models: ModelsForPlaying) -> VirtualSpring:
-    """Under which the device is played, and which is not in the model."""
+    """Spring under which the device is played and which is not in the model."""
     feedback = _feedback(models)
     acting = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
     if not feedback:
-        raise _refused(
+        raise _refusal(
             "The model does not say under which spring it was recorded, so the spring's share of the forces is not "
             "known.",
             "Identify it from recordings that hapteq record made.",
         )
-    return spring_beside(models.nearest, acting)
+    return spring_outside_model(models.nearest, acting)
 
 
 def _feedback(models: ModelsForPlaying) -> dict[str, Any]:
@@ -175,7 +177,7 @@ def _gain(tested: Convergence | None) -> float:
         return 1.0
     gain = min(1.0, SAFE_SHARE * tested.safe_beta)
     if gain < LOWEST_GAIN:
-        raise _refused(
+        raise _refusal(
             f"Repeats would not converge: at {tested.worst_hz:.1f} Hz {tested.surviving.max():.2f} of an error can "
             "survive each, by what the device may be within the models.",
             "Record and identify at the place itself, or with more sweeps.",
@@ -184,7 +186,7 @@ def _gain(tested: Convergence | None) -> float:
 
 
 def _settings(plan: EqualizePlan, models: ModelsForPlaying) -> DeviceSettings:
-    """The spring of the recordings; steps up to what forces at the upper end of the band do at the cap."""
+    """Device settings: the spring of the recordings; slew limit for the upper end of the band at the cap."""
     feedback = _feedback(models)
     steepest = 2 * math.pi * models.band_hz[1] * plan.cap_n
     return DeviceSettings(
@@ -207,7 +209,7 @@ def _settings(plan: EqualizePlan, models: ModelsForPlaying) -> DeviceSettings:
 
 
 def _first(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring) -> FloatArray | None:
-    """None = the model's own, which the first play computes together with what follows the last row."""
+    """Initial forces; None = the model's own, which the first play computes together with what follows the last row."""
     if order.earlier is not None:
         return earlier_forces(order.earlier, solved.wanted, solved.models.sha256)
     if solved.compensation is None:
@@ -220,5 +222,5 @@ def _first(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSprin
     return forces + fitting_share(forces, held, solved.plan.cap_n) * held
 
 
-def _refused(happened: str, do_now: str) -> StudyError:
+def _refusal(happened: str, do_now: str) -> StudyError:
     return StudyError("Nothing was repeated", happened, do_now, saved="Nothing moved.")

@@ -1,4 +1,4 @@
-"""The page about an identified device, with its figures beside it."""
+"""Page about an identified device, with its figures beside it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,12 +21,12 @@ from study.workflows.equalizer.identify_model import IdentifiedDevice
 from study.workflows.picture_files import write_pictures
 
 FREER = 1.5
-"""Bound over the slowest decay that was found."""
+"""Factor between the bound on the decay time and the slowest decay found."""
 PAGE_NAME = "report.html"
 
 
 def report_identification(device: IdentifiedDevice, folder: Path, on_progress: Callable[[float], None]) -> Path:
-    """Writes report.html and figures/ into `folder`; returns the page. Raises CannotWriteError."""
+    """Write report.html and figures/ into `folder`; returns the page. Raises CannotWriteError."""
     found = findings(device, lambda share: on_progress(0.8 * share))
     pictures = identification_pictures(found)
     write_pictures(folder / "figures", pictures)
@@ -38,6 +38,7 @@ def report_identification(device: IdentifiedDevice, folder: Path, on_progress: C
 
 
 def findings(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> IdentificationFindings:
+    """Content of the page."""
     onset = coupling_onset(device.estimate)
     lowest, highest = max(1.0, float(device.estimate.frequency_hz[0])), float(device.estimate.frequency_hz[-1])
     return IdentificationFindings(

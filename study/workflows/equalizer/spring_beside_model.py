@@ -1,4 +1,4 @@
-"""Which spring is still to be accounted for where a model drives a device: none that is in the model already."""
+"""Spring to account for during playback that the model does not already contain."""
 
 import math
 
@@ -7,11 +7,12 @@ from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpri
 from study.errors import StudyError
 
 SAME = 0.01
-"""Springs that differ by less, relatively, are one."""
+"""Relative difference below which two springs are equal."""
 
 
-def spring_beside(model: IdentifiedModel, spring: VirtualSpring) -> VirtualSpring:
-    """spring: what will act while the model's forces are played. Raises StudyError where the model holds another."""
+def spring_outside_model(model: IdentifiedModel, spring: VirtualSpring) -> VirtualSpring:
+    """The part of `spring`, which acts during playback, that the model does not contain. Raises StudyError if the
+    model contains another spring."""
     if model.provenance.get("input") != "excitation":
         return spring
     feedback = model.provenance.get("feedback")

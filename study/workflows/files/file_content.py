@@ -1,4 +1,4 @@
-"""A file opened once, so that everybody who might know its format can look at it."""
+"""Content of a file, opened once for all recognisers."""
 
 import csv
 import io
@@ -17,15 +17,15 @@ from study.store.disk.toml_text import TOML_BYTES, too_long_key
 
 @dataclass(frozen=True, slots=True)
 class FileContent:
-    """What a file is made of. Everything that it is not is None."""
+    """A file's content in the forms that it can be read as; None for the others."""
 
     path: Path
     is_folder: bool = False
     hdf5_format: str | None = None
-    """What an HDF5 file calls itself; empty where it says nothing."""
+    """Format attribute of an HDF5 file; empty if it has none."""
     text: str | None = None
     json: Any = None
-    """A whole document. Lines of JSON (`events.jsonl`) are none."""
+    """A whole document. Lines of JSON (`events.jsonl`) are not parsed here."""
     toml: dict[str, Any] | None = None
 
     @property
@@ -35,7 +35,7 @@ class FileContent:
 
     @property
     def header(self) -> tuple[str, ...]:
-        """The first line's fields, if this were a table."""
+        """Fields of the first line, as of a table."""
         rows = csv.reader(io.StringIO((self.text or "").partition("\n")[0]))
         try:
             return tuple(name.strip() for name in next(rows, []))

@@ -163,7 +163,7 @@ def importing_markdown() -> str:
         *(_keys(_title(name, node), _table_of(node)) for name, node in _tables()),
         "## Maps that come with hapteq",
         "For public recordings; no data are in them. `--map NAME` takes one.",
-        _rows(("name", "files", "what"), (_shipped(name) for name in list_shipped_maps())),
+        _rows(("name", "files", "what"), (_map_row(name) for name in list_shipped_maps())),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -197,7 +197,7 @@ def _keys(title: str, table: Node) -> str:
     return f"### {title}\n\n{_rows(('key', 'holds', 'meaning'), rows)}"
 
 
-def _shipped(name: str) -> tuple[str, str, str]:
+def _map_row(name: str) -> tuple[str, str, str]:
     found = read_map(name).map
     return f"`{name}`", ", ".join(f"`{pattern}`" for pattern in found.files), found.title
 

@@ -1,4 +1,4 @@
-"""Who knows which file: one small function per format. A new format adds its function to the tuple at the end."""
+"""Recognise a file's format: one small function per format. A new format adds its function to the tuple at the end."""
 
 from collections.abc import Callable
 
@@ -32,7 +32,8 @@ from study.store.formats.trials_file import TRIALS_HEADER, read_trials
 from study.workflows.files.file_content import FileContent
 
 Recogniser = Callable[[FileContent], str | None]
-"""What the file is, in words; None where it is another's. Raises UnusableFileError where it is ours but wrong."""
+"""The kind of the file in words; None if it has another format. Raises UnusableFileError if the format is ours but
+the content wrong."""
 
 
 def recognise_recording(content: FileContent) -> str | None:
@@ -89,7 +90,7 @@ def recognise_import_map(content: FileContent) -> str | None:
 
 
 def _unit_problem(channel: ChannelMap | ComputedMap) -> str:
-    """Empty where its unit is known, or none is stated."""
+    """Problem with the unit; empty if it is known or not stated."""
     try:
         check_quantity(channel.quantity, parse_unit(channel.unit.strip() or UNSTATED))
     except UnknownUnitError as error:
@@ -182,4 +183,4 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     recognise_import_map,
     recognise_protocol,
 )
-"""Asked in this order; the first answer counts."""
+"""Tried in this order; the first answer counts."""

@@ -1,4 +1,4 @@
-"""Recognisers of what a study leaves behind: session folders and logs, summaries, statistics, locks, tombstones."""
+"""Recognisers of a study's results: session folders and logs, summaries, statistics, locks, tombstones."""
 
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -35,7 +35,7 @@ DOCUMENTS = {
     WITHDRAWAL_FORMAT: ("withdrawal that was begun", ()),
     TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
 }
-"""Format: what it is, and the keys it must have."""
+"""By format: kind in words, and required keys."""
 
 
 def recognise_session(content: FileContent) -> str | None:
@@ -43,14 +43,14 @@ def recognise_session(content: FileContent) -> str | None:
     if content.is_folder:
         folder = SessionFolder(content.path.resolve())
         if folder.withdrawn:
-            return _withdrawn(folder, content.path)
-        return _checked(folder, content.path) if folder.log.exists() else None
+            return _describe_withdrawn(folder, content.path)
+        return _check_session(folder, content.path) if folder.log.exists() else None
     if content.path.name == LOG_NAME or f'"{SESSION_FORMAT}"' in (content.text or "")[:1000]:
-        return _described(_folded(SessionFolder(content.path.resolve().parent), content.path))
+        return _describe(_fold(SessionFolder(content.path.resolve().parent), content.path))
     return None
 
 
-def _withdrawn(folder: SessionFolder, path: Path) -> str:
+def _describe_withdrawn(folder: SessionFolder, path: Path) -> str:
     if finish := how_to_finish(folder):
         raise UnusableFileError(path, "withdrawn session", ("the erasing is not finished", finish))
     return "withdrawn session; nothing is left of it but its tombstone"
@@ -82,19 +82,19 @@ def recognise_lock(content: FileContent) -> str | None:
     return f"lock of protocol '{lock.name}', {local_time(lock.locked_utc, machine_zone)}"
 
 
-def _checked(folder: SessionFolder, path: Path) -> str:
-    """Beyond the log: every recording is the one that the log speaks of, and the table agrees with it."""
-    folded = _folded(folder, path)
+def _check_session(folder: SessionFolder, path: Path) -> str:
+    """Beyond the log: every recording is the logged one, and the tables agree with the log."""
+    folded = _fold(folder, path)
     problems = [
         *_recording_problems(folder, folded),
         *_result_problems(folder, folded),
     ]
     if problems:
         raise UnusableFileError(path, KIND, tuple(problems))
-    return _described(folded)
+    return _describe(folded)
 
 
-def _folded(folder: SessionFolder, path: Path) -> FoldedSession:
+def _fold(folder: SessionFolder, path: Path) -> FoldedSession:
     try:
         folded = fold_session(folder)
     except UnusableFileError:
@@ -121,7 +121,7 @@ def _recording_problems(folder: SessionFolder, folded: FoldedSession) -> list[st
 
 
 def _result_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
-    """What is missing is due and not wrong; what differs from the log was changed, or belongs to an earlier time."""
+    """Results that contradict the log. Missing ones are due and not reported."""
     said = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded.seal_due else []
     for result in result_problems(folder, folded.state):
         if not result.missing:
@@ -129,7 +129,7 @@ def _result_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
     return said
 
 
-def _described(folded: FoldedSession) -> str:
+def _describe(folded: FoldedSession) -> str:
     state = folded.state
     who = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
     end = state.sitting.turned_away or ("finished" if state.closed else "not finished")

@@ -31,21 +31,21 @@ class Validation:
     kind: str
     """In words: "recording, 105 s at 1000 Hz, 3 commands, 3 responses"."""
     problems: tuple[str, ...]
-    """One sentence each; empty = the file is sound."""
+    """One sentence each; empty = the file is valid."""
     notes: tuple[str, ...] = ()
-    """Worth knowing of a sound file too: that others can read a session's folder."""
+    """Remarks about a valid file, such as a session's folder that others can read."""
 
 
 def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECOGNISERS + RECOGNISERS) -> Validation:
-    """Never raises for what is in a file or for one that is not there."""
-    found = _validated(path, recognisers)
+    """Validate one file. Never raises for its content or absence."""
+    found = _validate(path, recognisers)
     folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
     said = (privacy_warning(folder) for folder in folders if _is_folder(folder))
     return replace(found, notes=(*filter(None, said), *_notes(found)))
 
 
 def _notes(found: Validation) -> tuple[str, ...]:
-    """Of a sound recording: axes that are not driven."""
+    """Remarks about a valid recording: axes that are not driven."""
     if found.problems or not found.kind.startswith("recording, "):
         return ()
     command = read_recording(found.path).command
@@ -62,7 +62,7 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _validated(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
+def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
     try:
         content = open_content(path)
         for recognise in recognisers:
@@ -73,12 +73,12 @@ def _validated(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
         return Validation(path, error.kind, error.sentences)
     except StudyError as error:
         return Validation(path, "unreadable", (error.happened,))
-    kind, problem = _unknown(content)
+    kind, problem = _describe_unknown(content)
     return Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
 
 
-def _unknown(content: FileContent) -> tuple[str, str]:
-    """The best that can be said of a file of no known kind."""
+def _describe_unknown(content: FileContent) -> tuple[str, str]:
+    """Kind and problem of a file of no known format."""
     if content.is_folder:
         return "folder", "this folder is not a session: it holds no events.jsonl"
     if content.hdf5_format is not None:

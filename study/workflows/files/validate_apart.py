@@ -1,4 +1,4 @@
-"""Validation in a process of its own: a damaged HDF5 file can crash or hang the library that reads it."""
+"""Validate files in a separate process: a damaged HDF5 file can crash or hang the library that reads it."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -10,31 +10,31 @@ from study.errors import StudyError
 from study.workflows.files.validate import Validation, validate_file
 
 PATIENCE_S = 60.0
-"""A recording of an hour takes seconds."""
+"""Longest wait for one file; a recording of an hour takes seconds."""
 START_S = 300.0
-"""Imports alone; a machine that swaps takes a minute."""
+"""Longest wait for the imports of the worker; a swapping machine takes a minute."""
 
 
 def validate_files(paths: Sequence[Path], patience_s: float = PATIENCE_S) -> Iterator[Validation]:
-    """Each file's validation, in order. One worker serves all, and is replaced when a file takes it down."""
+    """Validation of each file, in order. One worker serves all and is replaced when a file crashes it."""
     worker = _worker()
     try:
         for path in paths:
             try:
-                yield worker.submit(_validated, path).result(timeout=patience_s)
+                yield worker.submit(_validate_safely, path).result(timeout=patience_s)
             except BrokenProcessPool:
-                yield _damaged(path, "reading it crashes the HDF5 library")
+                yield _damage_report(path, "reading it crashes the HDF5 library")
                 worker = _worker()
             except TimeoutError:
-                yield _damaged(path, f"reading it does not end within {patience_s:g} s")
+                yield _damage_report(path, f"reading it does not end within {patience_s:g} s")
                 _kill(worker)
                 worker = _worker()
     finally:
         worker.shutdown(wait=False, cancel_futures=True)
 
 
-def _validated(path: Path) -> Validation:
-    """Runs in the worker. Only a death of the process may look like one."""
+def _validate_safely(path: Path) -> Validation:
+    """Runs in the worker; an exception of ours is not reported as a damaged file."""
     try:
         return validate_file(path)
     except Exception as error:  # noqa: BLE001 - a file must not be called damaged for a mistake of ours
@@ -59,7 +59,7 @@ def _worker() -> ProcessPoolExecutor:
 
 
 def _ready() -> None:
-    """Runs in the worker, once all that it needs is imported."""
+    """Runs in the worker once its imports are done."""
 
 
 def _kill(worker: ProcessPoolExecutor) -> None:
@@ -68,5 +68,5 @@ def _kill(worker: ProcessPoolExecutor) -> None:
     worker.shutdown(wait=False, cancel_futures=True)
 
 
-def _damaged(path: Path, how: str) -> Validation:
+def _damage_report(path: Path, how: str) -> Validation:
     return Validation(path, "damaged file", (f"The file is damaged: {how}. Restore it from a copy.",))

@@ -1,4 +1,4 @@
-"""What files say of each other: effects of a model on axes that the recordings beside it have."""
+"""Check files against each other: a model's effects against the axes of the recordings."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -12,8 +12,8 @@ from study.store.formats.recording_file import read_recording
 from study.workflows.files.validate import Validation
 
 
-def validated_together(found: Sequence[Validation]) -> tuple[Validation, ...]:
-    """Of sound files; a model is held against recordings with as many commands and responses as it has."""
+def check_together(found: Sequence[Validation]) -> tuple[Validation, ...]:
+    """Valid files with problems between them; a model is compared with recordings of as many commands and responses."""
     recordings = [(each.path, read_recording(each.path)) for each in _sound(found, "recording, ")]
     if not recordings:
         return tuple(found)

@@ -1,4 +1,4 @@
-"""Power against participants: simulated studies on any executor, kept as they finish, so that a broken run goes on."""
+"""Statistical power over the number of participants: simulated studies on any executor, saved as they finish."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import read_text
 
 CHUNK = 10
-"""Studies in one piece of work: some seconds, so that little is lost when a worker dies."""
+"""Studies per piece of work: some seconds, so that little is lost when a worker dies."""
 FINISHED_NAME, RESULT_NAME = "studies.jsonl", "power.json"
 
 
@@ -38,8 +38,8 @@ Piece = tuple[int, int]
 def simulate_power(
     plan: PowerPlan, out: Path, executor: Executor, on_finished: Callable[[int], None]
 ) -> tuple[PowerPoint, ...]:
-    """Blocks until all studies are there, calling `on_finished(how many)`. The same seeds give the same numbers on any
-    executor, in any order; what `out` holds from a broken run of the same plan is not computed again.
+    """Run all studies, calling `on_finished(count)`. The same seeds give the same numbers on any executor, in any
+    order; results in `out` from an interrupted run of the same plan are reused.
 
     Raises StudyError where `out` belongs to another plan, and CannotWriteError.
     """
@@ -50,7 +50,7 @@ def simulate_power(
             "Set staircase.trial_limit to 0 in the protocol.",
         )
     path = out / FINISHED_NAME
-    done = _begun(path, plan)
+    done = _read_finished(path, plan)
     todo = [(n, first) for n in plan.people for first in range(0, plan.studies, CHUNK) if (n, first) not in done]
     finished = sum(map(len, done.values()))
     on_finished(finished)
@@ -68,20 +68,20 @@ def simulate_power(
         raise
     # In the order of the plan, whatever finished first: sums of the same numbers are then the same to the bit.
     points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
-    payload = {"plan": _described(plan), "points": [asdict(point) for point in points]}
+    payload = {"plan": _plan_facts(plan), "points": [asdict(point) for point in points]}
     write_json(out / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
     return points
 
 
 def judge_piece(plan: PowerPlan, piece: Piece) -> list[StudyVerdict]:
-    """In a worker process."""
+    """Runs in a worker process."""
     people, first = piece
     last = min(first + CHUNK, plan.studies)
     return [judge_study(plan.crowd, plan.rule, people, (plan.seed, people, number)) for number in range(first, last)]
 
 
-def _described(plan: PowerPlan) -> dict[str, object]:
-    """Everything but the sample sizes: more of them may be asked for later."""
+def _plan_facts(plan: PowerPlan) -> dict[str, object]:
+    """The plan without its sample sizes: more of them may be added later."""
     from pydantic import TypeAdapter
 
     rule = TypeAdapter(StaircaseRule).dump_python(plan.rule, mode="json")
@@ -89,14 +89,14 @@ def _described(plan: PowerPlan) -> dict[str, object]:
     return {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
 
 
-def _begun(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict]]:
-    """What a broken run of the same plan has finished; a torn last line is left out."""
+def _read_finished(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict]]:
+    """Results of an interrupted run of the same plan; an incomplete last line is ignored."""
     if not path.exists():
         try:
             make_folder(path.parent)
         except OSError as problem:
             raise CannotWriteError(path.parent, problem) from problem
-        _append(path, {"plan": _described(plan)})
+        _append(path, {"plan": _plan_facts(plan)})
         return {}
     rows = []
     for line in read_text(path).splitlines():
@@ -104,7 +104,7 @@ def _begun(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict]]:
             rows.append(json.loads(line))
         except ValueError:
             continue
-    if not rows or rows[0].get("plan") != _described(plan):
+    if not rows or rows[0].get("plan") != _plan_facts(plan):
         raise StudyError(
             "This folder holds another power simulation",
             f"{path} was begun with other people, another rule, seed or number of studies.",

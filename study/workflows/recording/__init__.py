@@ -1,5 +1,5 @@
-"""Recordings: made on the device, imported from other programs, looked at before any model.
+"""Recordings: made on the device, imported from other programs, inspected before any model.
 
 A protocol -> `play_pieces` -> `take_facts` -> `record_device` -> one recording file; `import_recording` makes the same
-file from tables of others; `look_at_recordings` draws it. Begin at `record_device.py`.
+file from foreign tables; `look_at_recordings` draws it. Begin at `record_device.py`.
 """

@@ -1,4 +1,4 @@
-"""Recordings of others into a recording of ours, by a map, by a table's own header, or as they are."""
+"""Import foreign recordings: by a map, by a table's own header, or as they are."""
 
 import hashlib
 from collections.abc import Callable, Sequence
@@ -28,12 +28,12 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True)
 class ImportPlan:
-    """Foreign files, what maps them to a recording, and where that is written."""
+    """Foreign files, the map to a recording, and the output."""
 
     files: tuple[Path, ...]
-    """Or one folder, whose map is found."""
+    """Or one folder, whose map is searched for."""
     map: str | None
-    """Name of a shipped map, or a path; None where the files speak for themselves."""
+    """Name of a shipped map, or a path; None if headers suffice."""
     out: Path
 
 
@@ -42,17 +42,17 @@ class Imported:
     path: Path
     recording: Recording
     map: str
-    """Name of the map; "header" or "recording" where there was none."""
+    """Name of the map; "header" or "recording" if there was none."""
     notes: tuple[str, ...]
 
 
 def check_free(out: Path) -> None:
-    """Raises StudyError where the recording could not be written under this name."""
+    """Raise StudyError if the recording could not be written under this name."""
     require_free(out, title="Nothing was imported", kind="recordings")
 
 
 def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: None) -> Imported:
-    """on_progress: share done, 0 to 1. Raises StudyError; then nothing is written."""
+    """Import and write. on_progress: share done, 0 to 1. Raises StudyError; nothing is written then."""
     check_free(plan.out)
     read = read_foreign(plan.files, plan.map, on_progress)
     provenance = gather_provenance(parents=read.files).as_dict()
@@ -67,7 +67,7 @@ def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: Non
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Foreign:
-    """What was read and not yet written."""
+    """An imported recording that is not written yet."""
 
     recording: Recording
     files: tuple[Path, ...]
@@ -89,7 +89,7 @@ def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progr
 
 
 def _inside(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...]:
-    """Files, and of a folder those that the map is for. Maps and notes beside the data are no data."""
+    """The files; of a folder, those that the map applies to, without maps and notes."""
     found: list[Path] = []
     for path in files:
         beside = sorted(path.iterdir()) if path.is_dir() else ()
@@ -156,7 +156,7 @@ def _with_header(wanted: ImportMap, files: Sequence[Path], on_progress: Progress
 
 
 def _perhaps_imposed(recording: Recording) -> tuple[str, ...]:
-    """More forces than motions: more often the motion was imposed and the forces were measured."""
+    """Remark for more forces than motions: the motion was probably imposed and the forces measured."""
     command, response = recording.command, recording.response
     if len(command.channels) <= len(response.channels) or not set(command.quantities) <= {"force", "torque"}:
         return ()

@@ -1,4 +1,4 @@
-"""Recordings looked at before any model, and the page about them."""
+"""Inspect recordings before any model, and write a page about them."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ from analysis.reports.look_report import pictures_of, render_look_report
 from study.local_clock import local_now
 from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
-from study.workflows.recording.recording_from import recording_from
+from study.workflows.recording.recording_from import read_any_recording
 
 PAGE_NAME = "report.html"
 
@@ -21,10 +21,10 @@ Progress = Callable[[float], None]
 
 
 def look_at(paths: Sequence[Path], on_progress: Progress = lambda share: None) -> tuple[Overview, ...]:
-    """Recordings, and tables of others whose header says all. Raises StudyError for a file that is neither."""
+    """Overview of recordings, and of foreign tables with a complete header. Raises StudyError for other files."""
     found = []
     for count, path in enumerate(paths, start=1):
-        recording, notes = recording_from(path)
+        recording, notes = read_any_recording(path)
         if notes:
             recording = replace(recording, meta={**recording.meta, "import": {"notes": list(notes)}})
         found.append(overview(path.stem, recording))
@@ -33,7 +33,7 @@ def look_at(paths: Sequence[Path], on_progress: Progress = lambda share: None) -
 
 
 def write_look(found: Sequence[Overview], folder: Path) -> Path:
-    """report.html and figures/ in `folder`; returns the page. Raises CannotWriteError."""
+    """Write report.html and figures/ in `folder`; returns the page. Raises CannotWriteError."""
     pictures = pictures_of(found)
     write_pictures(folder / "figures", [picture for drawn in pictures for picture in drawn])
     provenance = {"recordings": ", ".join(each.name for each in found)}
@@ -42,7 +42,7 @@ def write_look(found: Sequence[Overview], folder: Path) -> Path:
 
 
 def recording_facts(found: Overview) -> tuple[str, ...]:
-    """What a recording says of itself, a line each."""
+    """Metadata of a recording, one line each."""
     recording, meta = found.recording, found.recording.meta
     parts = len(found.stretches)
     rate = f"{recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, " if recording.is_timed else ""
@@ -58,7 +58,7 @@ def recording_facts(found: Overview) -> tuple[str, ...]:
 
 
 def look_document(found: Sequence[Overview]) -> list[dict[str, Any]]:
-    """For programs: one entry per recording, numbers in SI."""
+    """One entry per recording, numbers in SI."""
     return [_entry(each) for each in found]
 
 
@@ -86,5 +86,5 @@ def _entry(each: Overview) -> dict[str, Any]:
 
 
 def _finite(entry: dict[str, Any]) -> dict[str, Any]:
-    """JSON knows no NaN: what is not known is null."""
+    """NaN becomes null, which JSON has."""
     return {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in entry.items()}

@@ -1,5 +1,5 @@
-"""The pieces of a recording, one after another; one that drove a sensor or the force to its limit is played again
-with less."""
+"""Play the pieces of a recording one after another; repeat a piece with lower force where sensor or force was at its
+limit."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,23 +11,23 @@ from study.errors import DeviceError
 from study.session.stimulus.recording_plan import Piece, pieces
 
 LOWERED_TO = 0.7
-"""3 dB less: after five times a sixth is left, and little of a clean amplitude is given away."""
+"""Factor of the amplitude: 3 dB; after five repetitions a sixth is left."""
 
 MOST_TRIES = 6
-"""Of one piece: a sensor that clips at a sixth, too, is broken or set for another device."""
+"""Attempts per piece: a sensor that clips at a sixth is broken or configured for another device."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Take:
-    """A piece as it was played in the end, clean unless `clipped`."""
+    """A piece as finally played, clean unless `clipped`."""
 
     piece: Piece
     requested_n: float
     tries: int
     sensor_clipped_before: int
-    """Samples that the accelerometer cut off in the takes that were thrown away."""
+    """Clipped samples of the accelerometer in the discarded takes."""
     total_clipped_before: int
-    """Likewise ticks at the cap of the total force, or of the spring's."""
+    """Ticks at the cap of the total force, or of the spring's, in the discarded takes."""
     recording: Recording
     health: Health
 
@@ -41,17 +41,17 @@ class Take:
 
 
 def is_clipped(health: Health) -> bool:
-    """Whether something was at its limit, so that the take tells less about the device than it seems to."""
+    """Whether something was at its limit, so that the take does not show the device alone."""
     return bool(health.sensor_clipped or health.total_clipped or health.feedback_clipped)
 
 
 def play_pieces(
     protocol: RecordingProtocol, device: Device, done: list[Take], on_progress: Callable[[float], None]
 ) -> None:
-    """Play all of the protocol, appending to `done` whatever is whole. `on_progress(seconds)` steps back where a piece
-    is played again. Where a piece had to be lowered, it is so from the start when its segment comes round again.
+    """Play the whole protocol, appending each finished piece to `done`. `on_progress(seconds)` steps back where a piece
+    is repeated. A lowered amplitude is kept for later rounds of the same segment.
 
-    Raises `DeviceError` when the device lets go.
+    Raises `DeviceError` when the device stops.
     """
     before_s = 0.0
     shares: dict[tuple[int, float | None], float] = {}

@@ -1,4 +1,4 @@
-"""Play a recording protocol on the device, piece by piece, and keep what came back in one file."""
+"""Play a recording protocol on the device, piece by piece, and write the result into one file."""
 
 import contextlib
 from collections.abc import Callable
@@ -27,7 +27,7 @@ NOMINAL_RATE_HZ = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class RecordingPlan:
-    """What is recorded, of which device, where in its workspace, and where it is written."""
+    """What is recorded, on which device, at which place, and the output file."""
 
     protocol: RecordingProtocol
     device: str
@@ -46,21 +46,21 @@ class WrittenRecording:
     warnings: tuple[str, ...]
 
 
-def _unsaid(notice: str) -> None:
-    """For a caller that knows that no person is near the device."""
+def _ignore_notice(notice: str) -> None:
+    """For callers that know that no person is near the device."""
 
 
 def record_device(
     plan: RecordingPlan,
     on_progress: Callable[[float], None],
-    before_moving: Callable[[str], None] = _unsaid,
+    before_moving: Callable[[str], None] = _ignore_notice,
 ) -> WrittenRecording:
-    """Record everything the protocol asks for. `on_progress(seconds)` counts recorded time, and steps back where
-    something is played again. `before_moving(notice)` is called before a real device moves, with what must be said
-    to those around it; what it raises keeps the device still.
+    """Record the whole protocol. `on_progress(seconds)` counts recorded time, and steps back where something is
+    repeated. `before_moving(notice)` is called before a real device moves, with the notice for those around it; an
+    exception from it keeps the device still.
 
-    Interrupted (KeyboardInterrupt), the pieces that are whole are written, and LeftError says so.
-    Raises StudyError before anything moves where `out` exists already.
+    If interrupted (KeyboardInterrupt), the complete pieces are written, and LeftError says so. Raises StudyError before
+    anything moves if `out` exists already.
     """
     check_free(plan.out)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
@@ -72,9 +72,9 @@ def record_on(
     device: Device,
     plan: RecordingPlan,
     on_progress: Callable[[float], None],
-    before_moving: Callable[[str], None] = _unsaid,
+    before_moving: Callable[[str], None] = _ignore_notice,
 ) -> WrittenRecording:
-    """As `record_device`, on a device that is open."""
+    """As `record_device`, on an open device."""
     done: list[Take] = []
     try:
         if not device.info.simulated:
@@ -87,13 +87,13 @@ def record_on(
         raise _left(plan, len(done)) from interruption
     except DeviceError as error:
         _write_whole_pieces(plan, device, done)
-        error.saved = _saved(plan, len(done))
+        error.saved = _saved_words(plan, len(done))
         raise
     return _write(plan, device, done, interrupted=False)
 
 
 def check_free(out: Path) -> None:
-    """Raises StudyError where the recording could not be written under this name."""
+    """Raise StudyError if the recording could not be written under this name."""
     require_free(out, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
@@ -103,17 +103,17 @@ def _left(plan: RecordingPlan, done: int) -> LeftError:
         "Interrupted",
         f"{done} of {all_pieces} pieces were recorded; the force was released.",
         "Record again under another name for the whole protocol.",
-        saved=_saved(plan, done),
+        saved=_saved_words(plan, done),
     )
 
 
 def _still_on(plan: RecordingPlan, done: int) -> DeviceError:
     return DeviceError(
-        "The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=_saved(plan, done)
+        "The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=_saved_words(plan, done)
     )
 
 
-def _saved(plan: RecordingPlan, done: int) -> str:
+def _saved_words(plan: RecordingPlan, done: int) -> str:
     return f"The {done} whole pieces are in {plan.out}." if done else "Nothing was written."
 
 

@@ -1,4 +1,4 @@
-"""A recording from any file: read as it is, or imported in memory."""
+"""Read a recording from any file: directly, or imported in memory."""
 
 from pathlib import Path
 
@@ -8,9 +8,8 @@ from study.store.disk.hdf5_file import format_of, is_hdf5
 from study.store.formats.recording_file import read_recording
 
 
-def recording_from(path: Path) -> tuple[Recording, tuple[str, ...]]:
-    """A recording of ours, or a table or arrays of others through the import, in memory; and what that did. Raises
-    StudyError."""
+def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
+    """A recording of ours, or foreign tables or arrays imported in memory, and remarks. Raises StudyError."""
     if path.is_file() and is_hdf5(path) and format_of(path):
         return read_recording(path), ()
     # Here, for the import takes longer to load than a recording of ours to read.

@@ -1,4 +1,4 @@
-"""What is written down about each piece of a recording and its feedback, and what is said about it."""
+"""Metadata of each piece of a recording and its feedback, and warnings about it."""
 
 import math
 from typing import Any
@@ -8,7 +8,7 @@ from study.workflows.recording.play_pieces import Take, along_in_words
 
 
 def spring_facts(spring: SpringSettings, effective_mass_kg: float) -> dict[str, Any]:
-    """The feedback that turns the excitation into the command: command = excitation - stiffness (position - place)."""
+    """Parameters of the feedback: command = excitation - stiffness (position - place) - damping velocity."""
     return {
         "kind": "virtual spring about the place",
         "natural_frequency_hz": spring.natural_frequency_hz,
@@ -19,6 +19,7 @@ def spring_facts(spring: SpringSettings, effective_mass_kg: float) -> dict[str, 
 
 
 def segment_facts(take: Take) -> dict[str, Any]:
+    """Metadata of one piece."""
     piece = take.piece
     return {
         "number": piece.number,
@@ -36,11 +37,11 @@ def segment_facts(take: Take) -> dict[str, Any]:
 
 
 def warnings_of(take: Take) -> list[str]:
-    """Sentences for the person who recorded."""
+    """Warnings for the person who recorded."""
     health, what = take.health, _what(take)
     found = []
     if take.played_n < take.requested_n:
-        found.append(_lowered(take))
+        found.append(_reduction_warning(take))
     if health.sensor_clipped:
         found.append(f"The accelerometer clipped in {health.sensor_clipped} samples at {take.played_n:.3g} N ({what}).")
     if health.feedback_clipped:
@@ -60,7 +61,7 @@ def _what(take: Take) -> str:
     return f"{kind} along {along_in_words(piece)}"
 
 
-def _lowered(take: Take) -> str:
+def _reduction_warning(take: Take) -> str:
     why = []
     if take.sensor_clipped_before:
         why.append(f"the accelerometer clipped in {take.sensor_clipped_before} samples")

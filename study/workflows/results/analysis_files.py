@@ -1,4 +1,4 @@
-"""What an analysis leaves in a folder. Apart from the analysis itself, which loads statistics and plots."""
+"""Files of an analysis. Separate from the analysis, which imports statistics and plots."""
 
 from pathlib import Path
 
@@ -9,17 +9,17 @@ from study.store.disk.real_folder import is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 
 ANALYSIS_NAME = "analysis"
-"""Where an analysis goes, in the folder that was analysed, unless stated otherwise."""
+"""Default output folder, in the analysed folder."""
 
 OURS = ("thresholds", "delivered", "ellipsoids", "staircases-*")
-"""Names of figures, so that those of an earlier analysis (of a participant who withdrew since) do not stay."""
+"""Name patterns of figures; earlier ones are removed, since they may show a participant who has withdrawn."""
 
 STATISTICS_NAME, PAGE_NAME = "anova.json", "report.html"
 OUR_FILES = (THRESHOLDS_NAME, DETECTION_NAME, STATISTICS_NAME, PAGE_NAME)
 
 
 def is_analysis_of(out: Path, log: Path) -> bool:
-    """Whether the analysis in `out` is whole, its page being the last that is written, and of the log as it is now."""
+    """Whether the analysis in `out` is complete (its page is written last) and was made from the log as it is now."""
     if not (out / PAGE_NAME).is_file():
         return False
     try:
@@ -30,8 +30,8 @@ def is_analysis_of(out: Path, log: Path) -> bool:
         return False
 
 
-def written_by_analysis(out: Path) -> tuple[Path, ...]:
-    """The files in `out` that an analysis writes, as far as they are there. None behind a link to another folder."""
+def analysis_outputs(out: Path) -> tuple[Path, ...]:
+    """Existing files in `out` that an analysis writes; none behind a link to another folder."""
     figures = out / "figures"
     drawn = [path for name in OURS for kind in ("svg", "png") for path in figures.glob(f"{name}.{kind}")]
     tables = [out / name for name in OUR_FILES if (out / name).is_file()]

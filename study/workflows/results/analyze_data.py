@@ -1,4 +1,4 @@
-"""From a folder of sessions to thresholds.csv, detection.csv, anova.json, figures and one report."""
+"""Analyse a folder of sessions: thresholds.csv, detection.csv, anova.json, figures and one report."""
 
 import errno
 from pathlib import Path
@@ -25,7 +25,7 @@ from study.store.formats.recording_file import read_recording
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
 from study.store.sessions.written_elsewhere import note_written
 from study.workflows.picture_files import write_pictures
-from study.workflows.results.analysis_files import PAGE_NAME, written_by_analysis
+from study.workflows.results.analysis_files import PAGE_NAME, analysis_outputs
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.collected import Collected
 from study.workflows.results.export_study import collect_exported, is_exported
@@ -35,7 +35,7 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 def analyze_data(
     data: Path, out: Path, ellipsoid: Path | None = None, protocol_name: str | None = None
 ) -> WrittenAnalysis:
-    """Analyse all sessions in `data`; what `out` holds from an earlier analysis is replaced.
+    """Analyse all sessions in `data`; an earlier analysis in `out` is replaced.
 
     Raises StudyError where there is nothing to analyse, where rows contradict their protocol, or on a full disk.
     """
@@ -86,7 +86,7 @@ def _lines(table: ThresholdTable, heading: str) -> list[str]:
 
 
 def _primary_lines(analysis: StudyAnalysis) -> list[str]:
-    """The medians of the hierarchical model, beside the means above."""
+    """Medians of the hierarchical model, beside the means."""
     if analysis.primary is None:
         return []
     lines = [f"{'frequency':>10}  {'median':>10}  {'95 % interval, all answers in one model':>10}"]
@@ -114,7 +114,7 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
 
 
 def sensor_frame(recording: Recording) -> FloatArray | None:
-    """Rotation from the sensor's axes to the device's, as the recording states it; None where it states none."""
+    """Rotation from the sensor's axes to the device's, as the recording states it; None if it does not."""
     sensor = recording.meta.get("sensor")
     frame = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
     if frame is None:
@@ -126,7 +126,7 @@ def sensor_frame(recording: Recording) -> FloatArray | None:
 
 
 def _make_private(out: Path, data: Path) -> None:
-    """Beside the sessions; a folder elsewhere has the rights that its place gives it. Raises CannotWriteError."""
+    """Create the output folder; private if it lies beside the sessions. Raises CannotWriteError."""
     if not out.resolve().is_relative_to(data.resolve()):
         return
     try:
@@ -151,7 +151,7 @@ def _write(
         if figures.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
         # The report is the last that is written: as long as it is not there, all else may be half of the new.
-        for stale in written_by_analysis(out):
+        for stale in analysis_outputs(out):
             if stale.parent == figures or stale.name in (DETECTION_NAME, PAGE_NAME):
                 stale.unlink()
     except OSError as problem:
@@ -169,7 +169,7 @@ def _write(
 
 
 def _shown(provenance: Provenance, collected: Collected) -> dict[str, str]:
-    """What the report's last section shows."""
+    """Entries of the report's last section."""
     return {
         "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",
         "locked before the data": collected.locked,

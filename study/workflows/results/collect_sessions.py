@@ -1,4 +1,4 @@
-"""Which sessions enter one analysis: one protocol, one kind of participant, nothing withdrawn or contradictory."""
+"""Select the sessions of one analysis: one protocol, one kind of participant, none withdrawn or contradictory."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,10 +18,10 @@ from study.workflows.results.session_results import finish_tables
 
 
 def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
-    """All sessions below `data` (or `data` itself, a session) that belong together.
+    """Matching sessions below `data` (or `data` itself, a session).
 
-    Of several protocols the one named, else the one with most sessions; people before simulated participants before
-    those who felt nothing. Raises StudyError where there is nothing to analyse.
+    Of several protocols the named one, else the one with most sessions; people before simulated participants before
+    practice without a device. Raises StudyError where there is nothing to analyse.
     """
     folders = _folders(data)
     whole, left_out = _fold_all(folders)
@@ -53,13 +53,14 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
         observers=tuple(dict.fromkeys(state.opened.observer for _, state in entering if state.opened.observer)),
         left_out=tuple(left_out),
         qualities=_qualities(entering),
-        locked=_locked([state for _, state in entering]),
+        locked=_lock_words([state for _, state in entering]),
         finished=_finish(whole),
         parents=tuple(folder.log for folder, _ in entering),
     )
 
 
-def _locked(states: Sequence[SessionState]) -> str:
+def _lock_words(states: Sequence[SessionState]) -> str:
+    """Whether the protocol was locked, in words."""
     locked = sum(state.opened.protocol_locked for state in states)
     if not locked:
         return "no: what the protocol declares was not fixed by a lock"
@@ -67,7 +68,7 @@ def _locked(states: Sequence[SessionState]) -> str:
 
 
 def _qualities(entering: Sequence[tuple[SessionFolder, SessionState]]) -> tuple[tuple[str, str], ...]:
-    """Sessions that share a model stand together."""
+    """Model quality by sessions; those that share a model are listed together."""
     sessions: dict[tuple[str, str], list[str]] = {}
     for folder, state in entering:
         if (equalized := state.opened.equalized) is not None:
@@ -111,7 +112,7 @@ def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolde
 
 
 def _finish(folded: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str, ...]:
-    """Nothing here keeps an analysis from going on: the log alone is analysed."""
+    """Write results that are due; problems are only reported, because the analysis uses the logs alone."""
     said = []
     for folder, session in folded:
         try:
@@ -147,4 +148,5 @@ def _choose_protocol(
 
 
 def _measures(protocol: StudyProtocol) -> bool:
+    """Whether the protocol has test or detection runs."""
     return bool(protocol.stimulus.frequencies_hz or protocol.detection.frequencies_hz)

@@ -1,4 +1,4 @@
-"""What enters one analysis, wherever its trials were read from."""
+"""Data of one analysis, from sessions or an exported dataset."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,12 +20,12 @@ class Collected:
     observers: tuple[str, ...]
     """Names of the simulated participants; empty for people."""
     left_out: tuple[str, ...]
-    """What did not enter, and why, in sentences."""
+    """What was excluded, and why, in sentences."""
     qualities: tuple[tuple[str, str], ...]
-    """Of the models that stimuli went through: (sessions, sentence), by what was measured; none for plain forces."""
+    """Quality of the models that equalized the stimuli: (sessions, sentence); none for plain forces."""
     locked: str
     """Whether the protocol was locked when its sessions began."""
     finished: tuple[str, ...]
-    """What was written now, because the program was killed before it was done, in sentences."""
+    """Results that had to be completed now, because the program had been killed, in sentences."""
     parents: tuple[Path, ...]
-    """Files that the trials were read from."""
+    """Input files."""

@@ -1,4 +1,4 @@
-"""A study's trials as other tools read them, with protocol, seeds and versions; and a dataset read back."""
+"""Export a study's trials for other tools, with protocol, seeds and versions; read such a dataset back."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -36,11 +36,11 @@ class Exported:
     """Relative to `out`."""
     trials: int
     left_out: tuple[str, ...]
-    """What did not enter, and why, in sentences."""
+    """What was excluded, and why, in sentences."""
 
 
 def export_study(collected: Collected, data: Path, out: Path, form: Form) -> Exported:
-    """Writes whole or not at all. collected: the sessions of `data` that belong together. Raises StudyError."""
+    """Write the dataset atomically. collected: the sessions of `data` that belong together. Raises StudyError."""
     require_new_folder(out)
     facts = _facts(collected)
     with new_folder(out) as folder:
@@ -70,7 +70,7 @@ def is_exported(folder: Path) -> bool:
 
 
 def collect_exported(folder: Path) -> Collected:
-    """A dataset of `export_study` that `is_exported`: the same trials and the same protocol give the same results.
+    """Read a dataset of `export_study` that `is_exported`: the same trials and protocol give the same results.
     Raises StudyError."""
     psych_ds = is_psych_ds(folder)
     found = read_psych_ds(folder) if psych_ds else tidy_csv.read_tidy_csv(folder)

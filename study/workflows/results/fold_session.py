@@ -1,6 +1,6 @@
 """Read a session: fold its log, checking every line against its checksum and every level against the rules.
 
-Changes nothing. Everything that reads a session begins here, so that damage is seen by all of it.
+Changes nothing. All readers of sessions start here, so that damage is always detected.
 """
 
 from dataclasses import dataclass
@@ -24,18 +24,18 @@ class FoldedSession:
     state: SessionState
     contents: LogContents
     sealed_lines: int
-    """How many lines a seal covers; 0 where there is none."""
+    """Number of lines that a seal covers; 0 if there is none."""
 
     @property
     def seal_due(self) -> bool:
-        """Closed, and the program died before the seal was written. A log without checksums is never sealed: what a
-        seal would say of it is not known to be what was written."""
+        """Closed, but the program ended before the seal was written. A log without checksums is never sealed: its
+        content cannot be verified."""
         return self.state.closed and bool(self.contents.chain.since) and not self.sealed_lines
 
 
 def fold_session(folder: SessionFolder) -> FoldedSession:
-    """Read a session without changing anything. Raises StudyError where the log contradicts itself or the rules, and
-    for a session that was withdrawn."""
+    """Read a session without changing it. Raises StudyError where the log contradicts itself or the rules, and for a
+    withdrawn session."""
     if folder.withdrawn:
         raise SessionWithdrawnError(folder)
     contents = read_log(folder.log)
@@ -73,7 +73,8 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
 
 
 def _check_end(state: SessionState, folder: SessionFolder) -> None:
-    """A log whose end was lost looks like that of an interrupted session; its results remember more."""
+    """Raise if results show that the end of the log was lost: such a log otherwise looks like an interrupted
+    session."""
     closed, presentations = closed_and_presentations(read_summary(folder.path))
     if closed or presentations > len(state.trials):
         what = "a finished session" if closed else f"{presentations} presentations"
@@ -87,7 +88,7 @@ def _check_end(state: SessionState, folder: SessionFolder) -> None:
 
 
 def protocol_of(opened: SessionOpened, folder: SessionFolder) -> StudyProtocol:
-    """The protocol that a log carries. Raises StudyError where it cannot be read, or is not the one that was begun."""
+    """The protocol inside a log. Raises StudyError if it cannot be read or does not match its hash."""
     try:
         protocol = load_protocol(opened.protocol_text, f"the log of {folder.name}")
     except ProtocolError as problem:

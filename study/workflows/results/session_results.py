@@ -1,4 +1,4 @@
-"""What is written from a session's log, at will: its seal, its tables, and its own small report."""
+"""Results derived from a session's log: its seal, tables, and a small report."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -31,7 +31,7 @@ REPORT_NAME = f"{ANALYSIS_NAME}/report.html"
 
 @dataclass(frozen=True, slots=True)
 class ResultProblem:
-    """A result that is not what the log gives."""
+    """A result that does not agree with the log."""
 
     file: str
     missing: bool
@@ -40,21 +40,21 @@ class ResultProblem:
 
 
 def write_tables(folder: SessionFolder) -> SessionState:
-    """The seal of a closed session; trials.csv, thresholds.csv, detection.csv (where there are such runs) and
-    session.json, from the log alone."""
+    """Write the seal of a closed session, trials.csv, thresholds.csv, detection.csv (for detection runs) and
+    session.json."""
     folded = fold_session(folder)
     state = folded.state
     if folded.seal_due:
         write_seal(folder.path, folded.contents)
     write_trials(folder.path / TRIALS_NAME, state.trials)
-    for name, rows in _computed(state).items():
+    for name, rows in _compute_tables(state).items():
         write_thresholds(folder.path / name, rows)
     _write_summary(folder, state)
     return state
 
 
 def write_results(folder: SessionFolder) -> WrittenAnalysis:
-    """The tables, and the analysis of this session alone beside them."""
+    """Write the tables and the analysis of this session alone."""
     # Statistics and plots take longer to load than all else; who begins or checks a session does not wait for them.
     from study.workflows.results.analyze_data import analyze_data
 
@@ -63,7 +63,7 @@ def write_results(folder: SessionFolder) -> WrittenAnalysis:
 
 
 def due_results(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
-    """Names of the files that a closed session still lacks, because the program was killed before it wrote them."""
+    """Names of missing results of a closed session, because the program was killed before it wrote them."""
     if not folded.state.closed:
         return ()
     seal = (SEAL_NAME,) if folded.seal_due else ()
@@ -80,16 +80,16 @@ def finish_tables(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ..
 
 
 def result_problems(folder: SessionFolder, state: SessionState) -> tuple[ResultProblem, ...]:
-    """Tables and summary that are missing, torn, or differ from what the log gives."""
-    found = [_compared(folder, TRIALS_NAME, lambda path: read_trials(path) == _as_in(path, state.trials, Trial))]
-    for name, rows in _computed(state).items():
+    """Tables and summary that are missing, damaged, or differ from the log."""
+    found = [_compare(folder, TRIALS_NAME, lambda path: read_trials(path) == _as_in(path, state.trials, Trial))]
+    for name, rows in _compute_tables(state).items():
         agrees = partial(_thresholds_agree, rows)
-        found.append(_compared(folder, name, agrees))
-    found.append(_compared(folder, SUMMARY_NAME, lambda path: _summary_agrees(folder, state)))
+        found.append(_compare(folder, name, agrees))
+    found.append(_compare(folder, SUMMARY_NAME, lambda path: _summary_agrees(folder, state)))
     return tuple(problem for problem in found if problem is not None)
 
 
-def _compared(folder: SessionFolder, name: str, agrees: Callable[[Path], bool]) -> ResultProblem | None:
+def _compare(folder: SessionFolder, name: str, agrees: Callable[[Path], bool]) -> ResultProblem | None:
     path = folder.path / name
     if not path.exists():
         return ResultProblem(name, True, ("is missing",))
@@ -106,12 +106,12 @@ def _thresholds_agree(rows: tuple[Threshold, ...], path: Path) -> bool:
 
 
 def _as_in(path: Path, rows: tuple[Row, ...], row_type: type[Row]) -> tuple[Row, ...]:
-    """In the columns of the table: one that an older version wrote may lack some."""
+    """The rows with the columns of the table: an older version may lack some."""
     return as_written_in(read_text(path), rows, row_type)
 
 
-def _computed(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
-    """The tables of thresholds that this session has, by their names."""
+def _compute_tables(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
+    """Tables of thresholds of this session, by file name."""
     tables = {THRESHOLDS_NAME: thresholds(state.trials, state.protocol.staircase)}
     if detection := detection_thresholds(state.trials, state.protocol):
         tables[DETECTION_NAME] = detection
@@ -119,7 +119,7 @@ def _computed(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
 
 
 def _summary_agrees(folder: SessionFolder, state: SessionState) -> bool:
-    """In what both know: a later version may say more."""
+    """Agreement in the common keys: a later version may add some."""
     written, due = read_summary(folder.path), _summary(state)
     if written is None or "session" not in written:
         return False

@@ -1,4 +1,4 @@
-"""A whole sitting, from opening the device to closing the log."""
+"""Conduct a whole sitting, from opening the device to closing the log."""
 
 import contextlib
 from collections.abc import Callable
@@ -16,16 +16,16 @@ from study.workflows.results.fold_session import fold_session
 from study.workflows.session.equalize_stimuli import (
     Equalized,
     check_playable,
-    equalized_again,
-    equalized_stimuli,
+    equalize_stimuli,
     load_equalizer,
+    reload_equalizer,
 )
 from study.workflows.session.open_session import (
     OpenedSession,
     SessionPlan,
-    opened_session,
+    open_session,
 )
-from study.workflows.session.resume_session import resumed_session
+from study.workflows.session.resume_session import resume_session
 from study.workflows.session.run_session import run_session
 from study.workflows.trial.attendant import Attendant
 from study.workflows.trial.display import Display, Hand
@@ -33,21 +33,21 @@ from study.workflows.trial.requests_port import ManyRequests, QueuedRequests, Re
 from study.workflows.trial.sitting import Sitting, tell, tell_clock_steps
 
 
-def _nobody_listens(folder: SessionFolder, device: Device) -> None:
+def _ignore_opened(folder: SessionFolder, device: Device) -> None:
     return None
 
 
 @dataclass(frozen=True, slots=True)
 class Participant:
-    """Who sits at the device, and the time that passes for them."""
+    """The participant at the device, and their clock."""
 
     display: Display
     hand: Hand
     clock: Clock
     requests: Requests = field(default_factory=QueuedRequests)
-    """What is asked for from within this program: notes typed at the display, a stop from its other screens."""
-    on_opened: Callable[[SessionFolder, Device], None] = _nobody_listens
-    """Hears once of the session, now locked, and of the device, which it may stop from any thread."""
+    """Requests from within this program: notes typed at the display, a stop from another screen."""
+    on_opened: Callable[[SessionFolder, Device], None] = _ignore_opened
+    """Called once with the session, now locked, and the device, which may be stopped from any thread."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,39 +55,39 @@ class Conducted:
     folder: SessionFolder
     state: SessionState
     left: str
-    """Why the sitting ended before the session was finished; empty where it is finished."""
+    """Why the sitting ended before the session was finished; empty if it is finished."""
     fault: Fault
-    """What was wrong with the device, if that was why."""
+    """The device fault, if that was why."""
     withdrawn: bool = False
-    """The participant takes the consent back: the caller erases the data."""
+    """The participant withdrew consent: the caller erases the data."""
 
 
 def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> Conducted:
-    """Open the device, then the session, and run it."""
+    """Open the device, then a new session, and run it."""
     check_playable(plan.protocol, plan.model)
     settings = device_settings(plan.protocol)
     with contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device:
-        equalized = equalized_stimuli(plan.protocol, plan.model, device.info)
-        with opened_session(plan, device.info, equalized, participant.clock) as opened:
+        equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
+        with open_session(plan, device.info, equalized, participant.clock) as opened:
             return _run(opened, device, equalized, participant)
 
 
 def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> Conducted:
-    """Fold the log, open the device, and go on where the session stopped."""
+    """Fold the log, open the device, and continue the session."""
     state = fold_session(folder).state
     if state.opened.equalized is not None:
         load_equalizer()
     settings = device_settings(state.protocol)
     with contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device:
-        equalized = equalized_again(folder, state, device.info)
-        with resumed_session(folder, device.info, participant.clock) as opened:
+        equalized = reload_equalizer(folder, state, device.info)
+        with resume_session(folder, device.info, participant.clock) as opened:
             return _run(opened, device, equalized, participant, known_steps=len(state.sitting.clock_steps))
 
 
 def _run(
     opened: OpenedSession, device: Device, equalized: Equalized, participant: Participant, known_steps: int = 0
 ) -> Conducted:
-    """known_steps: how often the computer's clock was set before this sitting; only what is new is told."""
+    """Run the session. known_steps: clock steps before this sitting; only new ones are reported."""
     folder, protocol = opened.folder, opened.state.protocol
     participant.on_opened(folder, device)
     place_m = device_settings(protocol).place_m

@@ -1,4 +1,4 @@
-"""After a sitting, with the device closed: the results of a finished session, or why there are none."""
+"""After a sitting, with the device closed: results of a finished session, or why there are none."""
 
 from dataclasses import replace
 
@@ -21,10 +21,10 @@ BUSY_ADVICE = "Close other programs, and measure with hapteq doctor whether that
 
 
 def end_sitting(end: Conducted, utc: str) -> WrittenAnalysis:
-    """Raises StudyError for a session that is not finished: how to go on, and an exit code that says why it ended.
-    Erases first what a participant withdrew."""
+    """Write the results, or erase what a participant withdrew. Raises StudyError for an unfinished session, with how
+    to continue and an exit code that says why it ended."""
     if end.withdrawn:
-        raise _erased(end, utc)
+        raise _erase(end, utc)
     if end.state.turned_away_for_good:
         write_tables(end.folder)
         raise does_not_take_part(end.state)
@@ -34,8 +34,8 @@ def end_sitting(end: Conducted, utc: str) -> WrittenAnalysis:
 
 
 def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalysis:
-    """What a kill after the last run left undone: seal, tables, summary and report. Raises StudyError where nothing is
-    due, or it cannot be written."""
+    """Complete what a kill after the last run left undone: seal, tables, summary and report. Raises StudyError where
+    nothing is due, or it cannot be written."""
     if folded.state.turned_away_for_good:
         finish_tables(folder, folded)
         raise does_not_take_part(folded.state)
@@ -59,7 +59,7 @@ def _not_finished(end: Conducted) -> StudyError:
     )
 
 
-def _erased(end: Conducted, utc: str) -> StudyError:
+def _erase(end: Conducted, utc: str) -> StudyError:
     data, plan = end.folder.path.parent, plan_withdrawal(end.folder)
     elsewhere = still_elsewhere(data, plan)
     withdraw(data, plan, utc)

@@ -1,4 +1,4 @@
-"""The equalizer of a session: read, checked against the protocol and the device, kept in the session folder."""
+"""Equalizer of a session: load it, check it against protocol and device, keep it in the session folder."""
 
 import math
 from dataclasses import dataclass
@@ -23,33 +23,33 @@ from study.store.disk.provenance import sha256_of
 from study.store.disk.regular_file import read_regular
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.sessions.archive import SessionFolder
-from study.workflows.equalizer.spring_beside_model import spring_beside
+from study.workflows.equalizer.spring_beside_model import spring_outside_model
 
 MODEL_NAME = "model.h5"
 NEAR_M = 0.02
-"""A model from a place farther away is of another device: by then the published coupling is back."""
+"""Largest distance from the place of identification: farther away, the published coupling returns."""
 
 AXES = (("fx", "fy", "fz"), ("ax", "ay", "az"))
 IDENTIFY_AGAIN = "Identify it again with hapteq identify."
 LEFT_OUT = 0.1
-"""Of a wanted acceleration, by the model itself: beyond this a level would not stand for what it says."""
+"""Largest relative error of a stimulus by the model itself; beyond it a level would not have its meaning."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equalized:
-    """What stimuli go through, and what is to be known of it. `facts`: None where forces are commanded."""
+    """Equalizer of the stimuli and its description. `facts`: None where forces are commanded."""
 
     equalizer: Equalizer
     facts: EqualizedFacts | None
     source: Path | None = None
-    """Of the model, to be kept with the session."""
+    """Model file to be kept with the session."""
 
 
 NOT_EQUALIZED = Equalized(Identity(), None)
 
 
 def check_playable(protocol: StudyProtocol, model: Path | None) -> None:
-    """Raises StudyError where protocol and model do not go together, before any device is opened."""
+    """Raise StudyError where protocol and model do not go together, before any device is opened."""
     wants_one = protocol.stimulus.quantity == "delivered_acceleration"
     if wants_one and model is None:
         raise StudyError(
@@ -69,13 +69,14 @@ def check_playable(protocol: StudyProtocol, model: Path | None) -> None:
 
 
 def load_equalizer() -> None:
-    """Before a device is opened, whose loop would wait for it. Its linear algebra takes longer to load than all else
-    that a session begins with, and most sessions command forces."""
+    """Import the equalizer before a device is opened, because the import is slow and the device's loop would wait.
+    Only called where stimuli are equalized."""
     import equalizer.tracking.feedforward.model_equalizer  # noqa: F401
 
 
-def equalized_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceInfo) -> Equalized:
-    """For what `check_playable` let pass. Raises StudyError for a model that does not go with the device."""
+def equalize_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceInfo) -> Equalized:
+    """Equalizer for a protocol and model that passed `check_playable`. Raises StudyError for a model that does not
+    fit the device."""
     if model is None:
         return NOT_EQUALIZED
     identified = read_identified_model(model)
@@ -83,19 +84,19 @@ def equalized_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceI
     try:
         scales = level_scales(protocol, equalizer, info.sample_rate_hz)
     except (ValueError, ArithmeticError) as error:  # what linear algebra says of a model that is none
-        raise _refused(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
+        raise _refusal(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
     facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales, quality_sentence(identified.quality))
     return Equalized(equalizer, facts, model)
 
 
 def keep_model(equalized: Equalized, folder: SessionFolder) -> None:
-    """Before the log names it."""
+    """Copy the model into the session folder, before the log names it."""
     if equalized.source is not None:
         write_atomically(folder.path / MODEL_NAME, read_regular(equalized.source))
 
 
-def equalized_again(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> Equalized:
-    """For a session that goes on: its own model, which must be the one it was begun with."""
+def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> Equalized:
+    """For a resumed session: its own model, which must be unchanged."""
     facts = state.opened.equalized
     if facts is None:
         return NOT_EQUALIZED
@@ -111,7 +112,7 @@ def equalized_again(folder: SessionFolder, state: SessionState, info: DeviceInfo
 
 
 def level_scales(protocol: StudyProtocol, equalizer: Equalizer, rate_hz: float) -> tuple[LevelScale, ...]:
-    """For every frequency of the protocol: the level that the harder direction needs for 1 m/s², onset included."""
+    """For every frequency: the level (N) that the more demanding direction needs for 1 m/s^2, onset included."""
     cap_n = protocol.staircase.cap_n
     scales = []
     for frequency_hz in protocol.all_frequencies_hz:
@@ -123,7 +124,7 @@ def level_scales(protocol: StudyProtocol, equalizer: Equalizer, rate_hz: float) 
 def _hardest(
     protocol: StudyProtocol, equalizer: Equalizer, direction: int, frequency_hz: float, rate_hz: float
 ) -> float:
-    """The peak force for 1 m/s² or, where it is the slew limit that comes first, the force that stands for that."""
+    """Peak force for 1 m/s^2 or, if the slew limit is reached first, the equivalent force."""
     limits, cap_n = limits_of_study(protocol), protocol.staircase.cap_n
     vector = direction_vector(protocol.directions, direction)
     stimulus = held_stimulus(protocol.stimulus, vector, frequency_hz, 1.0, equalizer, rate_hz)
@@ -141,34 +142,34 @@ def _equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo
     from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 
     if model.sample_rate_hz != info.sample_rate_hz:
-        raise _refused(
+        raise _refusal(
             f"It runs at {model.sample_rate_hz:g} Hz, the device at {info.sample_rate_hz:g} Hz.",
             "Identify it from recordings of this device.",
         )
     stiffness = info.effective_mass_kg * (2 * math.pi * protocol.spring.natural_frequency_hz) ** 2
     acting = VirtualSpring(stiffness, protocol.spring.damping_n_s_per_m)
-    return ModelEqualizer(model, spring_beside(model, acting))
+    return ModelEqualizer(model, spring_outside_model(model, acting))
 
 
 def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
     shape = (model.D.shape, model.input_unit, model.output_unit)
     if shape != ((3, 3), "N", "m/s^2"):
-        raise _refused(
+        raise _refusal(
             f"{path} goes from {model.D.shape[1]} inputs in {model.input_unit} to {model.D.shape[0]} outputs in "
             f"{model.output_unit}; a stimulus needs three forces in N and three accelerations in m/s^2.",
             "Identify a model from a recording of all three axes.",
         )
     if model.spectral_radius >= 1:
-        raise _refused(f"The model in {path} is not stable.", IDENTIFY_AGAIN)
+        raise _refusal(f"The model in {path} is not stable.", IDENTIFY_AGAIN)
     low, high = model.band_hz
     outside = [f"{f:g}" for f in protocol.all_frequencies_hz if not low <= f <= high]
     if outside:
-        raise _refused(
+        raise _refusal(
             f"{path} was made for {low:g} to {high:g} Hz; the protocol also plays {', '.join(outside)} Hz.",
             "Identify a model that covers the protocol, such as hapteq identify --band 5 50.",
         )
     if model.place_m is not None and math.dist(model.place_m, (0.0, 0.0, 0.0)) > NEAR_M:
-        raise _refused(
+        raise _refusal(
             f"{path} was identified at {model.place_m} m, and the study is at the centre.",
             "Record and identify at the centre of the workspace.",
         )
@@ -177,10 +178,11 @@ def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
 
 
 def _check_axes(model: IdentifiedModel, path: Path) -> None:
-    """Other names may mean anything; ours in another order would send forces along the wrong axes."""
+    """Raise for our channel names in another order, which would send forces along wrong axes. Unknown names are
+    accepted."""
     for names, ours in zip((model.input_channels, model.output_channels), AXES, strict=True):
         if set(names) == set(ours) and names != ours:
-            raise _refused(
+            raise _refusal(
                 f"The channels of {path} are {', '.join(names)}; a stimulus has them in the order {', '.join(ours)}.",
                 "Identify a model from a recording whose channels are in that order.",
             )
@@ -197,11 +199,11 @@ def _check_reach(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
         left_out = np.linalg.norm(reached - wanted, axis=1).max(axis=1)
     beyond = [f"{f:g}" for f, share in zip(frequency_hz, left_out, strict=True) if not share <= LEFT_OUT]
     if beyond:
-        raise _refused(
+        raise _refusal(
             f"By {path} itself, no reasonable force gives the wanted acceleration at {', '.join(beyond)} Hz.",
             "Check units and axes of the recording it was made from, and identify it again.",
         )
 
 
-def _refused(happened: str, do_now: str) -> StudyError:
+def _refusal(happened: str, do_now: str) -> StudyError:
     return StudyError("This model cannot equalize the study", happened, do_now, saved="Nothing moved.")

@@ -1,4 +1,4 @@
-"""Begin a session: a folder of its own, a log with its first line, and everything that first line fixes."""
+"""Begin a session: its folder, and a log whose first line fixes everything that follows."""
 
 import secrets
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ from study.workflows.session.participant_number import participant_number
 
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """What is decided before a person sits down."""
+    """What is decided before the participant starts."""
 
     protocol: StudyProtocol
     protocol_text: str
@@ -49,14 +49,13 @@ class OpenedSession:
 
 
 def fresh_seed() -> int:
+    """A random seed."""
     return secrets.randbits(32)
 
 
 @contextmanager
-def opened_session(
-    plan: SessionPlan, device: DeviceInfo, equalized: Equalized, clock: Clock
-) -> Iterator[OpenedSession]:
-    """A new session, locked as long as the context lasts."""
+def open_session(plan: SessionPlan, device: DeviceInfo, equalized: Equalized, clock: Clock) -> Iterator[OpenedSession]:
+    """Create a session; it is locked while the context lasts."""
     number = plan.participant_number
     if number is None:
         number = participant_number(plan.data, plan.subject, plan.protocol.name, plan.observer is not None)

@@ -1,4 +1,4 @@
-"""The other sessions of a participant, as far as they bear on the vibration dose of the hand."""
+"""Other sessions of a participant that contribute to the vibration dose of the hand."""
 
 from study.errors import StudyError
 from study.session.facts.sitting_events import DoseElsewhere
@@ -9,9 +9,9 @@ from study.workflows.results.fold_session import fold_session
 
 
 def dose_before(folder: SessionFolder, observer: str | None, simulated: bool, utc: str) -> DoseElsewhere | None:
-    """What this participant's hand got today in the other sessions of the data folder on the same kind of device.
+    """Dose that this participant's hand got today in other sessions of the data folder on the same kind of device.
 
-    A session that cannot be read is named and not counted. None for a simulated participant.
+    An unreadable session is named and not counted. None for a simulated participant.
     """
     if observer is not None:
         return None

@@ -1,4 +1,4 @@
-"""Which participant of a protocol a person is: chooses the row of a balanced order, and who has swapped labels."""
+"""Number of a participant within a protocol: it selects the row of the balanced order and the labelling."""
 
 import re
 import tomllib
@@ -18,18 +18,18 @@ from study.workflows.trial.sitting import Sitting, record
 
 PLACED = b'"event":"place_taken"'
 NUMBER = re.compile(rb'"participant_number":(\d{1,6})\b')
-"""In the first line, and in that of the place; the last that is there holds."""
+"""In the first line, and in that of the place; the last occurrence counts."""
 PROTOCOL_NAME = re.compile(rb'(?:\\n|")name = \\"([^"\\]*)\\"')
 OF_A_PERSON = b'"observer":null'
 PRESENTED = b'"event":"trial_presented"'
 
 
 def participant_number(data: Path, subject: str, protocol: str, simulated: bool) -> int:
-    """0 for the first participant of this protocol in the data folder; a returning one keeps the number.
+    """Number of the participant in this protocol, from 0; a returning one keeps the number.
 
-    Those who take part count: a person who refused, was excluded, or left before the place was taken has none.
-    People and simulated participants are counted apart. Withdrawn ones keep their number, so that no row of a
-    balanced order is given twice, and so do those whose log was damaged, as far as anything is left of it.
+    Only those who take part count: a person who refused, was excluded, or left before the place was taken has none.
+    People and simulated participants are counted separately. Withdrawn participants keep their number, so that no row
+    of a balanced order is given twice, and so do those with a damaged log, as far as it is readable.
     """
     numbers = []
     for folder in session_folders(data):
@@ -43,7 +43,7 @@ def participant_number(data: Path, subject: str, protocol: str, simulated: bool)
 
 
 def begun_in(folder: SessionFolder) -> Begun | None:
-    """None where nothing was begun, or nothing can be read of it."""
+    """What a session folder says about its participant; None if nothing was begun or can be read."""
     if folder.tombstone.exists():
         return read_begun(folder)
     intent = read_intent(folder.path.parent, folder.subject)
@@ -60,8 +60,8 @@ def begun_in(folder: SessionFolder) -> Begun | None:
 
 
 def _begun_in_damaged(folder: SessionFolder) -> Begun | None:
-    """By what is left of a damaged log: a place that is held too long costs a row of the balanced order, a place that
-    is given twice costs its balance."""
+    """From a damaged log. Holding a place too long costs a row of the balanced order; giving it twice costs the
+    balance."""
     try:
         content = read_regular(folder.log)
     except OSError:
@@ -74,7 +74,7 @@ def _begun_in_damaged(folder: SessionFolder) -> Begun | None:
 
 
 def _place(folder: SessionFolder, opening: SessionOpened) -> int | None:
-    """From the lines before the first trial, so that a long log is not read for it."""
+    """From the lines before the first trial, so that a long log is not read completely."""
     if not place_comes_later(opening):
         return opening.participant_number
     chain = Chain()
@@ -93,7 +93,7 @@ def _place(folder: SessionFolder, opening: SessionOpened) -> int | None:
 
 
 def take_place(state: SessionState, sitting: Sitting) -> SessionState:
-    """Once for a person, when everything before the first stimulus is passed. Two programs take places in turn."""
+    """Assign the place once, when everything before the first stimulus is passed. A lock serialises programs."""
     if not place_comes_later(state.opened) or state.takes_part:
         return state
     data = sitting.folder.path.parent

@@ -1,7 +1,7 @@
-"""Where a data folder speaks of a participant: what is proved to be theirs, and what only looks so.
+"""Find a participant's data in a data folder: what provably belongs to them, and what only might.
 
-Proved is a session folder whose log, or tombstone, says this session of this participant; an analysis whose tables
-name the participant; a half-made file or folder that does. Links are named and never followed.
+Proved: a session folder whose log or tombstone names the participant; an analysis whose tables name the participant; an
+unfinished file or folder that does. Links are reported and never followed.
 """
 
 import csv
@@ -20,13 +20,13 @@ from study.store.sessions.archive import FOLDER, TOMBSTONE_NAME, SessionFolder
 from study.store.sessions.session_lock import LOCK_NAME
 from study.store.sessions.withdrawal_files import read_tombstone
 from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE
-from study.workflows.results.analysis_files import ANALYSIS_NAME, written_by_analysis
+from study.workflows.results.analysis_files import ANALYSIS_NAME, analysis_outputs
 
 PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}\.part")
-"""What a write that was cut off leaves, file or folder."""
+"""Name of an unfinished file or folder from an interrupted write."""
 
 LARGEST_BYTES = 1 << 24
-"""Of a file that is searched for a name; recordings and pictures are not."""
+"""Largest file that is searched for a name; recordings and pictures are not searched."""
 LONGEST_LINE = 1 << 20
 TEXTS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".part")
 
@@ -34,15 +34,16 @@ TEXTS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".p
 @dataclass(frozen=True, slots=True)
 class Traces:
     sessions: tuple[str, ...]
-    """Names of the session folders that are proved to be the participant's."""
+    """Names of the session folders proved to be the participant's."""
     derived: tuple[str, ...]
-    """Analyses and half-made files that are, relative to the data folder."""
+    """Proved analyses and unfinished files, relative to the data folder."""
     doubtful: tuple[str, ...]
     """Sentences on what may be the participant's and is not erased."""
 
 
 def find_traces(data: Path, subject: str, proved: Collection[str] = ()) -> Traces:
-    """data: the resolved data folder. proved: session folders that were before their logs were erased. Reads only."""
+    """Search without changes. data: the resolved data folder. proved: session folders that were proved before their
+    logs were erased."""
     sessions, derived, doubtful = [], [], []
     for path in sorted(data.iterdir()):
         match = FOLDER.fullmatch(path.name)
@@ -69,17 +70,17 @@ def find_traces(data: Path, subject: str, proved: Collection[str] = ()) -> Trace
 
 
 def is_session_of(path: Path, subject: str) -> bool:
-    """A real folder that holds, by the opening line of its log or by its tombstone, this session of this subject."""
+    """Whether a real folder holds a session of this subject, by the first line of its log or its tombstone."""
     if not is_real_folder(path):
         return False
     folder = SessionFolder(path)
-    if (opening := _opening(folder)) is not None:
+    if (opening := _read_opening(folder)) is not None:
         return opening == (path.name, subject)
     return is_real_file(folder.tombstone) and read_tombstone(folder).get("session") == path.name
 
 
 def _was_session(path: Path) -> bool:
-    """Its log, which goes last, is erased, and nothing else has come into the folder since."""
+    """Whether its log, which is erased last, is gone, and nothing else has been added since."""
     if not is_real_folder(path):
         return False
     names = {inner.name for inner in path.iterdir() if PART.fullmatch(inner.name) is None}
@@ -87,19 +88,19 @@ def _was_session(path: Path) -> bool:
 
 
 def analysis_names(folder: Path, subject: str) -> bool | None:
-    """Whether the analysis in this folder is also of this subject; None where it does not say."""
+    """Whether the analysis in this folder contains this subject; None if that cannot be determined."""
     said = [_rows_name(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
     said.append(_statistics_name(folder / "anova.json", subject))
     if any(said):
         return True
     figure = re.compile(rf"staircases-\d+-{re.escape(subject)}\.(svg|png)")
-    if any(figure.fullmatch(path.name) for path in written_by_analysis(folder)):
+    if any(figure.fullmatch(path.name) for path in analysis_outputs(folder)):
         return True
     return None if all(each is None for each in said) else False
 
 
-def _opening(folder: SessionFolder) -> tuple[Any, Any] | None:
-    """Session and subject, even where the rest of the first line is damaged."""
+def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
+    """Session and subject, even if the rest of the first line is damaged."""
     if not is_real_file(folder.log):
         return None
     try:
@@ -117,7 +118,7 @@ def _no_session(path: Path, subject: str) -> str:
 
 
 def _strange_folder(path: Path, subject: str) -> Iterator[str]:
-    opening = _opening(SessionFolder(path))
+    opening = _read_opening(SessionFolder(path))
     if opening is not None and opening[1] == subject:
         yield f"{path.name} holds a log of {subject} under another name: it was copied or renamed."
     elif _names(path / "diagnosis.json", subject):
@@ -129,9 +130,9 @@ def _may_hold_analysis(path: Path) -> bool:
 
 
 def _analysis_traces(folder: Path, subject: str, alone: bool) -> tuple[list[Path], list[Path]]:
-    """Proved and unclear ones: the files of the analysis in `folder`, and what was half made there.
-    alone: what is half made there belongs to the analysis."""
-    files = list(written_by_analysis(folder))
+    """Proved and unclear paths: files of the analysis in `folder`, and unfinished ones. alone: unfinished ones
+    belong to the analysis."""
+    files = list(analysis_outputs(folder))
     whose = analysis_names(folder, subject) if files else False
     found, unclear = (files if whose else []), (files if whose is None and folder.name == ANALYSIS_NAME else [])
     places = [folder, *([folder / "figures"] if is_real_folder(folder / "figures") else [])]
@@ -171,12 +172,12 @@ def _statistics_name(path: Path, subject: str) -> bool | None:
 
 
 def _is_others_file(path: Path, subject: str) -> bool:
-    """Not one of those that the program keeps beside the sessions."""
+    """Whether it is not one of those that the program keeps beside the sessions."""
     return path.name not in (f"{subject}.withdrawal.json", WRITTEN_ELSEWHERE) and PART.fullmatch(path.name) is None
 
 
 def _names(path: Path, subject: str) -> bool:
-    """Whether a name says a session of this subject, or a text does; of a folder, anything in it."""
+    """Whether a name or text names a session of this subject; for a folder, anything in it."""
     session = re.compile(rf"(?<![A-Za-z0-9]){re.escape(subject)}(_\d{{3,}}|\.withdrawal\.json)(?!\d)")
     if session.search(path.name):
         return True
@@ -186,7 +187,7 @@ def _names(path: Path, subject: str) -> bool:
 
 
 def _text(path: Path) -> str | None:
-    """None where it is no regular file, or too large for one of ours."""
+    """The text; None if it is not a regular file, or too large for one of ours."""
     try:
         return read_regular(path, LARGEST_BYTES).decode("utf-8", errors="replace") if is_real_file(path) else None
     except OSError:

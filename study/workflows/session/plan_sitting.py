@@ -1,4 +1,4 @@
-"""From what is asked for to a plan: the protocol read, the code checked, the seed drawn."""
+"""Plan a sitting from a request: read the protocol, check the code, draw the seed."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from study.workflows.session.participant_number import begun_in
 
 
 def check_code(data: Path, subject: str, simulated: bool) -> None:
-    """Raises WrongUseError where the code belongs to another person."""
+    """Raise WrongUseError if the code belongs to another person."""
     for folder in _folders(data, subject):
         if folder.withdrawn:
             raise WrongUseError(
@@ -33,7 +33,7 @@ def check_code(data: Path, subject: str, simulated: bool) -> None:
 
 
 def unfinished_sessions(data: Path, subject: str, protocol: str) -> tuple[SessionFolder, ...]:
-    """Sessions of the same participant and protocol that could be resumed."""
+    """Resumable sessions of the same participant and protocol."""
     return tuple(folder for folder in _folders(data, subject) if _can_go_on(folder, protocol))
 
 
@@ -53,13 +53,14 @@ def _can_go_on(folder: SessionFolder, protocol: str) -> bool:
 class SittingPlan:
     session: SessionPlan
     notes: tuple[str, ...]
-    """Worth knowing before the session begins."""
+    """Remarks before the session begins."""
 
 
 def plan_sitting(
     protocol_name: str, subject: str, observer: str | None, seed: int | None, data: Path, model: Path | None = None
 ) -> SittingPlan:
-    """observer: name of a simulated participant; None for a person. Raises StudyError where it cannot be begun."""
+    """The plan. observer: name of a simulated participant; None for a person. Raises StudyError if the sitting
+    cannot begin."""
     source = read_study_protocol(protocol_name, data)
     plan = SessionPlan(
         protocol=source.protocol,

@@ -1,4 +1,4 @@
-"""Before the instructions, in each sitting: consent, exclusion, the set-up, and a look at device and computer."""
+"""Preparation of each sitting: consent, exclusion, set-up, device and computer check."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from study.workflows.trial.sitting import Sitting, record, write_notes
 
 
 def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState, str]:
-    """Returns why the sitting ends before it began; empty where it goes on."""
+    """Run the preparation. Returns the state, and why the sitting ends before it began; empty if it continues."""
     while (due := next_preparation(state)) is not None:
         match due:
             case Leave(reason=reason):
@@ -34,6 +34,7 @@ def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState
 
 
 def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
+    """Ask for one form and log it."""
     sitting.attendant.begin("form")
     reply = sitting.display.fill_in(form)
     outcome = judge_form(state.protocol, form.kind, reply)
@@ -56,14 +57,14 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
 
 
 def turn_away(state: SessionState, sitting: Sitting) -> SessionState:
-    """The session is over: nothing but the outcome is in it."""
+    """Close the session; only the outcome is logged."""
     state = write_notes(state, sitting)
     outcome = state.sitting.turned_away or "refused"
     return record(state, SessionClosed(utc=sitting.clock.utc(), outcome=outcome), sitting)
 
 
 def does_not_take_part(state: SessionState) -> StudyError:
-    """At the end of such a sitting, and where it is to be resumed."""
+    """The error at the end of such a sitting, and on an attempt to resume it."""
     return StudyError(
         "This person does not take part",
         f"{state.opened.session} is over: {TURNED_AWAY[state.sitting.turned_away or 'refused']}.",
@@ -73,7 +74,7 @@ def does_not_take_part(state: SessionState) -> StudyError:
 
 
 def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
-    """As often as it is to be checked again. Going on in spite of a finding is their decision, and is logged."""
+    """Repeat the check as long as the experimenter wants. Continuing despite a finding is logged."""
     sitting.attendant.begin("preparing")
     device, clock = sitting.device, sitting.clock
     safety = state.protocol.safety

@@ -1,4 +1,5 @@
-"""A whole study of simulated participants, several at once; begun ones are resumed, finished ones left alone."""
+"""Rehearse a whole study with simulated participants, several at once; begun sessions are resumed, finished ones
+kept."""
 
 import signal
 from collections.abc import Callable
@@ -17,14 +18,14 @@ from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import finish_tables, write_tables
 from study.workflows.session.conduct_session import conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
-from study.workflows.session.simulated_participant import seated
+from study.workflows.session.simulated_participant import seat_observer
 
 DEVICE = "simulated"
 
 
 @dataclass(frozen=True, slots=True)
 class Rehearsal:
-    """A study of simulated participants: its protocol, how many, and where their sessions are written."""
+    """Protocol, number of participants, seed and output folder."""
 
     protocol: StudyProtocol
     protocol_text: str
@@ -36,9 +37,7 @@ class Rehearsal:
 
 
 def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[int], None]) -> None:
-    """Blocks until every participant has finished, calling `on_finished(how many are done)` on the way.
-
-    After an interruption the same call goes on.
+    """Run all participants, calling `on_finished(count)`. After an interruption the same call continues.
 
     Raises StudyError where the folder holds a rehearsal of another protocol, seed or model.
     """
@@ -65,7 +64,7 @@ def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[in
 
 
 def _leave_ctrl_c_to_the_parent() -> None:
-    """A terminal sends Ctrl-C to all. Sessions that are running finish, which takes seconds; no other is begun."""
+    """Ignore Ctrl-C in a worker. Running sessions finish within seconds; no other is begun."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -78,7 +77,7 @@ def codes(subjects: int) -> set[str]:
 
 
 def subject_seed(seed: int, number: int) -> int:
-    """Neighbouring rehearsals share no participant: the number is mixed in, not added."""
+    """Seed of one participant: hashed, so that neighbouring rehearsals share no participant."""
     from numpy.random import SeedSequence
 
     return int(SeedSequence(seed, spawn_key=(number,)).generate_state(1)[0])
@@ -102,13 +101,13 @@ def _sit(rehearsal: Rehearsal, number: int) -> None:
             participant_number=number,
             model=rehearsal.model,
         )
-        conducted = conduct_new(plan, DEVICE, seated(observer, seed, VirtualClock()))
+        conducted = conduct_new(plan, DEVICE, seat_observer(observer, seed, VirtualClock()))
     elif (folded := fold_session(begun)).state.closed:
         finish_tables(begun, folded)
         return
     else:
         clock = VirtualClock.not_before(folded.state.sitting.last.utc)
-        conducted = conduct_resumed(begun, DEVICE, seated(observer, seed, clock))
+        conducted = conduct_resumed(begun, DEVICE, seat_observer(observer, seed, clock))
     write_tables(conducted.folder)
     if conducted.left:
         raise StudyError(
@@ -120,7 +119,7 @@ def _sit(rehearsal: Rehearsal, number: int) -> None:
 
 
 def _begun(data: Path, subject: str) -> SessionFolder | None:
-    """The participant's last session with a first line; an empty folder is what a crash at birth leaves."""
+    """The participant's last session with a first line; a crash at the start leaves an empty folder."""
     folders = [f for f in session_folders(data) if f.subject == subject and f.log.exists() and f.log.stat().st_size]
     return folders[-1] if folders else None
 

@@ -1,4 +1,4 @@
-"""Go on with a session after a crash or a pause: fold its log, check it, close what was left open."""
+"""Resume a session after a crash or a pause: fold its log, check it, close an open trial."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,12 +36,12 @@ from study.workflows.session.open_session import OpenedSession, device_facts
 from study.workflows.session.other_sessions import dose_before
 from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.trial.judge_trial import Judgement, judge
-from study.workflows.trial.trial_facts import known_again
+from study.workflows.trial.trial_facts import health_from_log
 
 
 @contextmanager
-def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> Iterator[OpenedSession]:
-    """An existing session, mended and locked as long as the context lasts."""
+def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> Iterator[OpenedSession]:
+    """An existing session, repaired and locked while the context lasts."""
     close_data_folder(folder.path.parent)
     close_to_others(folder.path, inside=True)  # an earlier version left its files to everyone
     with hold_session_lock(folder.path):
@@ -76,7 +76,7 @@ def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> 
 
 
 def _close_as_turned_away(folded: FoldedSession, folder: SessionFolder, log: EventLog, clock: Clock) -> None:
-    """What the program may have died before: the last line, seal and tables."""
+    """Complete what a crash may have prevented: last line, seal and tables."""
     if not folded.state.closed:
         mend(folder.log, folded.contents)
         outcome = folded.state.sitting.turned_away or "refused"
@@ -124,20 +124,19 @@ def _close_open_trial(
             cause=VoidCause.LEFT if interrupted else VoidCause.PROGRAM_ENDED,
         )
     else:
-        event = _judged_late(state, presented, folder, clock)
+        event = _judge_late(state, presented, folder, clock)
     log.append(event)
     return apply(state, event)
 
 
-def _judged_late(
+def _judge_late(
     state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
 ) -> TrialMeasured | TrialSpoiled:
-    """The program died between answer and measurement: the recording may still have reached the disk.
+    """Judge a trial whose program ended between answer and measurement.
 
-    A recording is written only of a trial that was judged to count. Without one, the trial is judged by what was
-    logged with its answer. Where that is unknown too (older logs) the answer counts, unmeasured: the person gave it,
-    the staircase of an earlier sitting may have moved by it, and to drop answers by what cannot be known would choose
-    among them after they were seen.
+    A recording is only written of a trial that was judged to count. Without one, the trial is judged by what was logged
+    with its answer. If that is unknown too (older logs), the answer counts as unmeasured: the staircase of an earlier
+    sitting may have moved by it, and dropping answers after they were seen would bias the result.
     """
     try:
         late = _from_recording(state, presented, folder, clock)
@@ -148,7 +147,7 @@ def _judged_late(
 
 def _without_recording(state: SessionState, presented: TrialPresented, clock: Clock) -> TrialMeasured | TrialSpoiled:
     logged = state.answered.health if state.answered is not None else None
-    health = known_again(logged) if logged is not None else None
+    health = health_from_log(logged) if logged is not None else None
     verdict = Judgement("", ())
     if health is not None and logged is not None:
         verdict = judge(health, state.protocol.measurement, logged.felt_whole)
@@ -187,7 +186,7 @@ def _without_recording(state: SessionState, presented: TrialPresented, clock: Cl
 def _from_recording(
     state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
 ) -> TrialMeasured | None:
-    """None where there is none. Raises StudyError, ValueError where it cannot be used."""
+    """Measurement from the recording; None if there is none. Raises StudyError, ValueError if it cannot be used."""
     found = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""The loop of a session: ask the machine what is next, do it, log it, until nothing is left."""
+"""Main loop of a session: ask the state machine for the next action, do it, log it, until nothing is left."""
 
 import contextlib
 from dataclasses import dataclass, replace
@@ -27,32 +27,32 @@ from study.workflows.trial.sitting import Sitting, record, tell, write_notes
 from study.workflows.trial.take_pause import take_pause
 
 VOID_TRIALS_IN_A_ROW = 3
-"""After so many void presentations that were not asked for, the sitting ends: the participant is gone, or the device
-is not well. A stimulus must not shake an empty chair all night."""
+"""After this many unrequested void presentations the sitting ends: the participant has left, or the device is
+faulty. A stimulus must not play on an unattended handle."""
 
 
 @dataclass(frozen=True, slots=True)
 class SessionEnd:
     state: SessionState
     left: str
-    """Why the sitting ended before the session was finished; empty where it is finished."""
+    """Why the sitting ended before the session was finished; empty if it is finished."""
     fault: Fault = Fault.NONE
-    """What was wrong with the device, if that was why."""
+    """The device fault, if that was why."""
     withdrawn: bool = False
-    """The participant takes the consent back: the data are to be erased."""
+    """The participant withdrew consent: the data are to be erased."""
 
 
 def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Run until the session is finished or left.
 
-    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and leaves as LeftError. Any StudyError
-    on the way leaves with the number of answers that are on disk, and how to go on.
+    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and becomes LeftError. Any StudyError is
+    extended by the number of saved answers and how to continue.
     """
     try:
         end = _sit(state, sitting)
     except KeyboardInterrupt as interruption:
         sitting.device.stop()
-        return _interrupted(sitting, interruption)
+        return _end_interrupted(sitting, interruption)
     except StudyError as error:
         sitting.device.stop()
         raise _with_the_way_back(error, sitting) from error
@@ -82,8 +82,8 @@ def _sit(state: SessionState, sitting: Sitting) -> SessionEnd:
     return _loop(state, sitting)
 
 
-def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
-    """What is on the disk decides: a session whose last line was written is finished, however it ended."""
+def _end_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
+    """End after an interruption. The log decides: a session whose last line was written is finished."""
     state = fold_session(sitting.folder).state
     still_on = sitting.device.fault() is Fault.FORCE_LEFT
     if state.turned_away_for_good:  # nothing was played; its last line may be missing
@@ -108,7 +108,7 @@ def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEn
 
 
 def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:
-    """The same error; only the session knows how much is safe and how to go on."""
+    """The same error with what is saved and how to continue."""
     with contextlib.suppress(StudyError):
         state = fold_session(sitting.folder).state
         if not state.turned_away_for_good:
@@ -158,7 +158,7 @@ def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
         case Present() as present:
             after = present_trial(state, present, sitting)
             if not after.leave:
-                _between_trials(after, present, state, sitting)
+                _finish_trial(after, present, state, sitting)
             return after
         case Finish():
             return AfterTrial(state)
@@ -171,7 +171,7 @@ def _end(after: AfterTrial, sitting: Sitting) -> SessionEnd:
 
 
 def _say_busy(state: SessionState, sitting: Sitting) -> SessionState:
-    """At the end of a sitting, to the experimenter: on the screen and in the log."""
+    """Report void trials of a busy computer at the end of a sitting, on the screen and in the log."""
     if not state.sitting.busy_voids:
         return state
     tell(busy_sentence(state.sitting.busy_voids), sitting)
@@ -184,7 +184,7 @@ def _pause_wanted(after: AfterTrial, sitting: Sitting) -> str:
     return after.pause or (f"the {who} asked for a pause" if who else "")
 
 
-def _between_trials(after: AfterTrial, present: Present, before: SessionState, sitting: Sitting) -> None:
+def _finish_trial(after: AfterTrial, present: Present, before: SessionState, sitting: Sitting) -> None:
     if after.void:
         sitting.display.await_return(after.void)
     if after.correct is not None:
@@ -202,7 +202,7 @@ def _practice_result(before: SessionState, correct: bool) -> PracticeResult:
 
 
 def _rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
-    """A rest that a pause or a stop cuts short counts for nothing: it is due again afterwards."""
+    """A rest cut short by a pause or stop does not count and is due again."""
     sitting.attendant.begin("rest")
     notice = RestNotice(seconds, len(state.runs) - state.run, progress(state))
     rested_s = max(0.0, sitting.display.rest(notice, sitting.attendant.glance))

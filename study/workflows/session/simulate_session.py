@@ -1,4 +1,4 @@
-"""A whole session of a simulated participant on the simulated device, by one call."""
+"""Simulate a whole session of a simulated participant on the simulated device by one call."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from study.store.sessions.archive import SessionFolder
 from study.workflows.results.session_results import write_tables
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.open_session import SessionPlan
-from study.workflows.session.simulated_participant import simulated_participant
+from study.workflows.session.simulated_participant import make_simulated_participant
 
 
 def simulate_session(
@@ -36,7 +36,7 @@ def simulate_session(
         data=data,
         model=model,
     )
-    conducted = conduct_new(plan, "simulated", simulated_participant(observer, seed, VirtualClock()))
+    conducted = conduct_new(plan, "simulated", make_simulated_participant(observer, seed, VirtualClock()))
     write_tables(conducted.folder)
     if conducted.left:
         raise StudyError(

@@ -1,4 +1,4 @@
-"""A simulated participant at the display and at the handle: feels the stimulus and answers after a while."""
+"""Simulated participant at display and handle: feels the stimulus and answers after a response time."""
 
 from collections.abc import Callable
 
@@ -28,10 +28,10 @@ from study.session.views.views import (
 from study.workflows.trial.display import SignOfLife
 
 GLANCE_S = 0.1
-"""How often a waiting participant gives the device a sign of life."""
+"""Interval of the signs of life to the device while waiting."""
 
 PATIENCE_S = 60.0
-"""How long a handle may stay away: no person will move a simulated one."""
+"""Longest wait for the handle: a simulated one is not moved by a person."""
 
 CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
 
@@ -71,14 +71,14 @@ class SimulatedDisplay:
         return DemoDone()
 
     def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
-        return None if self._waited(notice.seconds, sign_of_life) else CUT_SHORT
+        return None if self._wait(notice.seconds, sign_of_life) else CUT_SHORT
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
         until_s = self._clock.now_s() + PATIENCE_S
         while not look().ready:
             if self._clock.now_s() > until_s:
                 return Unanswered("the handle did not come back", leave=True)
-            if not self._waited(GLANCE_S, sign_of_life):
+            if not self._wait(GLANCE_S, sign_of_life):
                 return CUT_SHORT
         return None
 
@@ -89,7 +89,7 @@ class SimulatedDisplay:
             raise RuntimeError("a simulated participant was asked before anything was felt")
         reply = self._observer.reply(self._felt, self._seed)
         too_slow = 0 < question.time_limit_s < reply.response_time_s
-        if not self._waited(question.time_limit_s if too_slow else reply.response_time_s, sign_of_life):
+        if not self._wait(question.time_limit_s if too_slow else reply.response_time_s, sign_of_life):
             return CUT_SHORT
         if too_slow:
             return Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
@@ -103,7 +103,7 @@ class SimulatedDisplay:
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
         started_s = self._clock.now_s()
-        self._waited(notice.seconds, sign_of_life)
+        self._wait(notice.seconds, sign_of_life)
         return self._clock.now_s() - started_s
 
     def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
@@ -118,8 +118,8 @@ class SimulatedDisplay:
     def trouble(self, sentence: str) -> None:
         return None
 
-    def _waited(self, seconds: float, sign_of_life: SignOfLife) -> bool:
-        """False where the sign of life ended the wait."""
+    def _wait(self, seconds: float, sign_of_life: SignOfLife) -> bool:
+        """Wait; False if the sign of life ended it."""
         until_s = self._clock.now_s() + seconds
         while (left_s := until_s - self._clock.now_s()) > 1e-9:
             self._clock.sleep(min(GLANCE_S, left_s))

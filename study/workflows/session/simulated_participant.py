@@ -1,4 +1,4 @@
-"""A simulated participant as a person who can sit down: display, hand and virtual time in one."""
+"""A simulated participant for a sitting: display, hand and virtual clock in one."""
 
 from collections.abc import Callable
 
@@ -10,15 +10,16 @@ from study.workflows.session.conduct_session import Participant
 from study.workflows.session.simulated_display import SimulatedDisplay
 
 
-def simulated_participant(
+def make_simulated_participant(
     name: str, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
 ) -> Participant:
-    """By the name that the command line and the log use. Raises StudyError for an unknown name."""
-    return seated(observer_named(name, seed), seed, clock, on_question)
+    """By the name used on the command line and in the log. Raises StudyError for an unknown name."""
+    return seat_observer(observer_named(name, seed), seed, clock, on_question)
 
 
-def seated(
+def seat_observer(
     observer: Observer, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
 ) -> Participant:
+    """A participant that answers as this observer."""
     display = SimulatedDisplay(observer, seed, clock, on_question)
     return Participant(display=display, hand=display, clock=clock)

@@ -1,8 +1,8 @@
-"""Withdrawal: erase a participant's data for good, and leave a tombstone.
+"""Withdrawal: erase a participant's data permanently and leave a tombstone.
 
-The tombstone keeps the session's name, the protocol's, and the place in its balanced order: nothing measured. What is
-to be erased is proved and written down first, each log goes last, then the tombstone takes its place: interrupted at
-any point, the same command goes on.
+The tombstone keeps the names of session and protocol, and the place in its balanced order: nothing measured. What is to
+be erased is determined and written down first, each log is erased last, then the tombstone takes its place: after an
+interruption the same command continues.
 """
 
 import errno
@@ -28,20 +28,21 @@ ELSEWHERE = "Analyses written elsewhere with --out, and copies, still hold the n
 class Withdrawal:
     subject: str
     sessions: tuple[str, ...]
-    """All sessions of the participant in this data folder, those withdrawn before included."""
+    """All sessions of the participant in this data folder, earlier withdrawn ones included."""
     derived: tuple[str, ...]
-    """Analyses and half-made files that hold the participant's numbers, relative to the data folder."""
+    """Analyses and unfinished files with the participant's data, relative to the data folder."""
     doubtful: tuple[str, ...]
-    """Sentences on what may be the participant's and stays, to be looked at."""
+    """Sentences on what may be the participant's and is kept, to be checked."""
 
     @property
     def made_from_them(self) -> tuple[str, ...]:
-        """The folders, or files, of the data folder in which analyses are."""
+        """Folders or files of the data folder that contain analyses."""
         return tuple(dict.fromkeys(PurePosixPath(name).parts[0] for name in self.derived))
 
 
 def session_to_withdraw(session: str, data: Path) -> SessionFolder:
-    """By its folder or, within `data`, by its name. Raises WrongUseError; also for a link, which is not followed."""
+    """The session by its folder or, within `data`, by its name. Raises WrongUseError; also for a link, which is not
+    followed."""
     path = Path(session) if Path(session).is_dir() else data / session
     folder = SessionFolder(path.absolute().parent.resolve() / path.absolute().name)
     if folder.path.is_symlink():
@@ -60,9 +61,9 @@ def session_to_withdraw(session: str, data: Path) -> SessionFolder:
 
 
 def plan_withdrawal(session: SessionFolder) -> Withdrawal:
-    """What would be erased: every session of the same participant beside this one, and what was made from them.
+    """What would be erased: every session of the same participant, and what was derived from them.
 
-    Raises StudyError where nothing here is proved to be the participant's.
+    Raises StudyError where nothing is proved to be the participant's.
     """
     data, subject = session.path.parent.resolve(), session.subject
     begun = read_intent(data, subject)
@@ -79,7 +80,7 @@ def plan_withdrawal(session: SessionFolder) -> Withdrawal:
 
 
 def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
-    """Erase. Raises StudyError: before anything is changed where a session runs, and where the system refuses."""
+    """Erase. Raises StudyError before any change if a session is running, or where the system refuses."""
     data, subject = data.resolve(), withdrawal.subject
     folders = tuple(SessionFolder(data / name) for name in withdrawal.sessions)
     try:
@@ -103,14 +104,14 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
 
 
 def still_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
-    """Sentences on copies outside the data folder, by what was noted when they were written."""
+    """Sentences on copies outside the data folder that were noted when they were written."""
     noted = [path for path in folders_written_elsewhere(data) if path.exists()]
     named = [path for path in noted if analysis_names(path, withdrawal.subject) is not False]
     return (*(f"Written with --out, and not erased: {path}" for path in named), ELSEWHERE)
 
 
 def _hold(folder: SessionFolder, held: ExitStack) -> None:
-    """The session is not written while it is erased. A link that was put in its place since is not followed."""
+    """Lock the session while it is erased. A link in its place is not followed."""
     if not is_real_folder(folder.path):
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
     lock = folder.path / LOCK_NAME
@@ -132,7 +133,7 @@ def _erase_session(data: RealFolder, folder: SessionFolder) -> None:
 
 
 def _erase_derived(data: RealFolder, name: str) -> None:
-    """And the folders that are empty then, up to the data folder."""
+    """Erase the file or folder, and parent folders that become empty, up to the data folder."""
     *parents, last = PurePosixPath(name).parts
     try:
         with open_folder(data, *parents) as place:

@@ -1,4 +1,4 @@
-"""A file of noise to be played while a participant sits at the device, so that the device is not heard."""
+"""Write masking noise that is played during a sitting, so that the device is not heard."""
 
 from dataclasses import dataclass
 from pathlib import Path

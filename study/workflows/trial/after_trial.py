@@ -1,4 +1,4 @@
-"""What a trial, a demonstration or a wait for the handle leaves to its caller."""
+"""Result of a trial, a demonstration or a wait for the handle."""
 
 from dataclasses import dataclass
 
@@ -13,16 +13,16 @@ class AfterTrial:
     correct: bool | None = None
     """None for a void trial, and where nothing was asked."""
     leave: str = ""
-    """Why the sitting ends here; empty where it goes on."""
+    """Why the sitting ends here; empty if it continues."""
     void: str = ""
-    """Why the trial is void, where that was not asked for; empty where it counts."""
+    """Why the trial is void without having been asked for; empty if it counts."""
     pause: str = ""
-    """Who asked for a pause; empty where it was not asked for."""
+    """Who asked for a pause; empty if it was not asked for."""
     fault: Fault = Fault.NONE
 
 
 def cut_short(state: SessionState, reply: Unanswered) -> AfterTrial:
-    """Nothing was presented, or nothing that counts: the participant leaves, wants a pause, or is not there."""
+    """Result if nothing that counts was presented: the participant leaves, wants a pause, or is absent."""
     if reply.leave:
         return AfterTrial(state, leave=reply.reason)
     if reply.pause:
@@ -31,5 +31,5 @@ def cut_short(state: SessionState, reply: Unanswered) -> AfterTrial:
 
 
 def reason_to_leave(fault: Fault) -> str:
-    """After these faults a device cannot go on until it is opened again, and that must be said at once."""
+    """Reason for faults after which the device must be opened again; empty for others."""
     return fault.value if fault in (Fault.STOPPED, Fault.LOST, Fault.FORCE_LEFT) else ""

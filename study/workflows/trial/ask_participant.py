@@ -1,4 +1,4 @@
-"""Play one stimulus and get its answer: held until the answer, or, in a detection trial, in one of two intervals."""
+"""Play one stimulus and get its answer: held until the answer or, in a detection trial, in one of two intervals."""
 
 from dataclasses import dataclass
 
@@ -10,26 +10,29 @@ from study.session.state.state import SessionState
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.stimulus import direction_vector, held_stimulus
 from study.session.views.views import Answered, PlayingNotice, Question, Reply, Unanswered
-from study.workflows.trial.sitting import Sitting, released
+from study.workflows.trial.sitting import Sitting, release_device
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Asked:
+    """The reply to one stimulus and the state of the device at that moment."""
+
     reply: Reply
     started_s: float
-    """From when on an answer could be given."""
+    """When answering became possible."""
     felt_whole: bool
-    """Nothing was wrong with the stimulus when the answer came. What happens to it afterwards, while a slow disk
-    holds us up, cannot spoil the answer."""
+    """The stimulus was faultless until the answer. Later faults, such as during a slow disk write, do not void the
+    answer."""
     played: Played | None
-    """Of a stimulus that is over before the question; None where it is still held, or was never begun."""
+    """For a stimulus that ended before the question; None if it is still held or never began."""
     holding: bool
-    """It must still be released."""
+    """It still has to be released."""
     health: Health | None = None
-    """What the device had counted when the answer came; None where nothing was played to the end of the question."""
+    """Counters of the device at the answer; None if the question was not reached."""
 
 
 def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
+    """Play the stimulus, ask, and return the reply."""
     sitting.attendant.begin("trial")
     if present.phase is Phase.DETECTION:
         return _in_one_of_two_intervals(state, present, question, sitting)
@@ -53,7 +56,7 @@ def _in_one_of_two_intervals(state: SessionState, present: Present, question: Qu
         if cut is not None:
             return Asked(cut, sitting.clock.now_s(), False, played, holding)
         if holding:
-            played = released(sitting)
+            played = release_device(sitting)
         cut = _wait("", 0, state.protocol.detection.gap_s, sitting) if interval == 1 else None
         if cut is not None:
             return Asked(cut, sitting.clock.now_s(), False, played, holding=False)
@@ -65,7 +68,7 @@ def _in_one_of_two_intervals(state: SessionState, present: Present, question: Qu
 
 
 def _reply_to(question: Question, sitting: Sitting) -> Reply:
-    """A repeat that is not left is no reply, whatever the display lets through: it is asked again."""
+    """The reply; a repeat request beyond the limit is ignored and the question asked again."""
     while True:
         reply = sitting.attendant.resolve(sitting.display.ask(question, sitting.attendant.glance))
         repeat = isinstance(reply, Unanswered) and reply.asked and not (reply.pause or reply.leave)
@@ -74,7 +77,7 @@ def _reply_to(question: Question, sitting: Sitting) -> Reply:
 
 
 def _wait(title: str, number: int, seconds: float, sitting: Sitting) -> Unanswered | None:
-    """A button pressed during an interval answers nothing yet."""
+    """Wait during an interval; a button pressed meanwhile is ignored."""
     reply = sitting.display.show_playing(PlayingNotice(title, number, seconds, picture=None), sitting.attendant.glance)
     if reply is None and sitting.attendant.glance():
         return None

@@ -1,4 +1,4 @@
-"""What goes on while the session waits: the device's sign of life, requests, buttons, the live state."""
+"""Background tasks while the session waits: the device's sign of life, requests, buttons, live state."""
 
 import math
 from collections.abc import Callable
@@ -11,13 +11,13 @@ from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked, Wh
 from study.workflows.trial.requests_port import Requests
 
 LIVE_EVERY_S = 0.25
-"""Often enough for a viewer, and no burden on the disk."""
+"""Often enough for a viewer, with little load on the disk."""
 
 PLAYING = ("trial", "demo")
 
 
 class Attendant:
-    """One for a sitting. `glance` is the sign of life of every wait; what ended a wait is asked for afterwards."""
+    """One per sitting. `glance` is the sign of life of every wait; `resolve` tells afterwards what ended it."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class Attendant:
         self.pause_asked: Who | None = None
 
     def begin(self, activity: Activity) -> None:
-        """A new wait begins: a button that is still down from the last one does not answer it."""
+        """Start a new wait: a button still held from the last one does not answer it."""
         self._activity, self._since_utc = activity, self._clock.utc()
         self._buttons_up = False
         self._answer = None
@@ -67,7 +67,7 @@ class Attendant:
         return self._activity not in PLAYING or self._device.fault() is Fault.NONE
 
     def listen(self) -> None:
-        """Take what was asked for. A stop takes the force away at once, whatever is waited for."""
+        """Take pending requests. A stop releases the force at once."""
         for request in self._requests.take():
             match request:
                 case StopAsked(who=who):
@@ -79,7 +79,7 @@ class Attendant:
                     self._notes.append(request)
 
     def resolve(self, reply: Reply) -> Reply:
-        """What really ended the wait, where the display only knows that it was over."""
+        """What actually ended the wait, where the display only knows that it ended."""
         if self.stop_asked is not None:
             return Unanswered(f"the {self.stop_asked} stopped the session", leave=True)
         if isinstance(reply, Answered):
@@ -119,7 +119,7 @@ class Attendant:
             self._answer = Answered(1 + self._buttons.index(down[0]), now_s)
 
     def offset_m(self, look: Look) -> tuple[float, float, float] | None:
-        """Of the handle from its place; None without a reading."""
+        """Offset of the handle from its place; None without a reading."""
         if look.position_m is None:
             return None
         (x, y, z), (x0, y0, z0) = look.position_m, self._place_m

@@ -13,13 +13,13 @@ from study.workflows.trial.sitting import Sitting, record
 
 
 def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
-    """Until enough was felt, or the participant leaves or wants a pause. Then it can be gone through again."""
+    """Run the demonstration until the participant has felt enough, leaves, or wants a pause. It can be repeated."""
     felt_so_far: tuple[tuple[int, int], ...] = ()
     vibration = 1
     while True:
         sitting.attendant.begin("demo")
         choice = sitting.display.choose_demo(_menu(state, felt_so_far, vibration), sitting.attendant.glance)
-        ended = _asked_to_end(state, sitting)
+        ended = _check_end_request(state, sitting)
         if ended is not None:
             return ended
         if isinstance(choice, DemoDone):
@@ -45,8 +45,8 @@ def _menu(state: SessionState, felt_so_far: tuple[tuple[int, int], ...], vibrati
     )
 
 
-def _asked_to_end(state: SessionState, sitting: Sitting) -> AfterTrial | None:
-    """A stop or a pause that came while nothing was played."""
+def _check_end_request(state: SessionState, sitting: Sitting) -> AfterTrial | None:
+    """A stop or pause requested while nothing was played."""
     reply = sitting.attendant.resolve(Unanswered("", leave=False, asked=True))
     return cut_short(state, reply) if isinstance(reply, Unanswered) and (reply.leave or reply.pause) else None
 

@@ -1,6 +1,6 @@
-"""The display port: how a session talks with the participant. A line-mode prompt, a screen, or a simulation.
+"""The display port: how a session talks to the participant. Implemented by line mode, a screen, and a simulation.
 
-Any method may raise KeyboardInterrupt to leave: the force is off at once, and the session can be resumed.
+Any method may raise KeyboardInterrupt to leave: the force is released at once, and the session can be resumed.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from study.session.state.due_trial import Present
 
 SignOfLife = Callable[[], bool]
-"""To be called at least every 100 ms while waiting: it keeps the device alive, and hears who asks for a stop or a
-pause. False: something ended the wait (a fault, a request, a device button); return at once, whatever the reply."""
+"""To be called at least every 100 ms while waiting: it keeps the device alive and takes requests to stop or pause.
+False: something ended the wait (a fault, a request, a device button); return at once with any reply."""
 
 
 class Display(Protocol):
@@ -90,13 +90,13 @@ class Display(Protocol):
 
 
 class Hand(Protocol):
-    """What holds the handle. A person feels by being there; a simulated participant must be told."""
+    """What holds the handle. A person feels the device; a simulated hand is told the stimulus."""
 
     def feel(self, stimulus: Present, answers_before: int) -> None: ...
 
 
 class PersonsHand:
-    """Feels without the program's help."""
+    """A person, who needs no information."""
 
     def feel(self, stimulus: Present, answers_before: int) -> None:
         return None

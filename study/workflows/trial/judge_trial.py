@@ -1,4 +1,4 @@
-"""Whether an answered trial counts, from what the device did in it."""
+"""Judge from the device's counters whether an answered trial counts."""
 
 from dataclasses import dataclass
 
@@ -11,15 +11,16 @@ from study.session.facts.void_reasons import TICKS_MISSED
 @dataclass(frozen=True, slots=True)
 class Judgement:
     spoiled: str
-    """Why the trial is void; empty where it counts."""
+    """Why the trial is void; empty if it counts."""
     flags: tuple[str, ...]
-    """What is worth a look in a trial that counts."""
+    """Remarks on a trial that counts."""
     cause: VoidCause = VoidCause.FAULT
     """Of a void trial."""
 
 
 def judge(health: Health, settings: MeasurementSettings, felt_whole: bool) -> Judgement:
-    """felt_whole: whether the stimulus was whole when the answer came; what stops it afterwards is only flagged."""
+    """Judge the trial. felt_whole: whether the stimulus was faultless until the answer; later faults are only
+    flagged."""
     if health.fault is not Fault.NONE and not felt_whole:
         return Judgement(health.fault.value, (), cause_of(health.fault))
     if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):
@@ -37,5 +38,5 @@ def judge(health: Health, settings: MeasurementSettings, felt_whole: bool) -> Ju
 
 
 def cause_of(fault: Fault) -> VoidCause:
-    """Of a trial that this fault made void."""
+    """Cause of a trial that this fault made void."""
     return VoidCause.SCREEN_LATE if fault is Fault.STALLED else VoidCause.FAULT

@@ -1,5 +1,5 @@
-"""One trial: wait for the handle, log, play, ask, log, release, measure, log. Nothing moves before its fact is on the
-disk."""
+"""One trial: wait for the handle, log, play, ask, log, release, measure, log. Every fact is on the disk before the
+device moves."""
 
 import math
 from collections.abc import Callable
@@ -18,12 +18,12 @@ from study.session.views.views import HandleView, Question, Task, Unanswered, pi
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
 from study.workflows.trial.ask_participant import Asked, ask_participant
 from study.workflows.trial.judge_trial import cause_of, judge
-from study.workflows.trial.sitting import Sitting, record, released
-from study.workflows.trial.trial_facts import Outcome, known_then, measured, presented, spoiled
+from study.workflows.trial.sitting import Sitting, record, release_device
+from study.workflows.trial.trial_facts import Outcome, answer_health, trial_measured, trial_presented, trial_spoiled
 
 
 def question_of(state: SessionState, present: Present) -> Question:
-    """A due trial as the participant sees it: everything that could give the answer away left out."""
+    """A due trial as the participant sees it, without anything that could reveal the answer."""
     run = state.runs[present.run]
     alike = [other.index for other in state.runs if (other.phase, other.practice) == (run.phase, run.practice)]
     return Question(
@@ -42,11 +42,11 @@ def question_of(state: SessionState, present: Present) -> Question:
 
 
 def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
-    """None when a trial may start; else why the wait was cut short."""
+    """None when a trial may start; otherwise why the wait was cut short."""
     gate = state.protocol.gate
     if gate.radius_mm <= 0:
         return None
-    look = _looking(gate, state.protocol.directions.plane, sitting)
+    look = _make_look(gate, state.protocol.directions.plane, sitting)
     if gate.still_s <= 0 and look().ready:
         return None
     sitting.attendant.begin("waiting for the handle")
@@ -60,7 +60,8 @@ def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
     return resolved if isinstance(resolved, Unanswered) else None
 
 
-def _looking(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[], HandleView]:
+def _make_look(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[], HandleView]:
+    """Function that reads the handle and judges whether it has been inside the gate long enough."""
     inside_since_s: list[float] = []
 
     def look() -> HandleView:
@@ -90,11 +91,12 @@ def _looking(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[],
 
 
 def present_trial(state: SessionState, present: Present, sitting: Sitting) -> AfterTrial:
+    """Run one trial to its result."""
     hindrance = await_handle(state, sitting)
     if hindrance is not None:
         return cut_short(state, hindrance)
     question = question_of(state, present)
-    state = record(state, presented(present, sitting), sitting)
+    state = record(state, trial_presented(present, sitting), sitting)
     asked = ask_participant(state, present, question, sitting)
     if isinstance(asked.reply, Unanswered):
         return _void(state, present, asked, asked.reply, sitting)
@@ -105,10 +107,10 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
         attempt=present.attempt,
         answer=1 if asked.reply.answer == 1 else 2,
         response_time_s=max(0.0, asked.reply.at_s - asked.started_s),
-        health=known_then(asked.health, asked.felt_whole) if asked.health is not None else None,
+        health=answer_health(asked.health, asked.felt_whole) if asked.health is not None else None,
     )
     state = record(state, answer, sitting)
-    played = asked.played if asked.played is not None else released(sitting)
+    played = asked.played if asked.played is not None else release_device(sitting)
     return _close(state, present, played, asked.felt_whole, sitting)
 
 
@@ -120,21 +122,23 @@ def _close(state: SessionState, present: Present, played: Played, felt_whole: bo
     fault = played.health.fault
     leave = reason_to_leave(fault)
     if verdict.spoiled:
-        state = record(state, spoiled(present, (verdict.spoiled, verdict.cause), played.health, sitting), sitting)
+        state = record(state, trial_spoiled(present, (verdict.spoiled, verdict.cause), played.health, sitting), sitting)
         return AfterTrial(state, leave=leave, void=verdict.spoiled, fault=fault)
-    state = record(state, measured(present, Outcome(played, values, verdict.flags, vector), state, sitting), sitting)
+    state = record(
+        state, trial_measured(present, Outcome(played, values, verdict.flags, vector), state, sitting), sitting
+    )
     return AfterTrial(state, correct, leave=leave, fault=fault)
 
 
 def _void(state: SessionState, present: Present, asked: Asked, reply: Unanswered, sitting: Sitting) -> AfterTrial:
-    played = released(sitting) if asked.holding else asked.played
+    played = release_device(sitting) if asked.holding else asked.played
     health = played.health if played is not None else None
     fault = health.fault if health is not None else Fault.NONE
     # An emergency stop is a fault too; who pressed it says more.
     faulty = fault is not Fault.NONE and not reply.leave
     reason = fault.value if faulty else reply.reason
     cause = cause_of(fault) if faulty else _cause_of(reply, sitting)
-    state = record(state, spoiled(present, (reason, cause), health, sitting), sitting)
+    state = record(state, trial_spoiled(present, (reason, cause), health, sitting), sitting)
     if reply.leave:
         return AfterTrial(state, leave=reply.reason, fault=Fault.NONE if fault is Fault.STOPPED else fault)
     if leave := reason_to_leave(fault):

@@ -1,4 +1,4 @@
-"""The port of requests: what watchers and second screens ask of a running session."""
+"""The port of requests from viewers and second screens to a running session."""
 
 from queue import Empty, SimpleQueue
 from typing import Protocol
@@ -8,12 +8,12 @@ from study.session.watching.requests import Request
 
 class Requests(Protocol):
     def take(self) -> tuple[Request, ...]:
-        """Those that came since the last call, oldest first. Cheap: asked some twenty times a second. Never raises."""
+        """New requests since the last call, oldest first. Fast: called about twenty times a second. Never raises."""
         ...
 
 
 class QueuedRequests:
-    """From within the program: `send` may be called from any thread."""
+    """Requests from within the program: `send` may be called from any thread."""
 
     def __init__(self) -> None:
         self._queue: SimpleQueue[Request] = SimpleQueue()

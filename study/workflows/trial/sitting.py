@@ -1,4 +1,4 @@
-"""The ports of one sitting, and the only way a fact gets into its state: through the log."""
+"""The ports of one sitting, and how facts enter its state: only through the log."""
 
 import contextlib
 from dataclasses import dataclass, replace
@@ -28,11 +28,12 @@ class Sitting:
     hand: Hand
     attendant: Attendant
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Of the spring's centre, where the handle belongs."""
+    """Centre of the spring, where the handle belongs."""
 
 
 def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
-    """First the fold, which refuses what cannot be; then the disk; only then may it be acted on."""
+    """Fold the event, which rejects contradictions; then log it to the disk. Only the returned state may be acted
+    on."""
     event = replace(event, monotonic_s=sitting.clock.now_s())
     after = apply(state, event)
     sitting.log.append(event)
@@ -46,13 +47,13 @@ def tell_clock_steps(steps: tuple[ClockStep, ...], sitting: Sitting) -> None:
 
 
 def tell(sentence: str, sitting: Sitting) -> None:
-    """The experimenter: on the screen now, and in the log with the next notes."""
+    """Tell the experimenter: on the screen now, and in the log with the next notes."""
     sitting.display.trouble(sentence)
     sitting.attendant.note(NoteAsked("program", sentence))
 
 
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
-    """What was noted meanwhile, by whomever. Listens first: a note may have come since the last glance."""
+    """Log the notes taken meanwhile. Takes pending requests first."""
     sitting.attendant.listen()
     for note in sitting.attendant.take_notes():
         event = NoteTaken(utc=sitting.clock.utc(), who=note.who, text=note.text, adverse=note.adverse)
@@ -60,8 +61,8 @@ def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
     return state
 
 
-def released(sitting: Sitting) -> Played:
-    """Let go after a stimulus, and say at once where the force could not be taken away: before any work on disk."""
+def release_device(sitting: Sitting) -> Played:
+    """Release the stimulus, and report at once if the force could not be removed, before any disk access."""
     played = sitting.device.release()
     if played.health.fault is Fault.FORCE_LEFT:
         with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""A pause: nothing is played until it is decided how to go on."""
+"""A pause: nothing is played until the participant decides how to continue."""
 
 from dataclasses import dataclass
 

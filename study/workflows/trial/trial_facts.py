@@ -1,4 +1,4 @@
-"""The facts of one trial as events, and what its recording says of itself."""
+"""The facts of one trial as events, and the metadata of its recording."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -29,7 +29,8 @@ class Outcome:
     """(3,): the direction played."""
 
 
-def presented(present: Present, sitting: Sitting) -> TrialPresented:
+def trial_presented(present: Present, sitting: Sitting) -> TrialPresented:
+    """Event logged before the stimulus."""
     return TrialPresented(
         utc=sitting.clock.utc(),
         run=present.run,
@@ -46,8 +47,8 @@ def presented(present: Present, sitting: Sitting) -> TrialPresented:
     )
 
 
-def known_then(health: Health, felt_whole: bool) -> AnswerHealth:
-    """Logged with the answer."""
+def answer_health(health: Health, felt_whole: bool) -> AnswerHealth:
+    """Device counters logged with the answer."""
     return AnswerHealth(
         fault=health.fault.name,
         felt_whole=felt_whole,
@@ -63,8 +64,8 @@ def known_then(health: Health, felt_whole: bool) -> AnswerHealth:
     )
 
 
-def known_again(logged: AnswerHealth) -> Health:
-    """From the log. A fault that this version does not know is still one."""
+def health_from_log(logged: AnswerHealth) -> Health:
+    """Device counters from the log. An unknown fault name still counts as a fault."""
     return Health(
         fault=Fault.__members__.get(logged.fault, Fault.NOT_A_NUMBER),
         ticks=logged.ticks,
@@ -79,8 +80,10 @@ def known_again(logged: AnswerHealth) -> Health:
     )
 
 
-def spoiled(present: Present, why: tuple[str, VoidCause], health: Health | None, sitting: Sitting) -> TrialSpoiled:
-    """why: in words, and as a cause. health: None where nothing was played yet."""
+def trial_spoiled(
+    present: Present, why: tuple[str, VoidCause], health: Health | None, sitting: Sitting
+) -> TrialSpoiled:
+    """Event of a void trial. why: in words, and as a cause. health: None if nothing was played."""
     reason, cause = why
     return TrialSpoiled(
         utc=sitting.clock.utc(),
@@ -96,8 +99,8 @@ def spoiled(present: Present, why: tuple[str, VoidCause], health: Health | None,
     )
 
 
-def measured(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> TrialMeasured:
-    """Saves the recording first: the event names it."""
+def trial_measured(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> TrialMeasured:
+    """Event of a trial that counts. Saves the recording first, because the event names it."""
     saved = None
     if outcome.played.recording is not None:
         conditions = _conditions(present, outcome, state, sitting)
@@ -126,12 +129,12 @@ def measured(present: Present, outcome: Outcome, state: SessionState, sitting: S
 
 
 def _seconds(health: Health, sitting: Sitting) -> float:
-    """From the onset to stillness, fades included."""
+    """Duration of vibration, from the onset to rest, fades included."""
     return health.ticks / sitting.device.info.sample_rate_hz
 
 
 def _farthest_mm(played: Played, sitting: Sitting) -> float | None:
-    """How far the handle was from its place at the most, while it was recorded."""
+    """Largest distance of the handle from its place during the recording."""
     if played.recording is None or played.recording.position is None:
         return None
     offset_m = np.linalg.norm(played.recording.position.samples - np.asarray(sitting.place_m), axis=1)
@@ -139,7 +142,7 @@ def _farthest_mm(played: Played, sitting: Sitting) -> float | None:
 
 
 def _conditions(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> dict[str, Any]:
-    """What a recording carries inside, so that the file alone tells what was played, and where it comes from."""
+    """Metadata in the recording file: what was played, and its origin."""
     return {
         "session": sitting.folder.name,
         "trial": {"run": present.run, "trial": present.trial, "attempt": present.attempt},

@@ -1,6 +1,6 @@
-"""What lies in a data folder, as values for command line and screen. Reads only, except requests to a running session.
+"""Contents of a data folder as values for command line and screen. Read only, except requests to a running session.
 
 `list_sessions` -> `session_line`, `session_facts` -> `view_session`; `view_diagnosis` for a diagnosis document;
 `plan_study` for who is done in a study and who comes next.
-`watch_session` follows a running session; `ask_session` and `take_note` speak to it. Begin at `list_sessions.py`.
+`watch_session` follows a running session; `ask_session` and `take_note` send it requests. Begin at `list_sessions.py`.
 """

@@ -1,4 +1,4 @@
-"""Ask a running session for something, and make sure that it was heard."""
+"""Send a request to a running session and wait until it is received."""
 
 from study.devices.clock import Clock
 from study.errors import StudyError
@@ -8,14 +8,14 @@ from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 
 HEARD_WITHIN_S = 3.0
-"""A session looks some twenty times a second, except while a form or a notice is read at its screen."""
+"""A session checks about twenty times a second, except while a form or notice is shown."""
 LOOK_EVERY_S = 0.02
 
 
 def ask_session(folder: SessionFolder, request: Request, clock: Clock) -> bool:
-    """Returns whether the session took it; a note that it did not take yet waits for it.
+    """Returns whether the session received it; a note that is not received yet stays in the inbox.
 
-    Raises StudyError where nothing runs, or where a stop or a pause was not heard.
+    Raises StudyError where nothing runs, or where a stop or pause was not received.
     """
     if is_log_locked(folder.log) is False:
         raise StudyError(

@@ -1,4 +1,4 @@
-"""What lies in a data folder, and what the start screen offers. Reads only."""
+"""List a data folder, and the choices of the start screen. Read only."""
 
 import tomllib
 from pathlib import Path
@@ -17,7 +17,7 @@ from study.workflows.views.session_line import session_line
 
 
 def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
-    """The shipped ones first, then files in the data folder and beside it."""
+    """Shipped protocols first, then files in the data folder and beside it."""
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
     found = [str(path) for place in places for path in _toml_files(place) if _says_study(path)]
     lines = (protocol_line(name, data) for name in (*list_shipped_protocols(), *found))
@@ -39,7 +39,7 @@ def _says_study(path: Path) -> bool:
 
 
 def protocol_line(name: str, data: Path) -> ProtocolLine | None:
-    """None for a protocol of another kind. A bad one is offered with its problem, so that it is not missed."""
+    """None for a protocol of another kind. An invalid one is listed with its problem."""
     try:
         file = read_protocol(name, data)
     except ProtocolRefusedError as refused:
@@ -56,11 +56,11 @@ def model_files(data: Path) -> tuple[str, ...]:
     """In the data folder and beside it, latest first."""
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
     found = [path for place in places for path in _hdf5_files(place)]
-    return tuple(str(path) for path in sorted(found, key=_changed, reverse=True) if _is_model(path))
+    return tuple(str(path) for path in sorted(found, key=_mtime_s, reverse=True) if _is_model(path))
 
 
 def model_words(path: str) -> str:
-    """How good it is, in a few words."""
+    """Quality of a model, in a few words."""
     try:
         return quality_brief(read_identified_model(Path(path)).quality)
     except StudyError as problem:
@@ -74,7 +74,7 @@ def _hdf5_files(folder: Path) -> list[Path]:
         return []
 
 
-def _changed(path: Path) -> float:
+def _mtime_s(path: Path) -> float:
     try:
         return path.stat().st_mtime
     except OSError:
@@ -89,7 +89,7 @@ def _is_model(path: Path) -> bool:
 
 
 def home_view(data: Path) -> HomeView:
-    """Everything on the start screen. A data folder that is not there is an empty one."""
+    """Content of the start screen. A missing data folder is shown as empty."""
     models = model_files(data)
     qualities = tuple((model, model_words(model)) for model in models)
     return HomeView(
@@ -98,7 +98,7 @@ def home_view(data: Path) -> HomeView:
 
 
 def session_lines(data: Path) -> tuple[SessionLine, ...]:
-    """Latest first. What cannot be read is there with a remark."""
+    """Latest first. Unreadable sessions are listed with a remark."""
     try:
         folders = session_folders(data)
     except OSError:

@@ -1,4 +1,4 @@
-"""What is to know about a session at a glance: (what, value), in the order in which it is asked."""
+"""Facts about a session: (name, value) in display order."""
 
 from equalizer.plant.model_quality import NOT_STORED
 from study.session.facts.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled
@@ -11,6 +11,7 @@ _HASH_DIGITS = 12
 
 
 def session_facts(folded: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:
+    """The facts. zone: of the displayed times."""
     state, events = folded.state, folded.contents.events
     opened = state.opened
     who = f"simulated ({opened.observer})" if opened.observer else "a person"
@@ -51,12 +52,12 @@ def _number(state: SessionState) -> str:
 
 
 def _quality(opened: SessionOpened) -> str:
-    """Of the model that stimuli go through."""
+    """Quality of the model that equalizes the stimuli."""
     return "" if opened.equalized is None else opened.equalized.quality or NOT_STORED
 
 
 def _reach(opened: SessionOpened) -> str:
-    """What both directions reach at the cap."""
+    """Acceleration that both directions reach at the cap."""
     if opened.equalized is None:
         return ""
     return ", ".join(f"{s.reachable_mps2:.1f} m/s² at {s.frequency_hz:g} Hz" for s in opened.equalized.levels)
@@ -85,15 +86,14 @@ def _last_utc(folded: FoldedSession) -> str:
 
 
 def _log(folded: FoldedSession) -> str:
-    """What speaks for it being as it was written."""
+    """Evidence that the log is unchanged: checksums and seals."""
     lines = f"{folded.contents.chain.lines} lines"
     sealed = f", sealed to line {folded.sealed_lines}" if folded.sealed_lines else ""
     return f"{lines}, {folded.contents.chain.in_words()}{sealed}"
 
 
 def _forms(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
-    """What the participant chose when looking back; what was written in own words stays in the log file, because it
-    may be about health."""
+    """Choices of the debrief; free text stays in the log file, because it may concern health."""
     questions = {question.key: question for question in folded.state.protocol.debrief if question.choices}
     facts = []
     for event in folded.contents.events:

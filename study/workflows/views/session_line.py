@@ -1,7 +1,7 @@
-"""One line per session. Reads only.
+"""One line per session in a list. Read only.
 
-A list has to be there at once: the log of a finished session whose checksums and seal hold is what the program wrote,
-and is counted without being parsed. Every other log is folded.
+A list must be fast: the log of a finished session whose checksums and seal hold is trusted and counted without being
+parsed. Every other log is folded.
 """
 
 from dataclasses import replace
@@ -28,10 +28,10 @@ MEASURED = b',"event":"trial_measured",'
 
 
 def session_line(folder: SessionFolder) -> SessionLine:
-    """What cannot be read is a line with a remark. Raises nothing."""
+    """The line; an unreadable session has a remark. Raises nothing."""
     try:
         if folder.withdrawn:
-            return _withdrawn(folder)
+            return _withdrawn_line(folder)
         line = _line(folder, _stamp(folder))
     except FileNotFoundError:
         return unreadable(folder, "It has no log: the program died while it was made.")
@@ -43,7 +43,7 @@ def session_line(folder: SessionFolder) -> SessionLine:
 
 
 def with_writer(line: SessionLine, folder: SessionFolder) -> SessionLine:
-    """`running` where it is being written right now; the lock is looked at for some microseconds."""
+    """The line marked `running` if the session is being written right now; the lock is probed for some microseconds."""
     if line.standing == "unfinished" and is_log_locked(folder.log):
         return replace(line, standing="running")
     return line
@@ -66,7 +66,7 @@ def line_of(state: SessionState, folder: SessionFolder) -> SessionLine:
 
 
 def unreadable(folder: SessionFolder, why: str) -> SessionLine:
-    """Its begin is unknown: it stands where its folder was last changed."""
+    """Line of an unreadable session; its start is unknown, so it is sorted by the last change of its folder."""
     try:
         changed_utc = datetime.fromtimestamp(folder.path.stat().st_mtime, UTC).isoformat(timespec="seconds")
     except OSError:
@@ -74,7 +74,7 @@ def unreadable(folder: SessionFolder, why: str) -> SessionLine:
     return SessionLine(folder.name, str(folder.path), folder.subject, "", changed_utc, None, 0, 0, 0, "unreadable", why)
 
 
-def _withdrawn(folder: SessionFolder) -> SessionLine:
+def _withdrawn_line(folder: SessionFolder) -> SessionLine:
     left = read_tombstone(folder)  # that there is one says enough
     intent = read_intent(folder.path.parent, folder.subject)
     when = str(left.get("withdrawn_utc", intent.withdrawn_utc if intent else ""))
@@ -91,7 +91,7 @@ def _withdrawn(folder: SessionFolder) -> SessionLine:
 
 
 def _stamp(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]:
-    """Of all files that decide how a session stands: times and sizes. Raises OSError where there is no log."""
+    """Times and sizes of all files that determine the line. Raises OSError if there is no log."""
     beside = (path for path in (*seal_paths(folder.path).values(), folder.path / SUMMARY_NAME) if path.exists())
     stats = ((path.name, path.stat()) for path in (folder.log, *beside))
     return tuple((name, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size) for name, stat in stats)
@@ -99,12 +99,12 @@ def _stamp(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]:
 
 @lru_cache(maxsize=4096)
 def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -> SessionLine:
-    """Depends on the content of these files alone, for which their stamp stands. Raises StudyError, OSError."""
+    """The line; depends only on the files that `stamp` represents (cached). Raises StudyError, OSError."""
     content = read_regular(folder.log)
     opened = read_opening(folder.log)
     ours = isinstance(opened, SessionOpened) and opened.session == folder.name and is_sealed(folder.path, content)
     ours = ours and MEASURED in content  # a person who does not take part left a short log
-    planned = _planned(opened.protocol_text) if ours and isinstance(opened, SessionOpened) else None
+    planned = _protocol_and_runs(opened.protocol_text) if ours and isinstance(opened, SessionOpened) else None
     if planned is None or not isinstance(opened, SessionOpened):
         return line_of(fold_session(folder).state, folder)
     protocol, run_count = planned
@@ -123,8 +123,8 @@ def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -
 
 
 @lru_cache(maxsize=64)
-def _planned(protocol_text: str) -> tuple[str, int] | None:
-    """Name and number of runs; None for text that is no study protocol."""
+def _protocol_and_runs(protocol_text: str) -> tuple[str, int] | None:
+    """Name and number of runs; None for text that is not a study protocol."""
     try:
         protocol = load_protocol(protocol_text, "the log")
     except ProtocolError:

@@ -1,4 +1,4 @@
-"""A note into a session's log: through the session while it runs, by ourselves where it does not."""
+"""Write a note into a session's log: through the session while it runs, directly otherwise."""
 
 from study.devices.clock import Clock
 from study.errors import StudyError
@@ -15,7 +15,7 @@ from study.workflows.views.ask_session import ask_session
 
 
 def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
-    """Returns whether it is in the log, or in the hands of the session that writes it; False where it waits for that.
+    """Returns whether it is in the log or received by the running session; False if it waits in the inbox.
 
     Raises StudyError where the log cannot be written.
     """
@@ -47,5 +47,5 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
 
 
 def _of_the_program(text: str, clock: Clock) -> NoteTaken:
-    """What `hapteq resume` would have kept with its own line."""
+    """Note about a repaired last line, as `hapteq resume` would log it."""
     return NoteTaken(utc=clock.utc(), who="program", text=text)

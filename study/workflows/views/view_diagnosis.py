@@ -1,4 +1,4 @@
-"""A diagnosis in words and tables, from its document. Reads only."""
+"""A diagnosis in words and tables, from its document. Read only."""
 
 from pathlib import Path
 
@@ -44,7 +44,7 @@ def diagnosis_view(path: Path) -> DiagnosisView:
 
 
 def _device(path: Path) -> Device | None:
-    """Of the improved model beside the document, whose units candidates are in; None where there is none to read."""
+    """The device of the improved model beside the document, for the units of candidates; None if it cannot be read."""
     try:
         model = read_mechanical_model(path)
     except StudyError:

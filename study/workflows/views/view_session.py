@@ -1,4 +1,4 @@
-"""One session looked at: facts, thresholds, staircases and its log in words. Reads only, and never fails for damage."""
+"""View of one session: facts, thresholds, staircases and its log in words. Read only; damage never raises."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,15 +28,15 @@ THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "tri
 
 
 def session_view(path: Path, zone: Zone = in_utc) -> SessionView:
-    """path: the session's folder. Damage is a view too: what can be read, and a warning that says what cannot.
+    """The view. path: the session's folder. A damaged session shows what can be read, and a warning.
 
-    zone: of the times in it, which are text; `study.local_clock.machine_zone` for a person.
+    zone: of the displayed times; `study.local_clock.machine_zone` for a person.
     """
     folder = SessionFolder(path.absolute())
     try:
         folded = None if folder.withdrawn else fold_session(folder)
     except StudyError as problem:
-        return printable(_damaged(folder, problem, zone))
+        return printable(_view_damaged(folder, problem, zone))
     return printable(_bare(folder, session_line(folder)) if folded is None else _whole(folder, folded, zone))
 
 
@@ -69,7 +69,7 @@ def _log_remarks(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...
     return tuple(text for holds, text in said if holds)
 
 
-def _damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> SessionView:
+def _view_damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> SessionView:
     line = session_line(folder)
     if line.standing != "unreadable":  # it looked whole at a glance, and is not
         line = SessionLine(

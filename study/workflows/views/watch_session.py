@@ -1,4 +1,4 @@
-"""Follow a running session from beside it, reading only, and ask it to stop, to pause, or to note something."""
+"""Follow a running session read-only, and send it requests to stop, pause, or take a note."""
 
 import io
 from pathlib import Path
@@ -24,20 +24,21 @@ from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.results.fold_session import protocol_of
 
 PROBE_EVERY_S = 1.0
-"""How often at most the lock of a session that gives no sign of life is looked at."""
+"""Shortest interval between probes of the lock of a session without a sign of life."""
 
 
 def follow(folder: Path) -> "Follower":
+    """Follower of the session in this folder."""
     return Follower(SessionFolder(folder))
 
 
 def ask(folder: Path, request: Request) -> str:
-    """Returns the request's name in the session's inbox. Raises StudyError where it cannot be written."""
+    """Send a request; returns its name in the session's inbox. Raises StudyError where it cannot be written."""
     return RequestInbox(folder).send(request)
 
 
 class Follower:
-    """Reads what is new in the log at every look, and never writes to it."""
+    """Reads the new part of the log at every look; never writes."""
 
     def __init__(self, folder: SessionFolder) -> None:
         self._folder = folder
@@ -52,12 +53,12 @@ class Follower:
         self._probed_utc = ""
 
     def look(self, now_utc: str) -> WatchView | None:
-        """None while there is no first line. Raises StudyError where the first line cannot be used."""
+        """The current view; None while there is no first line. Raises StudyError where the first line is invalid."""
         self._take_in_what_is_new()
         if self._watched is None:
             return None
         live = read_live(self._folder.path)
-        beside = Beside(live, self._somebody_writes(live, now_utc), self._problem)
+        beside = Beside(live, self._is_written(live, now_utc), self._problem)
         self._view = watch_view(self._watched, beside, now_utc, self._view)
         return self._view
 
@@ -87,20 +88,20 @@ class Follower:
             self._problem = "its end is missing."
 
     def _sealed_bytes(self) -> int | None:
-        """None where a seal cannot be read."""
+        """Sealed length of the log; None if a seal cannot be read."""
         try:
             return max((read_seal(path).bytes for path in seal_paths(self._folder.path).values()), default=0)
         except StudyError:
             return None
 
     def _begin_again_if_rewritten(self, file: io.BufferedReader) -> None:
-        """A line that could not be synced is cut off again by its writer, after it was seen here."""
+        """Start over if the log became shorter: its writer removes a line that could not be synced."""
         file.seek(self._read_bytes - len(self._last_line))
         if file.read(len(self._last_line)) != self._last_line:
             self._watched, self._read_bytes, self._last_line, self._chain = None, 0, b"", Chain()
 
     def _take_in(self, line: bytes) -> str:
-        """Returns the problem with this line; empty where there is none."""
+        """Apply one line; returns its problem, empty if there is none."""
         try:
             chain, content = read_chained(self._chain, line.removesuffix(b"\n"))
             event = parse_event(content)
@@ -127,7 +128,7 @@ class Follower:
         self._chain = chain
         return ""
 
-    def _somebody_writes(self, live: Live | None, now_utc: str) -> bool | None:
+    def _is_written(self, live: Live | None, now_utc: str) -> bool | None:
         if self._missing:
             return False
         if live is not None and 60.0 * minutes_between(live.utc, now_utc) <= SILENT_AFTER_S:

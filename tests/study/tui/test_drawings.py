@@ -6,7 +6,7 @@ import pytest
 
 from study.session.views.views import DirectionPicture
 from study.tui.drawing.braille import Canvas
-from study.tui.drawing.direction_picture import large_drawing
+from study.tui.drawing.direction_picture import draw_large_direction
 from study.tui.drawing.number_picture import large_number
 
 DIAGONAL = DirectionPicture("yz", (135.0, 45.0))
@@ -61,7 +61,7 @@ def test_a_circle_is_only_its_line():
 @pytest.mark.parametrize("angle", [0.0, 20.0, 45.0, 70.0, 90.0, 135.0, 170.0])
 def test_a_segment_lies_along_its_direction_and_is_symmetric(angle):
     picture = DirectionPicture("yz", (angle, angle + 90.0))
-    drawn = dots(large_drawing(picture, 1, 40, 20))
+    drawn = dots(draw_large_direction(picture, 1, 40, 20))
     x = [dot[0] - 39.5 for dot in drawn]
     y = [39.5 - dot[1] for dot in drawn]
     assert abs(sum(x)) < 0.2 * len(x) and abs(sum(y)) < 0.2 * len(y)
@@ -74,16 +74,16 @@ def test_a_segment_lies_along_its_direction_and_is_symmetric(angle):
 def test_both_segments_are_equally_long_and_only_one_is_broken():
     length = {}
     for number in (1, 2):
-        drawn = dots(large_drawing(DIAGONAL, number, 40, 20))
+        drawn = dots(draw_large_direction(DIAGONAL, number, 40, 20))
         length[number] = max(math.dist(a, b) for a in drawn for b in drawn)
     assert length[1] == pytest.approx(length[2], rel=0.03)
-    solid, dashed = (len(dots(large_drawing(DIAGONAL, number, 40, 20))) for number in (1, 2))
+    solid, dashed = (len(dots(draw_large_direction(DIAGONAL, number, 40, 20))) for number in (1, 2))
     assert dashed < 0.85 * solid
 
 
 @pytest.mark.parametrize(("columns", "rows"), [(2, 1), (6, 3), (20, 10), (92, 46)])
 def test_drawings_fit_any_room(columns, rows):
-    for drawn in (large_drawing(DIAGONAL, 2, columns, rows), large_number(2, columns, rows)):
+    for drawn in (draw_large_direction(DIAGONAL, 2, columns, rows), large_number(2, columns, rows)):
         assert len(drawn) == rows and all(len(line) == columns for line in drawn)
 
 

@@ -20,7 +20,7 @@ from equalizer.effects.discovered_law import law_effect
 from equalizer.effects.effect import living_effects
 from equalizer.laws.law import law_of
 from study.workflows import forked_map as module
-from study.workflows.forked_map import forked_map, processor_s
+from study.workflows.forked_map import map_forked, processor_s
 
 
 @pytest.fixture(autouse=True)
@@ -51,11 +51,11 @@ def slow(number: float) -> tuple[float, int]:
 
 
 def test_results_come_in_order_from_two_processes():
-    found = forked_map(slow, range(8))
+    found = map_forked(slow, range(8))
     assert [number for number, _ in found] == list(range(8))
     assert len({process for _, process in found}) == 2
-    assert forked_map(pow, [2, 3], [3, 2]) == [8, 9]
-    assert forked_map(str, []) == []
+    assert map_forked(pow, [2, 3], [3, 2]) == [8, 9]
+    assert map_forked(str, []) == []
 
 
 def test_arrays_and_effects_come_back_as_they_are():
@@ -63,7 +63,7 @@ def test_arrays_and_effects_come_back_as_they_are():
         time.sleep(0.02)
         return np.full(3, float(number)), CATALOGUE[number]
 
-    for number, (values, effect) in enumerate(forked_map(paired, range(6))):
+    for number, (values, effect) in enumerate(map_forked(paired, range(6))):
         assert values.tolist() == [number] * 3
         assert effect is CATALOGUE[number]
 
@@ -75,7 +75,7 @@ def test_a_law_that_was_there_before_comes_back_as_it_is_and_from_where_it_was_f
         time.sleep(0.02)
         return law, os.getpid()
 
-    answers = forked_map(found, range(6))
+    answers = map_forked(found, range(6))
     assert all(effect is law for effect, _ in answers)
     assert len({process for _, process in answers}) == 2
 
@@ -98,7 +98,7 @@ def test_what_cannot_be_sent_is_done_here_and_not_tried_elsewhere_again():
         return lambda: number
 
     for _ in range(2):
-        assert [found() for found in forked_map(function_of, range(6))] == list(range(6))
+        assert [found() for found in map_forked(function_of, range(6))] == list(range(6))
         assert len(processes) == 6
         processes.clear()
         assert module._key(function_of) in module._lost
@@ -110,10 +110,10 @@ def of_seconds(seconds: float, _: int) -> int:
 
 
 def test_work_that_was_short_is_forked_again_once_it_takes_longer():
-    assert set(forked_map(partial(of_seconds, 0.0), range(4))) >= {os.getpid()}
-    assert set(forked_map(partial(of_seconds, 0.0), range(4))) == {os.getpid()}
-    assert set(forked_map(partial(of_seconds, 0.06), range(4))) == {os.getpid()}
-    assert len(set(forked_map(partial(of_seconds, 0.06), range(8)))) == 2
+    assert set(map_forked(partial(of_seconds, 0.0), range(4))) >= {os.getpid()}
+    assert set(map_forked(partial(of_seconds, 0.0), range(4))) == {os.getpid()}
+    assert set(map_forked(partial(of_seconds, 0.06), range(4))) == {os.getpid()}
+    assert len(set(map_forked(partial(of_seconds, 0.06), range(8)))) == 2
 
 
 def test_functions_without_code_of_their_own_are_told_apart():
@@ -143,7 +143,7 @@ def failing_fork(after: int):
 def test_a_system_without_further_processes_leaves_the_work_to_those_there_are(monkeypatch, after):
     monkeypatch.setattr(os, "fork", failing_fork(after))
     before = len(list(Path("/proc/self/fd").iterdir()))
-    found = forked_map(slow, range(8), workers=4)
+    found = map_forked(slow, range(8), workers=4)
     assert [number for number, _ in found] == list(range(8))
     assert len({process for _, process in found}) == 1 + after
     assert len(list(Path("/proc/self/fd").iterdir())) == before
@@ -163,7 +163,7 @@ def test_a_signal_at_the_fork_ends_this_process_and_leaves_none(monkeypatch, tmp
     before = signal.signal(number, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            forked_map(slow, range(8))
+            map_forked(slow, range(8))
         assert children() == []
     finally:
         if os.getpid() != here:
@@ -183,7 +183,7 @@ def test_what_a_process_died_of_is_done_here():
             os._exit(1)
         return number
 
-    assert forked_map(dies, range(6)) == list(range(6))
+    assert map_forked(dies, range(6)) == list(range(6))
 
 
 @pytest.mark.parametrize("wrong", range(4))
@@ -193,16 +193,16 @@ def test_an_error_is_raised_where_the_results_are_wanted_and_leaves_no_process(w
         return 1 / (number - wrong)
 
     with pytest.raises(ZeroDivisionError):
-        forked_map(inverse, range(4))
+        map_forked(inverse, range(4))
     assert children() == []
-    assert forked_map(abs, [-1, -2]) == [1, 2]
+    assert map_forked(abs, [-1, -2]) == [1, 2]
 
 
 def test_work_within_work_is_done_there():
     def inner(number: int) -> list[int]:
-        return [process for _, process in forked_map(slow, range(number))]
+        return [process for _, process in map_forked(slow, range(number))]
 
-    assert all(len(set(processes)) == 1 for processes in forked_map(inner, [2, 3, 2, 3]))
+    assert all(len(set(processes)) == 1 for processes in map_forked(inner, [2, 3, 2, 3]))
 
 
 def test_crashes_in_a_process_are_noted_here():
@@ -212,7 +212,7 @@ def test_crashes_in_a_process_are_noted_here():
         time.sleep(0.02)
         raise ValueError("no such number")
 
-    assert list(guard.over(forked_map, "its fit")(broken, CATALOGUE[:6])) == []
+    assert list(guard.over(map_forked, "its fit")(broken, CATALOGUE[:6])) == []
     assert [crash.what for crash in guard.crashes] == [effect.name for effect in CATALOGUE[:6]]
     assert all(crash.said == "ValueError: no such number" for crash in guard.crashes)
 
@@ -236,12 +236,12 @@ def asked(most: int, map_: object) -> int:
 
 @pytest.mark.parametrize("most", [11, 12, 13, 23, 24, 100])
 def test_evaluations_are_counted_wherever_they_are_made(most):
-    assert asked(most, forked_map) == asked(most, map) == most // 12
+    assert asked(most, map_forked) == asked(most, map) == most // 12
 
 
 def test_pieces_that_began_in_time_are_kept_where_a_clock_ran_out_before_they_were_done(tmp_path):
     over = tmp_path / "over"
-    mapped = budgeted(forked_map, lambda: not over.exists())
+    mapped = budgeted(map_forked, lambda: not over.exists())
 
     def last(number: int) -> int:
         (tmp_path / str(number)).touch()
@@ -262,7 +262,7 @@ def test_processor_time_of_processes_counts():
             pass
 
     before = processor_s()
-    forked_map(busy, range(4))
+    map_forked(busy, range(4))
     assert processor_s() - before > 0.35
 
 
@@ -273,11 +273,11 @@ def test_ctrl_c_ends_a_program_and_all_its_processes():
         "import os, signal, time\n"
         # A shell that starts this in the background has it ignored, and children inherit that.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from study.workflows.forked_map import forked_map\n"
+        "from study.workflows.forked_map import map_forked\n"
         "def work(_):\n"
         "    os.write(1, f'{os.getpid()}\\n'.encode())\n"  # at once: two processes write
         "    time.sleep(50)\n"
-        "forked_map(work, range(8), workers=2)\n"
+        "map_forked(work, range(8), workers=2)\n"
     )
     root = Path(__file__).parents[3]
     process = subprocess.Popen(
@@ -298,7 +298,7 @@ def test_ctrl_c_ends_a_program_and_all_its_processes():
 def test_a_process_whose_parent_is_killed_ends_though_its_answers_fill_the_pipe(tmp_path):
     program = f"""
 import os, pathlib, signal, time
-from study.workflows.forked_map import forked_map
+from study.workflows.forked_map import map_forked
 place = pathlib.Path({str(tmp_path)!r})
 def piece(number):
     if os.getpid() == here:
@@ -309,7 +309,7 @@ def piece(number):
     (place / str(os.getpid())).touch()
     return b"x" * 1_000_000
 here = os.getpid()
-forked_map(piece, range(2), workers=2)
+map_forked(piece, range(2), workers=2)
 """
     subprocess.run([sys.executable, "-c", program], check=False, timeout=60)
     (child,) = (int(path.name) for path in tmp_path.iterdir())

@@ -8,7 +8,7 @@ from textual.widgets import Input
 from study.tui.screens.browse import BrowseScreen
 from study.tui.screens.diagnosis import DiagnosisScreen
 from study.tui.screens.home import HomeScreen
-from study.tui.screens.preparing import PreparingScreen, elapsed
+from study.tui.screens.preparing import PreparingScreen, elapsed_words
 
 
 @pytest.mark.parametrize("size", [(80, 24), (132, 40)], ids=["80x24", "132x40"])
@@ -136,6 +136,6 @@ def test_while_the_device_is_prepared_it_says_what_and_for_how_long(on_screen, m
 
 
 def test_elapsed_time_counts_whole_seconds():
-    assert [elapsed(s) for s in (0.0, 59.9, 60.0, 3601.0)] == [
+    assert [elapsed_words(s) for s in (0.0, 59.9, 60.0, 3601.0)] == [
         "0 s so far", "59 s so far", "1 min 0 s so far", "60 min 1 s so far"
     ]  # fmt: skip

@@ -15,7 +15,7 @@ from study.session.views.views import (
     Unanswered,
     Welcome,
 )
-from study.tui.drawing.direction_picture import drawing, sentence
+from study.tui.drawing.direction_picture import draw_directions, sentence
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.trial_replies import REPEAT, TIME_OVER
 
@@ -204,7 +204,7 @@ def test_a_direction_is_told_in_words(plane, angle_deg, expected):
 
 
 def test_the_picture_shows_a_solid_and_a_dashed_segment_that_lean_opposite_ways():
-    lines = drawing(PICTURE, columns=16, rows=8)
+    lines = draw_directions(PICTURE, columns=16, rows=8)
     first = [line[:16].strip() for line in lines[:-1]]
     second = [line[20:].strip() for line in lines[:-1]]
     dots = [sum(bin(ord(c) - 0x2800).count("1") for c in "".join(half) if c > "\u2800") for half in (first, second)]

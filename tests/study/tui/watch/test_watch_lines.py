@@ -23,10 +23,10 @@ def taken(data, text):
     from study.devices.clock import VirtualClock
     from study.workflows.session.conduct_session import conduct_new
     from study.workflows.session.open_session import SessionPlan
-    from study.workflows.session.simulated_participant import simulated_participant
+    from study.workflows.session.simulated_participant import make_simulated_participant
 
     plan = SessionPlan(load_protocol(text, "small"), text, False, "S1", "scripted", 3, data)
-    return conduct_new(plan, "simulated", simulated_participant("scripted", 3, VirtualClock())).folder
+    return conduct_new(plan, "simulated", make_simulated_participant("scripted", 3, VirtualClock())).folder
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from study.store.formats.mechanical_model_file import read_mechanical_model, wri
 from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.open_session import SessionPlan
-from study.workflows.session.simulated_participant import simulated_participant
+from study.workflows.session.simulated_participant import make_simulated_participant
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
@@ -25,7 +25,7 @@ def session(tmp_path_factory, small_text) -> Path:
         protocol=load_protocol(small_text, "small.toml"), protocol_text=small_text, protocol_locked=False,
         subject="P01", observer="ideal", seed=3, data=tmp_path_factory.mktemp("data"), participant_number=0,
     )  # fmt: skip
-    return conduct_new(plan, "simulated", simulated_participant("ideal", 3, VirtualClock())).folder.path
+    return conduct_new(plan, "simulated", make_simulated_participant("ideal", 3, VirtualClock())).folder.path
 
 
 def test_the_spring_is_in_the_compared_model_and_not_in_the_improved_one(session, diagnosed, tmp_path):

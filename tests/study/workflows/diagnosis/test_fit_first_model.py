@@ -16,7 +16,7 @@ from study.cli.main import main
 from study.errors import StudyError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import write_recording
-from study.workflows.diagnosis.diagnosis_input import given_model, read_input
+from study.workflows.diagnosis.diagnosis_input import read_given_model, read_input
 from study.workflows.diagnosis.fit_first_model import FirstModel, FirstModelPlan, fit_first_model
 
 RATE_HZ, SECONDS = 1000.0, 30.0
@@ -167,7 +167,7 @@ def test_the_file_says_which_way_a_command_is_counted(tmp_path):
 
 def test_the_file_is_accepted_for_a_diagnosis(tmp_path):
     done = fitted(tmp_path, recorded(device(0.4, 6.0, 900.0)))
-    found = given_model(done.plan.out, read_input([tmp_path / "rec.h5"], 1))
+    found = read_given_model(done.plan.out, read_input([tmp_path / "rec.h5"], 1))
     assert found.tolerance is not None and found.tolerance.mass_kg > 0
     assert found.provenance["structure"] == "mass-spring"
 

@@ -10,10 +10,10 @@ from equalizer.signals.signal import Signal
 from study.devices.clock import VirtualClock
 from study.errors import StudyError, WrongUseError
 from study.store.formats.recording_file import read_recording, write_recording
-from study.workflows.diagnosis.session_as_recordings import LEAD_S, MOST_S, session_recordings, spring_of
+from study.workflows.diagnosis.session_as_recordings import LEAD_S, MOST_S, estimate_spring, session_recordings
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.open_session import SessionPlan
-from study.workflows.session.simulated_participant import simulated_participant
+from study.workflows.session.simulated_participant import make_simulated_participant
 
 RATE_HZ = 1000
 
@@ -27,7 +27,7 @@ def session(tmp_path_factory, small_text):
         protocol=load_protocol(small_text, "small.toml"), protocol_text=small_text, protocol_locked=False,
         subject="P01", observer="ideal", seed=3, data=data, participant_number=0,
     )  # fmt: skip
-    return conduct_new(plan, "simulated", simulated_participant("ideal", 3, VirtualClock())).folder.path
+    return conduct_new(plan, "simulated", make_simulated_participant("ideal", 3, VirtualClock())).folder.path
 
 
 def test_all_trials_are_one_recording_with_its_frequencies_one_after_the_other(session):
@@ -64,8 +64,8 @@ def test_what_was_decided_is_played_and_the_spring_is_told_apart(session):
 
 def test_without_positions_no_spring_is_known(session):
     one = read_recording(session_recordings(session, seed=1).parents[1])
-    assert spring_of([one]) == pytest.approx(137, abs=1)
-    assert spring_of([replace(one, position=None)]) == spring_of([replace(one, excitation=None)]) == 0.0
+    assert estimate_spring([one]) == pytest.approx(137, abs=1)
+    assert estimate_spring([replace(one, position=None)]) == estimate_spring([replace(one, excitation=None)]) == 0.0
 
 
 def test_levels_are_grouped_and_of_each_frequency_one_trial_in_four_is_a_test(session):

@@ -8,7 +8,7 @@ import pytest
 from study.errors import StudyError
 from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.diagnosis.diagnosis_input import read_input
-from study.workflows.diagnosis.fitted_first import fitted_model
+from study.workflows.diagnosis.fitted_first import fit_linear_model
 
 
 @pytest.fixture
@@ -24,5 +24,5 @@ def test_the_weight_stays_in_the_file(heavy):
 
 def test_no_model_is_fitted_to_a_device_with_a_weight_on(heavy):
     with pytest.raises(StudyError, match="a model that is fitted to it would hold the weight") as refused:
-        fitted_model(read_input([heavy], 1), lambda share: None)
+        fit_linear_model(read_input([heavy], 1), lambda share: None)
     assert "Give a model of the device alone with --model" in str(refused.value)

@@ -23,7 +23,7 @@ from study.store.formats.recording_file import read_recording
 from study.store.formats.repeats_file import read_repeats, repeats_path
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan
-from study.workflows.equalizer.repeat_trajectory import RepeatOrder, repeat_trajectory, repeated_lines, repeated_summary
+from study.workflows.equalizer.repeat_trajectory import RepeatOrder, repeat_lines, repeat_summary, repeat_trajectory
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
 BAND_HZ = (5.0, 35.0)
@@ -84,12 +84,12 @@ def refusal(plan, order=ORDER, error=StudyError) -> StudyError:
 
 
 def test_repeats_make_it_better_and_say_so_play_by_play(done):
-    found = repeated_summary(done)
+    found = repeat_summary(done)
     assert found["errors"][0] > 0.08
     assert min(found["errors"]) < 0.3 * found["errors"][0]
     assert found["noise_floor"] < min(found["errors"])
     assert found["peak_n"] <= 3.0
-    lines = repeated_lines(done)
+    lines = repeat_lines(done)
     assert lines[0].startswith("Quality not stored")
     assert lines[1].startswith("As the model itself predicts: error 0.")
     assert f"Play 0: error {100 * found['errors'][0]:.2f} % as measured." in lines
@@ -98,16 +98,16 @@ def test_repeats_make_it_better_and_say_so_play_by_play(done):
 
 
 def test_convergence_is_tested_before_anything_is_played(done):
-    assert 0 < repeated_summary(done)["surviving_error"] < 0.2
+    assert 0 < repeat_summary(done)["surviving_error"] < 0.2
     assert done.gain == 1.0
-    assert any(line.startswith("If the device is linear") for line in repeated_lines(done))
+    assert any(line.startswith("If the device is linear") for line in repeat_lines(done))
 
 
 def test_forces_and_how_they_were_found_are_written(done):
     out = done.solved.plan.out
     assert len(read_trajectory(out).signal) == 2000
     assert read_repeats(repeats_path(out)).errors == pytest.approx(done.repeated.errors)
-    assert repeated_summary(done)["repeats"] == str(repeats_path(out))
+    assert repeat_summary(done)["repeats"] == str(repeats_path(out))
 
 
 def test_a_later_run_goes_on_from_them(done, plan):
@@ -152,8 +152,8 @@ def test_a_model_that_holds_the_spring_is_repeated_without_it(plan, tmp_path):
 
 def test_a_model_that_does_not_say_how_well_it_is_known_is_played_untested(plan, tmp_path):
     done = repeat_trajectory(changed(plan, tmp_path, samples=None), replace(ORDER, repeats=1), unheard)
-    assert repeated_summary(done)["surviving_error"] is None
-    assert any(line.startswith("Convergence was not tested") for line in repeated_lines(done))
+    assert repeat_summary(done)["surviving_error"] is None
+    assert any(line.startswith("Convergence was not tested") for line in repeat_lines(done))
 
 
 def test_repeats_that_could_not_converge_are_refused(plan, tmp_path):
@@ -189,7 +189,7 @@ def test_named_friction_is_in_the_first_play(plan, tmp_path):
     write_mechanical_model(tmp_path / "improved.toml", physics)
     done = repeat_trajectory(replace(plan, physics=tmp_path / "improved.toml"), replace(ORDER, repeats=1), unheard)
     assert done.repeated.errors[0] < 0.3
-    assert "Compensated: coulomb_friction." in repeated_lines(done)
+    assert "Compensated: coulomb_friction." in repeat_lines(done)
 
 
 def test_a_device_that_is_not_there_is_named(plan):

@@ -25,7 +25,7 @@ def crash_or_hang(path: Path) -> Validation:
 
 @pytest.mark.timeout(120)
 def test_a_crash_and_a_hang_are_problems_of_their_files_alone(tmp_path, monkeypatch):
-    monkeypatch.setattr(validate_apart, "_validated", crash_or_hang)
+    monkeypatch.setattr(validate_apart, "_validate_safely", crash_or_hang)
     names = ("sound.toml", "crash.h5", "hang.h5", "last.toml")
     paths = [tmp_path / name for name in names]
     for path in paths:

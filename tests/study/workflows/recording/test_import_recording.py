@@ -9,7 +9,7 @@ from study.errors import StudyError, WrongUseError
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.recording.import_recording import ImportPlan, import_recording
-from study.workflows.recording.recording_from import recording_from
+from study.workflows.recording.recording_from import read_any_recording
 
 T = np.arange(200) / 1000
 TABLE = "time [s],fx [N],ax [g]\n" + "\n".join(f"{t:.3f},{np.sin(99 * t):.6f},{t * t:.9f}" for t in T) + "\n"
@@ -87,9 +87,9 @@ def test_a_folder_that_no_map_is_for_is_wrong_use(tmp_path):
 def test_seconds_that_are_called_milliseconds_are_noticed(tmp_path):
     (tmp_path / "a.csv").write_text(TABLE.replace("time [s]", "time [ms]"))
     (tmp_path / "b.csv").write_text(TABLE)
-    _, notes = recording_from(tmp_path / "a.csv")
+    _, notes = read_any_recording(tmp_path / "a.csv")
     assert any("1e+06 Hz is an unlikely rate" in note and "(s, called ms)" in note for note in notes)
-    found, notes = recording_from(tmp_path / "b.csv")
+    found, notes = read_any_recording(tmp_path / "b.csv")
     assert not any("unlikely" in note for note in notes)
     (check,) = clock(found, [(0, len(found))])
     assert (check.level, check.seen) == (
@@ -102,9 +102,9 @@ def test_of_two_forces_along_one_motion_it_is_said_that_the_motion_may_be_impose
     (tmp_path / "a.csv").write_text(
         "time [s],drive force [N],tip force [N],displacement [mm]\n" + "\n".join(rows) + "\n"
     )
-    assert any("If the motion was imposed" in note for note in recording_from(tmp_path / "a.csv")[1])
+    assert any("If the motion was imposed" in note for note in read_any_recording(tmp_path / "a.csv")[1])
     (tmp_path / "b.csv").write_text(TABLE)
-    assert not any("imposed" in note for note in recording_from(tmp_path / "b.csv")[1])
+    assert not any("imposed" in note for note in read_any_recording(tmp_path / "b.csv")[1])
 
 
 def write_runs(folder, *names):
@@ -128,14 +128,14 @@ def test_of_a_folder_of_other_names_it_is_said_that_they_are_no_parts(tmp_path):
 
 def test_a_table_of_others_is_looked_at_and_read_as_it_is(tmp_path):
     (tmp_path / "a.csv").write_text(TABLE)
-    found, notes = recording_from(tmp_path / "a.csv")
+    found, notes = read_any_recording(tmp_path / "a.csv")
     assert (found.command.channels, found.response.unit) == (("fx",), "m/s^2")
     assert notes[0] == "a.csv is no recording of ours: it was imported in memory."
     write_recording(tmp_path / "r.h5", found)
-    assert recording_from(tmp_path / "r.h5")[1] == ()
+    assert read_any_recording(tmp_path / "r.h5")[1] == ()
     (tmp_path / "b.csv").write_text(TABLE.replace("fx [N]", "knob"))
     with pytest.raises(StudyError, match=r"Nothing says what 'knob' is\. hapteq import .*b\.csv --out REC\.h5"):
-        recording_from(tmp_path / "b.csv")
+        read_any_recording(tmp_path / "b.csv")
 
 
 def test_a_folder_of_several_recordings_asks_which(tmp_path):

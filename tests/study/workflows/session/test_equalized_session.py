@@ -20,7 +20,7 @@ from study.workflows.results.session_results import write_tables
 from study.workflows.session.conduct_session import conduct_new, conduct_resumed
 from study.workflows.session.equalize_stimuli import level_scales
 from study.workflows.session.open_session import SessionPlan
-from study.workflows.session.simulated_participant import simulated_participant
+from study.workflows.session.simulated_participant import make_simulated_participant
 from study.workflows.views.session_facts import session_facts
 
 MASS_KG = np.array([0.3, 0.4, 0.5])
@@ -49,7 +49,7 @@ def plan(small_text, tmp_path):
 
 def take(plan):
     clock = VirtualClock()
-    return conduct_new(plan, "simulated", simulated_participant("ideal", 7, clock))
+    return conduct_new(plan, "simulated", make_simulated_participant("ideal", 7, clock))
 
 
 @pytest.fixture(scope="module")
@@ -110,10 +110,10 @@ def test_a_session_goes_on_with_the_model_it_was_begun_with(conducted):
     (conducted.folder.path.parents[1] / "rigid.h5").unlink()
     assert fold_session(conducted.folder).state == conducted.state
     with pytest.raises(StudyError, match="finished"):  # and not the model, which is in the folder
-        conduct_resumed(conducted.folder, "simulated", simulated_participant("ideal", 7, VirtualClock()))
+        conduct_resumed(conducted.folder, "simulated", make_simulated_participant("ideal", 7, VirtualClock()))
     (conducted.folder.path / "model.h5").write_bytes(b"another")
     with pytest.raises(StudyError, match="not the one it was begun with"):
-        conduct_resumed(conducted.folder, "simulated", simulated_participant("ideal", 7, VirtualClock()))
+        conduct_resumed(conducted.folder, "simulated", make_simulated_participant("ideal", 7, VirtualClock()))
 
 
 def refused(plan, **changes) -> str:

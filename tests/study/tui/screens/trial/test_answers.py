@@ -86,7 +86,7 @@ def test_a_wrong_key_leaves_no_trace_in_the_next_trial(on_stage):
         await stage.pilot.pause()
         before = stage.text
         await stage.press("x", "1")
-        screen.saved()
+        screen.show_saved()
         screen.arm(QUESTION)
         await stage.pilot.pause()
         assert stage.text == before

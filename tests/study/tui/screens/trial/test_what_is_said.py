@@ -46,14 +46,14 @@ def test_what_became_of_the_answer_is_said_in_words(on_stage):
     async def story(stage):
         screen.arm(QUESTION)
         await stage.press("2")
-        screen.saved()
+        screen.show_saved()
         await stage.pilot.pause()
         assert "2 saved" in stage.words
         for correct, word in ((True, "Right."), (False, "Wrong.")):
             screen.show_feedback(correct)
             await stage.pilot.pause()
             assert word in stage.words
-            screen.saved()
+            screen.show_saved()
             await stage.pilot.pause()
             assert word in stage.words
 
