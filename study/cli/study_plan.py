@@ -40,15 +40,15 @@ def study_plan(
 
 
 def _shown(study: "PlannedStudy", width: int | None) -> Iterator[str]:
-    from study.tui.text_rows import aligned, hanging
+    from study.tui.text_rows import align_rows, wrap_hanging
     from study.workflows.views.plan_study import lines, order_words
 
     for line in lines(study):
-        yield from hanging(line, 2, width)
+        yield from wrap_hanging(line, 2, width)
     if study.plan.cells:
         header = ("order", "frequencies", "wanted", "done", "begun", "needed")
         rows = [
             (str(place), order_words(cell), *map(str, (cell.wanted, cell.done, cell.begun, cell.needed)))
             for place, cell in enumerate(study.plan.cells, start=1)
         ]
-        yield from aligned((header, *rows), width)
+        yield from align_rows((header, *rows), width)
