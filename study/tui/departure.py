@@ -1,4 +1,4 @@
-"""Leave when that is asked from outside, or when the terminal is gone: the device must not stay unattended."""
+"""Leave when asked from outside, or when the terminal is gone: the device must not run unattended."""
 
 import asyncio
 import os
@@ -14,12 +14,11 @@ from study.errors import ExitCode
 
 LOOK_EVERY_S = 0.5
 LAST_RESORT_S = 10.0
-"""Longer than the engine ever takes to end. Writing to a terminal that is gone may block for good."""
+"""Longer than the engine ever takes to end. Writing to a closed terminal may block forever."""
 
 
 def leave_with_the_terminal(app: App[Any], leave: Callable[[], None]) -> None:
-    """`leave` is called from the event loop: at a polite kill, at a hang-up, and where the terminal vanished without
-    one (it was not this process's own, or hang-ups are ignored)."""
+    """Call `leave` from the event loop on SIGTERM, on SIGHUP, and when the terminal vanished without a signal."""
 
     def depart() -> None:
         last_resort = threading.Timer(LAST_RESORT_S, os._exit, (ExitCode.INTERRUPTED,))

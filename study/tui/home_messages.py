@@ -1,7 +1,6 @@
-"""What the screens around a session ask for. The application hears these and lets the engine do it.
+"""Requests of the screens outside a sitting. The application receives them and lets the engine do the work.
 
-Values: none is changed after it was posted (Textual itself writes its own fields into a message, so they cannot be
-frozen).
+Values: none is changed after it was posted (Textual writes its own fields into a message, so they cannot be frozen).
 """
 
 from dataclasses import dataclass

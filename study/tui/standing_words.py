@@ -1,4 +1,4 @@
-"""How a session stands, as a symbol and a word: neither is told by colour alone."""
+"""Status of a session as a symbol and a word, so that neither depends on colour."""
 
 from study.session.views.archive_views import TURNED_AWAY, SessionLine, Standing
 
@@ -24,11 +24,12 @@ STYLES: dict[Standing, str] = {
 
 
 def standing_words(standing: Standing) -> str:
+    """Symbol and word."""
     return f"{SYMBOLS[standing]} {standing}"
 
 
 def describe(line: SessionLine) -> str:
-    """One sentence or two about a session in a list, and what can be done with it."""
+    """One or two sentences about a session in a list, and what can be done with it."""
     match line.standing:
         case "finished":
             return f"{_who(line)} finished all {_runs(line.runs)} with {_answers(line)}."

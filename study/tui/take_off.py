@@ -1,4 +1,4 @@
-"""The one way in which a screen leaves: with its reply, and once."""
+"""Dismiss a screen with its reply, exactly once."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Reply = TypeVar("Reply")
 
 
 def take_off(screen: Screen[Reply], reply: Reply) -> None:
-    """Nothing, where it is not the screen on top. Two keys that arrive together are both handed to the screen of the
-    first: with the second, Textual would pop whatever lies below, or end the program where nothing does."""
+    """Dismiss the screen if it is on top. Of two keys that arrive together, both are handled by the first key's
+    screen: with the second, Textual would remove the screen below, or end the program."""
     if screen.is_active:
         screen.dismiss(reply)

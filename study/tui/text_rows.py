@@ -1,4 +1,4 @@
-"""Rows of words as lines with aligned columns. Too wide for a terminal, cells wrap; none is cut."""
+"""Rows of words as lines with aligned columns. Cells that are too wide for the terminal are wrapped, never cut."""
 
 from textwrap import wrap
 
@@ -6,19 +6,19 @@ Rows = tuple[tuple[str, ...], ...]
 
 GAP = "  "
 LEAST_CELLS = 12
-"""Width below which no column is narrowed: a line that is still too long is wrapped by the terminal."""
+"""Smallest width to which a column is narrowed; longer lines are wrapped by the terminal."""
 
 
 def align_rows(rows: Rows, columns: int | None = None) -> tuple[str, ...]:
-    """A line per row, or several where cells wrap. Columns that hold numbers below the header stand on the right.
+    """One line per row, or several where cells wrap. Columns of numbers below the header are right-aligned.
 
-    columns: of the terminal, which the widest columns give way to; None = as wide as needed.
+    columns: width of the terminal, to which the widest columns are narrowed; None = as wide as needed.
     """
     return tuple(line for lines in lines_of_rows(rows, columns) for line in lines)
 
 
 def lines_of_rows(rows: Rows, columns: int | None = None) -> Rows:
-    """As `aligned`, the lines of each row by themselves."""
+    """As `align_rows`, grouped by row."""
     if not rows:
         return ()
     count = max(map(len, rows))
@@ -29,14 +29,14 @@ def lines_of_rows(rows: Rows, columns: int | None = None) -> Rows:
 
 
 def wrap_hanging(line: str, indent: int, columns: int | None) -> tuple[str, ...]:
-    """One line wrapped to the terminal, what follows under the place `indent`."""
+    """One line wrapped to the terminal with a hanging indent of `indent`."""
     if columns is None or len(line) <= columns:
         return (line,)
     return tuple(wrap(line, columns, subsequent_indent=" " * indent, break_on_hyphens=False))
 
 
 def _fit_widths(widths: list[int], right: list[bool], columns: int | None) -> list[int]:
-    """The widest column of words gives way first, down to `LEAST_CELLS`."""
+    """Narrow the widest text columns first, down to `LEAST_CELLS`."""
     widths = list(widths)
     while columns is not None and (excess := sum(widths) + len(GAP) * (len(widths) - 1) - columns) > 0:
         words = [(width, place) for place, width in enumerate(widths) if width > LEAST_CELLS and not right[place]]

@@ -55,7 +55,7 @@ CONTRAST = Theme(
 
 THEMES = (DARK, LIGHT, CONTRAST)
 NEXT = {"hapteq-dark": "hapteq-light", "hapteq-light": "hapteq-contrast", "hapteq-contrast": "hapteq-dark"}
-"""For a key that goes through them."""
+"""The theme after each one, for a key that cycles through them."""
 
 
 def register_themes(app: App[Any], chosen: str = DARK.name) -> None:

@@ -1,5 +1,4 @@
-"""Where a session stands, in words that line mode and screens share: by runs and counts, which say nothing about
-levels."""
+"""Position in a session in words, for line mode and screens: runs and counts, which do not reveal levels."""
 
 from typing import Literal
 
@@ -7,10 +6,11 @@ from protocols.trial import Phase
 from study.session.views.views import Progress, Question, Task, Welcome
 
 WITHDRAW = "withdraw"
-"""To be typed as a whole: one key must not erase a session."""
+"""Must be typed completely: a single key must not erase a session."""
 
 
 def heading(question: Question) -> str:
+    """Run and trial number."""
     again = ", once more" if question.repeated else ""
     return (
         f"{run_name(question)} {question.run_number} of {question.runs_in_phase}, trial {question.trial_number}{again}"
@@ -44,7 +44,7 @@ def plan(notice: Welcome) -> str:
 
 
 def refusal_words(outcome: Literal["refused", "excluded"]) -> tuple[str, ...]:
-    """The last words to a person who does not take part."""
+    """Last words to a person who does not take part."""
     kept = "Nothing was played, and only this is kept."
     if outcome == "refused":
         return ("Thank you for coming. You decided not to take part, and that is fine.", kept)

@@ -1,8 +1,8 @@
-"""The screen in a browser, by textual-serve: for one window at a time, and for no page but our own.
+"""The screen in a browser, by textual-serve: for one window at a time, and only for our own page.
 
-A browser lets any page that it shows open a connection to this machine, and so can any account of it: "only
-localhost" alone would let any website, and any user, drive the device. The address holds a random token, without which
-nothing is answered; the connection's origin tells whose page it is; and headers keep other pages from framing it.
+Any page in a browser can open a connection to this machine, and so can any local account: binding to localhost alone
+would let any website and user drive the device. So the address contains a random token, without which nothing is
+answered; the connection's origin is checked; and headers prevent other pages from framing it.
 """
 
 import asyncio
@@ -20,14 +20,14 @@ from rich.console import Console
 from textual_serve.server import Server
 
 RELOAD_S = 10.0
-"""A page that is loaded again waits so long for the sitting of the old one to end."""
+"""How long a reloaded page waits for the sitting of the old one to end."""
 
 THIS_MACHINE = ("localhost", "127.0.0.1", "[::1]")
 TOKEN_BYTES = 32
 
 
 class ScreenServer(Server):
-    """Starts `command` for each visitor of the page. A closed page ends it, as a closed terminal would."""
+    """Starts `command` for each visitor of the page. Closing the page ends it, as closing a terminal would."""
 
     def __init__(self, command: Sequence[str], host: str, port: int, say: Callable[[str], None]) -> None:
         super().__init__(
@@ -41,7 +41,7 @@ class ScreenServer(Server):
         self._seat = asyncio.Lock()
 
     def initialize_logging(self) -> None:
-        """Each request in a line of its own would hide what must be read, and show the token."""
+        """No log of requests: it would hide important lines and show the token."""
         logging.basicConfig(level=logging.WARNING, format="%(message)s")
         logging.getLogger("aiohttp.access").disabled = True
 
@@ -63,7 +63,7 @@ class ScreenServer(Server):
             self._seat.release()
 
     async def _make_app(self) -> web.Application:
-        """Page, connection, downloads and what the page loads, all below the token."""
+        """Page, connection, downloads and page resources, all below the token."""
         app = web.Application(middlewares=[self._require_token])
         app.on_response_prepare.append(self._add_headers)
         app.add_subapp(f"/{self._token}", await super()._make_app())
@@ -73,7 +73,7 @@ class ScreenServer(Server):
     async def _require_token(
         self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
-        """Also of an address that leads nowhere, so that nothing is told apart without the token."""
+        """Also for unknown addresses, so that nothing can be distinguished without the token."""
         given = request.path.split("/")[1]
         if not hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode()):
             raise web.HTTPNotFound(text="The study is at the address that hapteq serve said, to its last letter.")
@@ -85,7 +85,7 @@ class ScreenServer(Server):
         response.headers.update(self._headers)
 
     def _safe_headers(self) -> dict[str, str]:
-        """The page's own scripts are known by their hashes; nothing is loaded from elsewhere, fonts included."""
+        """The page's own scripts are allowed by their hashes; nothing is loaded from elsewhere, fonts included."""
         page = (self.templates_path / "app_index.html").read_text("utf-8")
         scripts = " ".join(f"'sha256-{_sha256(script)}'" for script in _inline_scripts(page))
         own = " ".join(sorted(origin for origin in self._origins if "[" not in origin))  # a policy knows no IPv6
@@ -110,13 +110,13 @@ class ScreenServer(Server):
 
 
 def origins(host: str, port: int) -> frozenset[str]:
-    """What a browser calls our page."""
+    """Origins of our page as a browser states them."""
     names = THIS_MACHINE if _shown(host) in THIS_MACHINE else (_shown(host),)
     return frozenset(_address(name, port) for name in names)
 
 
 def _shown(host: str) -> str:
-    """As an address holds it."""
+    """The host as an address contains it."""
     return f"[{host}]" if ":" in host else host
 
 

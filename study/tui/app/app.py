@@ -1,4 +1,4 @@
-"""`hapteq study` on a screen. This process draws and takes keys, and never waits: all work is done by the engine."""
+"""`hapteq study` on a screen. This process draws and reads keys and never blocks: the engine does all work."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class HapteqApp(App[None]):
         return self._engine.pid
 
     def close_engine(self) -> None:
-        """After `run`: wait until the device has let go and the log is closed."""
+        """After `run`: wait until the device has released the force and the log is closed."""
         self._watching.end()
         self._engine.close()
         if self._sitting is not None:
@@ -151,7 +151,7 @@ class HapteqApp(App[None]):
         self.exit(return_code=int(code))
 
     def action_let_go(self) -> None:
-        """Ctrl-C. Once: force off, and a panel. Once more: leave."""
+        """Ctrl-C. First press: force off, and a panel. Second press: leave."""
         if self._sitting is None or self._letting_go is not None:
             self._leave(ExitCode.INTERRUPTED)
             return
@@ -203,7 +203,7 @@ class HapteqApp(App[None]):
         self._engine.send(Relay(event.note))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Of a session only while there is one."""
+        """Actions of a session are available only during one."""
         return action not in ("watch", "note", "pause") or self._sitting is not None
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:

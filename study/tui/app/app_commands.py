@@ -1,4 +1,4 @@
-"""The command palette: every action of the screen, each with the key and with its twin on the command line."""
+"""The command palette: every action of the screen, with its key and its command-line equivalent."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TWINS = {
     "note(True)": "hapteq note --adverse SESSION TEXT",
     "quit": "Ctrl-C in line mode",
 }
-"""What a terminal takes instead of an action."""
+"""Command-line equivalent of each action."""
 
 TITLES = {
     "let_go": "Take the force off and leave",
@@ -43,11 +43,11 @@ TITLES = {
     "heard(2)": "",
     "command_palette": "",
 }
-"""Of actions whose bindings are too short to say it, or not in the footer; an empty one is no command."""
+"""Titles of actions whose bindings are too short, or not in the footer; an empty one hides the action."""
 
 
 def commands(app: App[Any], screen: Screen[Any]) -> Iterator[SystemCommand]:
-    """What can be done on this screen now."""
+    """Actions available on this screen now."""
     told = set()
     for active in screen.active_bindings.values():
         binding = active.binding

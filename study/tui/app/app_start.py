@@ -1,4 +1,4 @@
-"""What the command line asks of the application. Light to import."""
+"""Options that the command line gives to the application. Light to import."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,10 @@ class AppStart:
     device: str
     keys: AnswerKeys = DIGITS
     first: Begin | Resume | None = None
-    """Goes straight into this sitting; None shows the start screen."""
+    """Start directly with this sitting; None shows the start screen."""
     protocol: str = ""
-    """What the start screen proposes first; empty leaves it to the list."""
+    """First choice of the start screen; empty for none."""
     seed: int | None = None
-    """Of every session that is begun; None draws one each time."""
+    """Seed of every new session; None draws one each time."""
     model: str = ""
-    """File of the identified model that equalizes the stimuli of every session that is begun; empty: none does."""
+    """Identified model that equalizes the stimuli of every new session; empty for none."""

@@ -1,4 +1,4 @@
-"""The screens around sittings: the start, past sessions, diagnoses."""
+"""Screens outside sittings: the start, past sessions, diagnoses."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 ArchiveWanted = SessionWanted | DiagnosisWanted | AnalyzeWanted | WithdrawWanted
-"""What these screens ask for, beside sittings."""
+"""Requests of these screens, besides sittings."""
 
 
 def command_for(wanted: ArchiveWanted) -> Command:
@@ -65,7 +65,7 @@ class ArchiveScreens:
         self._diagnosing: DiagnosingScreen | None = None
 
     async def home(self) -> None:
-        """The start screen at once, and its list when it is read."""
+        """Show the start screen at once, and its list when it is read."""
         from study.tui.screens.home import HomeScreen
 
         self.clear()
@@ -75,7 +75,7 @@ class ArchiveScreens:
         self._send(ShowHome(self._start.data, self._start.protocol, self._start.device, self._start.model))
 
     def clear(self) -> None:
-        """Take everything off but the start screen, where there is one."""
+        """Remove all screens but the start screen."""
         self._session = None
         while len(self._app.screen_stack) > 1 and self._app.screen is not self._home:
             self._app.pop_screen()
@@ -98,7 +98,7 @@ class ArchiveScreens:
                 self._app.notify(sentence, markup=False)
 
     async def diagnose(self, wanted: DiagnoseWanted) -> None:
-        """The engine works through one at a time; so does this screen, which is taken off when it is over."""
+        """Start a diagnosis; its screen is removed when it ends."""
         from study.tui.screens.diagnosing import DiagnosingScreen
 
         def stopped(stopped_here: bool | None) -> None:
@@ -111,7 +111,7 @@ class ArchiveScreens:
         await self._app.push_screen(self._diagnosing, stopped)
 
     def end_diagnosing(self) -> None:
-        """It is over, one way or another; whatever was opened over its screen goes too."""
+        """Remove the diagnosis screen and everything above it."""
         diagnosing, self._diagnosing = self._diagnosing, None
         while diagnosing is not None and diagnosing in self._app.screen_stack:
             self._app.pop_screen()

@@ -1,4 +1,4 @@
-"""The application's line to the engine: messages out, messages in as Textual messages, and a heartbeat."""
+"""Connection of the application to the engine: messages out, messages in as Textual messages, and a heartbeat."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ class EngineLine:
 
     @property
     def pid(self) -> int | None:
-        """Of the engine's process."""
+        """Process id of the engine."""
         return self._engine.pid
 
     def start(self) -> None:
-        """Returns at once. The heartbeat comes from the event loop: it stops when that hangs or is suspended."""
+        """Returns at once. The heartbeat comes from the event loop, so it stops when that hangs or is suspended."""
         self._engine.start()
         self._app.set_interval(HEARTBEAT_S, self._beat)
 
     def send(self, message: ToEngine) -> None:
-        """Returns at once. Starts another engine where the last one died."""
+        """Returns at once. Starts another engine if the last one died."""
         if self._engine.dead:
             self._engine = EngineClient(self._deliver)
             self._engine.start()
@@ -47,7 +47,7 @@ class EngineLine:
         self._engine.send(message)
 
     def close(self) -> None:
-        """Waits until the engine has let go and ended."""
+        """Wait until the engine has released the force and ended."""
         self._engine.close()
 
     def _beat(self) -> None:

@@ -1,4 +1,4 @@
-"""Screens that are needed later, loaded in a thread once the first one is drawn, so that none is late."""
+"""Import screens that are needed later in a thread after the first frame."""
 
 import gc
 import threading

@@ -1,4 +1,4 @@
-"""What is said when something ended, in words for a panel."""
+"""Texts of the panel that is shown when something ended."""
 
 from study.tui.engine.from_engine import Failed, Finished
 from study.tui.screens.outcome import Decision, Outcome
@@ -26,7 +26,7 @@ UNHEARD = Outcome(
 
 
 def failure_outcome(failure: Failed, at_home: bool) -> Outcome:
-    """at_home: it came up while nothing was going on, and the screen below goes on as before."""
+    """Panel for a failure. at_home: nothing was running, and the screen below continues."""
     error = failure.error
     parts = (("What happened", error.happened), ("What is safe", error.saved), ("What to do now", error.do_now))
     way_on: tuple[Decision, ...] = ("back",) if at_home else ("home", "quit")
@@ -35,6 +35,7 @@ def failure_outcome(failure: Failed, at_home: bool) -> Outcome:
 
 
 def completion_outcome(end: Finished) -> Outcome:
+    """Panel for a finished session."""
     results = end.results
     parts = (
         ("Thresholds", "\n".join(results.table)),

@@ -1,4 +1,4 @@
-"""The screens of one sitting: the one that the engine asks for now, over the trial's, which stays."""
+"""The screens of one sitting: the one that the engine asks for, above the trial's, which stays."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ SCREENS: dict[Call, Callable[[Any], Screen[Any]]] = {
 
 
 def screen_for(ask: Ask, keys: AnswerKeys) -> Screen[Any]:
-    """Of all but the trial, whose one screen stays for the whole sitting. Each is dismissed with the reply."""
+    """A screen for every request but the trial, whose screen is kept for the whole sitting. Each is dismissed with
+    the reply."""
     if ask.call is Call.WELCOME:
         return InstructionsScreen(ask.shown, keys)
     if ask.call is Call.CHOOSE_DEMO:
@@ -54,14 +55,14 @@ def screen_for(ask: Ask, keys: AnswerKeys) -> Screen[Any]:
 
 
 def forget_drawn_before(app: App[Any]) -> None:
-    """What Textual 8.2 keeps of widgets that are gone. Searching it for garbage holds the event loop up: for longer
-    with every trial, and in the end past the half second after which a screen counts as dead. To be called where
-    screens come and go."""
-    # By mistake, a lookup of two colours is cached by the whole drawing of a widget: the last 1024 of them.
+    """Clear caches of Textual 8.2 that keep removed widgets alive. Garbage collection over them blocks the event
+    loop for longer with every trial, finally beyond the half second after which a screen counts as dead. To be
+    called when screens change."""
+    # Textual caches a lookup of two colours with the whole rendering of a widget as key: the last 1024 of them.
     StylesCache.get_inner_outer.cache_clear()
     for screen in app.screen_stack:
         for footer in screen.query(Footer):
-            # A footer that is written anew goes on watching for its old keys, until what they follow changes.
+            # A recomposed footer keeps watchers of its old keys until what they follow changes.
             footer.mutate_reactive(Footer.compact)
 
 
@@ -70,7 +71,7 @@ TROUBLE_FOR_S = 8.0
 
 
 class SittingScreens:
-    """One for a sitting. Every reply carries the number of what it replies to, and each is sent once."""
+    """One per sitting. Every reply carries the number of its request, and each is sent once."""
 
     def __init__(
         self,
@@ -111,11 +112,11 @@ class SittingScreens:
                 await self.prepare(sentence)
 
     def send_trial_reply(self, reply: TrialReply) -> None:
-        """The trial's screen says so; it disarms itself."""
+        """Called by the trial's screen, which disarms itself."""
         self._reply(reply)
 
     async def prepare(self, sentence: str = OPENING) -> None:
-        """While nothing is asked, at the beginning and at the end."""
+        """Show that the device is prepared, while nothing is asked."""
         self._number, self._shown, self._trial = 0, None, None
         if self._preparing is None:
             self._preparing = PreparingScreen(sentence)
@@ -167,7 +168,7 @@ class SittingScreens:
         self._number = 0
 
     def _drop(self) -> None:
-        """Take off what was asked before, and whatever was opened over it (help, commands)."""
+        """Remove the previous request's screen and everything above it (help, commands)."""
         self._number = 0
         if self._trial is not None:
             self._trial.show_saved()  # the engine goes on only when the answer is on the disk

@@ -1,1 +1,1 @@
-"""Pictures in characters: `braille` is the canvas; directions, staircases and recordings are drawn on it."""
+"""Character graphics: `braille` is the canvas; directions, staircases and recordings are drawn on it."""

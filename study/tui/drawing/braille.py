@@ -1,4 +1,4 @@
-"""A canvas of braille dots: 2 x 4 per character cell, nearly square, in any UTF-8 terminal."""
+"""Canvas of braille dots: 2 x 4 per character cell, nearly square, in any UTF-8 terminal."""
 
 import math
 from collections.abc import Sequence
@@ -73,7 +73,7 @@ class Canvas:
         self.fill([(centre[0] + radius * math.cos(turn), centre[1] + radius * math.sin(turn)) for turn in turns])
 
     def fill(self, corners: Sequence[Point]) -> None:
-        """A convex polygon, with its outline. Row by row: a large drawing must not hold up the keys."""
+        """Fill a convex polygon, outline included, row by row."""
         top = max(0, math.ceil(min(y for _, y in corners)))
         bottom = min(self.height - 1, math.floor(max(y for _, y in corners)))
         sides = list(zip(corners, [*corners[1:], corners[0]], strict=True))
@@ -91,5 +91,5 @@ class Canvas:
 
 
 def _edge_crossing_x(a: Point, b: Point, y: float) -> float:
-    """x at which the side from a to b passes the height y."""
+    """x at which the edge from a to b crosses the height y."""
     return a[0] if a[1] == b[1] else a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])

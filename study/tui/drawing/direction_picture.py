@@ -1,4 +1,4 @@
-"""The two directions as oriented segments, told apart by number, place and line style, and in words."""
+"""The two directions as oriented segments, distinguished by number, place and line style, and in words."""
 
 import math
 from functools import lru_cache
@@ -18,7 +18,7 @@ SCREEN = {"yz": ((1, 0), (0, 1)), "xy": ((0, -1), (1, 0)), "zx": ((0, 1), (1, 0)
 
 
 def sentence(picture: DirectionPicture, number: int) -> str:
-    """Such as "1: up-left to down-right"."""
+    """A direction in words, such as "1: up-left to down-right"."""
     angle = picture.angle_deg[number - 1]
     return f"{number}: {_end(picture.plane, angle)} to {_end(picture.plane, angle + 180)}"
 
@@ -33,7 +33,7 @@ def draw_directions(picture: DirectionPicture, columns: int = 18, rows: int = 9)
 
 @lru_cache(maxsize=64)
 def draw_large_direction(picture: DirectionPicture, number: int, columns: int, rows: int) -> tuple[str, ...]:
-    """One direction as large as fits: a thick segment with a head at both ends; 1 is solid, 2 is dashed."""
+    """One direction as large as fits: a thick segment with a head at both ends; 1 solid, 2 dashed."""
     canvas = Canvas(columns, rows)
     right, up = _on_screen(picture.plane, picture.angle_deg[number - 1])
     x, y = canvas.middle
@@ -54,14 +54,14 @@ def draw_large_direction(picture: DirectionPicture, number: int, columns: int, r
 
 
 def _reach(picture: DirectionPicture, x: float, y: float) -> float:
-    """Half a segment, the same for both: neither may look stronger than the other."""
+    """Half length of a segment, the same for both: neither may look stronger."""
     sides = [_on_screen(picture.plane, angle) for angle in picture.angle_deg]
     fits = min(min(x / max(abs(right), 1e-9), y / max(abs(up), 1e-9)) for right, up in sides)
     return min(fits, 1.25 * min(x, y))
 
 
 def _dashes(half_length: float, dash: float, gap: float) -> list[tuple[float, float]]:
-    """Begin and end of each dash, spread evenly, with a gap at both ends."""
+    """Begin and end of each dash, evenly spaced, with a gap at both ends."""
     count = max(1, round((2 * half_length - gap) / (dash + gap)))
     stretch = 2 * half_length / (count * dash + (count + 1) * gap)
     begins = [-half_length + stretch * (gap + i * (dash + gap)) for i in range(count)]

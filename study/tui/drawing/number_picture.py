@@ -1,4 +1,4 @@
-"""A large 1 or 2, where there is no direction to draw."""
+"""A large 1 or 2, for tasks without a direction."""
 
 from functools import lru_cache
 from itertools import pairwise

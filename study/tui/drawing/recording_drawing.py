@@ -1,4 +1,4 @@
-"""Channels of a recording as lines of braille: their course over time, and their spectrum."""
+"""Channels of a recording in braille lines: time series and spectra."""
 
 import itertools
 from collections.abc import Iterable
@@ -12,11 +12,11 @@ from study.tui.drawing.braille import Canvas
 
 LABEL, COLUMNS, ROWS = 24, 54, 2
 _DECADES = 4.0
-"""Of a spectrum's amplitude, below its highest."""
+"""Range of a spectrum's amplitude below its maximum."""
 
 
 def time_series_lines(channel: Channel) -> Iterable[str]:
-    """From the lowest to the highest sample of each column of dots, with both ends beside it."""
+    """Range from lowest to highest sample in each column of dots, with both extremes beside it."""
     known = channel.known
     if not known.size:
         yield f"{_channel_label(channel)} {'':{COLUMNS}} no samples"
@@ -44,7 +44,7 @@ def _columns(samples: FloatArray, columns: int) -> list[tuple[float, float]]:
 
 
 def spectrum_lines(found: Overview) -> Iterable[str]:
-    """Amplitude of commands and responses over frequency, both axes logarithmic."""
+    """Amplitude spectra of commands and responses, both axes logarithmic."""
     if found.spectra is None:
         return
     frequency_hz = found.spectra.frequency_hz

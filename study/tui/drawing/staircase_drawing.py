@@ -1,4 +1,4 @@
-"""A staircase as lines of text: level over trials on a logarithmic scale, in braille dots with marks upon them."""
+"""A staircase as lines of text: level over trials on a logarithmic scale, in braille dots with marks."""
 
 import itertools
 import math
@@ -11,12 +11,12 @@ LEGEND = f"{RIGHT} right  {WRONG} wrong  {PEAK} peak  {VALLEY} valley  ┄ cap  
 
 LABEL_COLUMNS = 8
 _LEAST_RANGE = 4.0
-"""Cap over the lowest level drawn, at least: a staircase that hardly moves must not look wild."""
+"""Smallest ratio of the cap to the lowest drawn level: small movements must not look large."""
 _DOTS_PER_TRIAL = 4.0
-"""At most: short runs stay short, so that runs beside each other can be compared."""
+"""Upper limit, so that short runs stay short and runs can be compared."""
 _DOTTED = 4
 _FIRST = (RIGHT, WRONG, VALLEY, PEAK)
-"""Where several marks fall on one cell, the last of these is shown."""
+"""Where several marks share a cell, the last of these is shown."""
 
 
 def staircase_lines(staircase: Staircase, columns: int, rows: int) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ def _with_marks(lines: list[str], dots: list[tuple[float, float]], staircase: St
 
 
 def _mark(correct: bool, reversal: bool) -> str:
-    """A reversal after a right answer is a peak: down from here; after a wrong one a valley."""
+    """A reversal after a right answer is a peak, after a wrong one a valley."""
     if reversal:
         return PEAK if correct else VALLEY
     return RIGHT if correct else WRONG

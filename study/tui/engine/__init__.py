@@ -1,1 +1,1 @@
-"""Between the process that draws and those that work, so that nothing slow ever holds up the screen."""
+"""The engine process and the pipe to it, so that slow work never blocks the screen."""

@@ -13,12 +13,12 @@ from typing import IO
 def start_child(
     module: str, function: str, *arguments: str, said: IO[bytes] | int = subprocess.DEVNULL
 ) -> tuple[Connection, "subprocess.Popen[bytes]"]:
-    """Runs `function(descriptor of its end of the pipe, *arguments)`, named because what works is not loaded here.
-    What it prints goes to `said`.
+    """Run `function(descriptor of its end of the pipe, *arguments)` in a new process. It is named by text because its
+    module is not loaded here. What it prints goes to `said`.
 
-    It has a session of its own: the terminal's Ctrl-C and Ctrl-Z do not reach it, and it cannot write on the screen.
-    It finds modules where this process finds them, however this one was started. It sees the end of the pipe when
-    this process ends, in whatever way. Raises OSError where the system refuses.
+    The process has a session of its own: the terminal's Ctrl-C and Ctrl-Z do not reach it, and it cannot write on the
+    screen. It uses this process's import path. It sees the end of the pipe when this process ends for any reason.
+    Raises OSError where the system refuses.
     """
     ours, theirs = socket.socketpair()
     with theirs:

@@ -1,6 +1,6 @@
-"""The screen's end of the pipe: starts the engine, hands over what it says, and notices when it is gone.
+"""The screen's end of the pipe: starts the engine, delivers its messages, and detects its end.
 
-Nothing here waits in the thread that draws: two threads start the engine, write to it and read from it.
+The drawing thread never blocks: two other threads start the engine, write to it and read from it.
 """
 
 import contextlib
@@ -22,11 +22,12 @@ from study.tui.engine.from_engine import ErrorText, Failed, FromEngine, Opened
 from study.tui.engine.to_engine import Heartbeat, ToEngine
 
 CLOSING_S = 6.0
-"""An engine that lost its screen has ended itself long before."""
+"""Longest wait for the engine to end; one that lost its screen ends by itself sooner."""
 
 
 class EngineClient:
-    """deliver: gets what the engine says, from a thread of this client. Last comes a `Failed` if the engine dies."""
+    """deliver: called with each message of the engine, from a thread of this client. The last one is a `Failed` if
+    the engine dies."""
 
     def __init__(self, deliver: Callable[[FromEngine], None]) -> None:
         self._deliver = deliver
@@ -44,16 +45,17 @@ class EngineClient:
         return self._process.pid if self._process is not None else None
 
     def start(self) -> None:
-        """Returns at once. What is sent before the engine is there waits for it."""
+        """Returns at once. Messages sent before the engine has started are queued."""
         self._thread.start()
 
     def send(self, message: ToEngine) -> None:
-        """Returns at once. A heartbeat that finds others still waiting is left out: it would come late."""
+        """Returns at once. A heartbeat is dropped while other messages are queued: it would be late."""
         if not isinstance(message, Heartbeat) or self._outbox.empty():
             self._outbox.put(message)
 
     def close(self, patience_s: float = CLOSING_S) -> None:
-        """Close the pipe and wait for the engine to let go, to write its last line, and to end. May be called twice."""
+        """Close the pipe and wait for the engine to release the force, write its last line, and end. May be called
+        twice."""
         self._closing = True
         self._outbox.put(None)
         if self._thread.ident is None:
@@ -106,7 +108,7 @@ class EngineClient:
 
 
 def _code_at_end(process: "subprocess.Popen[bytes]") -> int:
-    """Of an engine whose pipe has ended; it ends by itself, or by force."""
+    """Exit code of an engine whose pipe has ended; it is killed if it does not end."""
     try:
         return process.wait(CLOSING_S)
     except subprocess.TimeoutExpired:

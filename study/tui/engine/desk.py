@@ -1,4 +1,5 @@
-"""What the engine does for the screen: lists, views, whole sittings, analyses, withdrawals. One after the other."""
+"""Commands that the engine performs for the screen: lists, views, whole sittings, analyses, withdrawals; one after
+another."""
 
 import contextlib
 import json
@@ -56,7 +57,7 @@ OPENING = "Preparing the device: some ten seconds the first time."
 
 
 class Desk:
-    """`opened`: the session that the present command opened and has not finished: what can be gone on with."""
+    """`opened`: the session that the current command opened and has not finished, which can be resumed."""
 
     def __init__(self, link: ScreenLink) -> None:
         self._link = link
@@ -64,9 +65,9 @@ class Desk:
         self.opened: SessionFolder | None = None
 
     def perform(self, command: Command) -> None:
-        """Raises StudyError where it cannot be done, KeyboardInterrupt where the user let go."""
+        """Perform one command. Raises StudyError where it fails, KeyboardInterrupt where the user interrupts."""
         self.opened = None
-        # From here on a signal interrupts. What came before interrupted nothing.
+        # From here on a signal interrupts; earlier ones are ignored.
         if self._link.taken_is_let_go:
             raise KeyboardInterrupt
         match command:
@@ -179,7 +180,7 @@ def _diagnosis(path: Path) -> Diagnosis:
 
 
 def _home_view(wanted: ShowHome) -> HomeView:
-    """The start screen, with what the command line named in the first place."""
+    """The start screen, with the choices of the command line first."""
     view = home_view(Path(wanted.data))
     line = protocol_line(wanted.protocol, Path(wanted.data)) if wanted.protocol else None
     protocols = (line, *(other for other in view.protocols if other.name != line.name)) if line else view.protocols

@@ -1,6 +1,6 @@
-"""The engine: the process in which sessions, the device, the disk and analyses run, so that none holds up the screen.
+"""The engine: the process in which sessions, the device, the disk and analyses run, so that none blocks the screen.
 
-It lives as long as its pipe. When the screen is gone, however it went, the device lets go, the log says that the
+It lives as long as its pipe. When the screen is gone for any reason, the device is released, the log records that the
 session was interrupted, and this process ends.
 """
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from study.tui.engine.desk import Desk
 
 NEEDED_FOR_A_SESSION = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.sessions.trial_recordings")
-"""Loaded while a code is still typed, so that beginning is quick."""
+"""Imported while the participant's code is typed, so that a session starts quickly."""
 
 NEEDED_AT_THE_END = ("study.workflows.results.analyze_data",)
-"""Statistics and plots: loaded after them, if there is still time, so that the results are quick."""
+"""Statistics and plots: imported afterwards if there is time, so that results come quickly."""
 
 LAST_RESORT_S = 5.0
 """The device was stopped long before."""
@@ -47,7 +47,7 @@ class Engine:
             signal.signal(getattr(signal, name), self._on_signal)
 
     def work(self) -> None:
-        """Until the screen is gone."""
+        """Perform commands until the screen is gone."""
         self._link.start()
         while not self._link.ended:
             try:
@@ -102,7 +102,7 @@ class Engine:
         self._link.send(Failed(text, path))
 
     def _interrupt(self) -> None:
-        """From the reading thread. A real signal, because only that wakes a main thread that sleeps or waits."""
+        """Called from the reading thread. A real signal, because only that wakes a main thread that sleeps or waits."""
         main = threading.main_thread().ident
         if self._busy and main is not None:
             signal.pthread_kill(main, signal.SIGINT)
@@ -117,7 +117,7 @@ class Engine:
 
 
 def _end_by_force() -> None:
-    """Of a process that has lost its screen and does not end: it hangs in a driver, or on a disk."""
+    """Kill the process if it has lost its screen and does not end: it hangs in a driver, or on a disk."""
     time.sleep(LAST_RESORT_S)
     os._exit(1)
 

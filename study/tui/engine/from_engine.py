@@ -1,4 +1,4 @@
-"""What the engine says to the screen. Values only, pickled over a pipe, and light to import."""
+"""Messages from the engine to the screen. Values only, pickled over a pipe, light to import."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -9,7 +9,7 @@ from study.session.views.views import HandleView
 
 
 class Call(Enum):
-    """The methods of the display port that wait for a reply."""
+    """Methods of the display port that wait for a reply."""
 
     FILL_IN = "fill_in"
     DEVICE_CHECKED = "device_checked"
@@ -27,7 +27,7 @@ class Call(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Show this and send the reply. What is sent with it is what the display port names: a view or a sentence."""
+    """Show this and send the reply. `shown` is what the display port names: a view or a sentence."""
 
     number: int
     call: Call
@@ -36,7 +36,7 @@ class Ask:
 
 @dataclass(frozen=True, slots=True)
 class LookUpdate:
-    """Where the handle is now, while `Call.AWAIT_HANDLE` of this number waits."""
+    """Current handle position, while `Call.AWAIT_HANDLE` of this number waits."""
 
     number: int
     view: HandleView
@@ -44,7 +44,7 @@ class LookUpdate:
 
 @dataclass(frozen=True, slots=True)
 class Close:
-    """The reply of this number is waited for no more."""
+    """The reply of this number is no longer needed."""
 
     number: int
 
@@ -56,7 +56,7 @@ class Feedback:
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """A sentence to know that ends nothing."""
+    """A message that ends nothing."""
 
     sentence: str
 
@@ -78,14 +78,14 @@ class Diagnosis:
 
 @dataclass(frozen=True, slots=True)
 class Preparing:
-    """What takes a while, a sentence."""
+    """A longer preparation, as a sentence."""
 
     sentence: str
 
 
 @dataclass(frozen=True, slots=True)
 class Working:
-    """What is being done of something long, and the share of it that is done."""
+    """Current step of longer work, and the share that is done."""
 
     what: str
     share: float
@@ -142,7 +142,7 @@ class Withdrawn:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """What was asked for could not be done, or not to its end: also of a sitting that was left."""
+    """A command failed or was left: also for a sitting that was left."""
 
     error: ErrorText
     path: str = ""

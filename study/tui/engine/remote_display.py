@@ -1,4 +1,4 @@
-"""The display port over the pipe: asks the screen, and never waits for it longer than a hand may be shaken."""
+"""The display port over the pipe: asks the screen, and never waits longer than the limits of a vibration."""
 
 import math
 from collections.abc import Callable
@@ -32,19 +32,19 @@ from study.workflows.checks.computer_load import load_per_processor
 from study.workflows.trial.display import SignOfLife
 
 GLANCE_S = 0.04
-"""Between two signs of life; the port allows 100 ms."""
+"""Interval of the signs of life; the port allows 100 ms."""
 LOOK_EVERY_S = 0.1
 UNSHOWN_S = 1.0
-"""A wait for the handle that is no longer than this shows nothing of its own."""
+"""A shorter wait for the handle is not shown."""
 SILENT_AFTER_S = 0.5
-"""A screen without a heartbeat for so long is suspended, dead or hung: what plays could not be stopped."""
+"""A screen without heartbeat for this long is suspended, dead or hung: a stimulus could not be stopped."""
 
 CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
 TOO_LATE = Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
 
 
 class RemoteDisplay:
-    """Any method raises KeyboardInterrupt where the screen is gone."""
+    """Any method raises KeyboardInterrupt if the screen is gone."""
 
     def __init__(self, link: ScreenLink, clock: Clock, load: Callable[[], float | None] = load_per_processor) -> None:
         self._link = link
@@ -90,8 +90,8 @@ class RemoteDisplay:
         return None
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """Shown only where the handle is away from its place, or the wait is long: most trials begin with it there,
-        held still for a moment."""
+        """Shown only if the handle is away from its place or the wait is long: in most trials the handle is already
+        there."""
         number, view, self._late_s = 0, look(), 0.0
         began_s = looked_s = self._clock.now_s()
         while not view.ready:
@@ -136,7 +136,7 @@ class RemoteDisplay:
         self._ask(Call.PRACTICE_OVER, result)
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
-        """Enforced here: a screen that comes back too early waits for the rest of it."""
+        """The rest is enforced here: if the screen returns too early, the remaining time is waited."""
         number = self._show(Call.REST, notice)
         started_s = self._clock.now_s()
         back = False
@@ -167,7 +167,7 @@ class RemoteDisplay:
         self._link.send(Trouble(sentence))
 
     def _ask(self, call: Call, shown: Any) -> Any:
-        """While nothing plays: a screen may be suspended for any time."""
+        """Ask while nothing plays: a screen may be suspended for any time."""
         number = self._show(call, shown)
         while (reply := self._reply(number)) is None:
             pass
@@ -180,7 +180,7 @@ class RemoteDisplay:
         return self._number
 
     def _reply(self, number: int, patience_s: float = GLANCE_S) -> Reply | None:
-        """The screen's reply to this; None where none came meanwhile, or one to something that is over."""
+        """The screen's reply to this request; None if none came in time, or one to an earlier request."""
         began_s = self._clock.now_s()
         reply = self._link.reply(patience_s)
         self._late_s = max(self._late_s, self._clock.now_s() - began_s - patience_s)
@@ -197,6 +197,6 @@ class RemoteDisplay:
 
 
 def silent(engine_late_s: float, load_per_processor: float | None) -> Unanswered:
-    """What a screen without a heartbeat makes of a trial."""
+    """Result of a trial whose screen sent no heartbeat."""
     reason = why_screen_silent(engine_late_s, load_per_processor)
     return Unanswered(reason, leave=False, cause=VoidCause.SCREEN_LATE)

@@ -1,4 +1,4 @@
-"""The engine's end of the pipe: a thread that hears the screen while the engine is busy with a session."""
+"""The engine's end of the pipe: a thread that listens to the screen while the engine is busy with a session."""
 
 import threading
 import time
@@ -13,7 +13,7 @@ from study.workflows.trial.requests_port import QueuedRequests
 
 
 class ScreenLink:
-    """interrupt: raises KeyboardInterrupt in the main thread, if that is busy. gone: comes last, when the screen is
+    """interrupt: raises KeyboardInterrupt in the main thread if it is busy. gone: called last, when the screen is
     gone. Both are called from the reading thread."""
 
     def __init__(self, connection: Connection, interrupt: Callable[[], None], gone: Callable[[], None]) -> None:
@@ -35,7 +35,7 @@ class ScreenLink:
         threading.Thread(target=self._listen, name="screen-link", daemon=True).start()
 
     def send(self, message: FromEngine) -> None:
-        """Raises KeyboardInterrupt where the screen is gone."""
+        """Raises KeyboardInterrupt if the screen is gone."""
         try:
             with self._sending:
                 self._connection.send(message)
@@ -44,7 +44,7 @@ class ScreenLink:
             raise KeyboardInterrupt from None
 
     def next_command(self) -> Command | None:
-        """Waits for it. None: the screen is gone."""
+        """Wait for the next command. None: the screen is gone."""
         command = self._commands.get()
         self._taken += 1
         return command
@@ -59,7 +59,8 @@ class ScreenLink:
         return self._taken <= self._let_go_up_to
 
     def reply(self, patience_s: float) -> Reply | None:
-        """The next reply, whatever its number. Raises KeyboardInterrupt where the screen is gone."""
+        """The next reply, whatever its number; None after the timeout. Raises KeyboardInterrupt if the screen is
+        gone."""
         if self.ended:
             raise KeyboardInterrupt
         try:
@@ -68,12 +69,12 @@ class ScreenLink:
             return None
 
     def forget_replies(self) -> None:
-        """What was replied in an earlier sitting, whose questions had the same numbers."""
+        """Drop replies of an earlier sitting, whose requests had the same numbers."""
         while not self._replies.empty():
             self._replies.get()
 
     def silent_s(self) -> float:
-        """For how long the screen has given no sign of life."""
+        """Seconds since the last sign of life of the screen."""
         return time.monotonic() - self._heard_s
 
     def _listen(self) -> None:

@@ -1,4 +1,4 @@
-"""What the screen says to the engine. Values only, pickled over a pipe, and light to import."""
+"""Messages from the screen to the engine. Values only, pickled over a pipe, light to import."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -91,7 +91,7 @@ class AskBeside:
 
 @dataclass(frozen=True, slots=True)
 class Relay:
-    """To the running session, as a second terminal could ask for it: a note, a pause, a stop."""
+    """Request to the running session, as from a second terminal: a note, a pause, a stop."""
 
     request: Request
 
@@ -115,6 +115,6 @@ class Reply:
 
 
 Command = ShowHome | ShowSession | ShowDiagnosis | Begin | Resume | Analyze | Withdraw | Diagnose | AskBeside
-"""What the engine works through, one after the other."""
+"""What the engine performs, one after another."""
 
 ToEngine = Command | Relay | LetGo | Heartbeat | Reply

@@ -13,7 +13,8 @@ CLOSING_S = 2.0
 
 
 class WatchFeed:
-    """Is a `study.tui.watch.watch_source.WatchSource`. The child ends with `close`, and when this process dies."""
+    """Implements `study.tui.watch.watch_source.WatchSource`. The child ends with `close`, and when this process
+    dies."""
 
     def __init__(self, session_path: str) -> None:
         self._connection, self._child = start_child("study.tui.engine.watch_feed", "feed", session_path)
@@ -49,7 +50,7 @@ class WatchFeed:
         self._connection.close()
 
     def _read(self) -> None:
-        """In a thread of its own: takes what the child sends, until it is gone."""
+        """Runs in a thread: takes what the child sends, until it is gone."""
         while True:
             try:
                 received = self._connection.recv()
@@ -64,7 +65,7 @@ class WatchFeed:
 
 
 def feed(descriptor: int, session_path: str) -> None:
-    """The child. Imports here, because the screen's process must load none of this."""
+    """Main function of the child. It imports here, because the screen's process must load none of this."""
     from pathlib import Path
 
     from study.devices.clock import RealClock

@@ -1,1 +1,1 @@
-"""Keys: `key_presses` (which events are presses) -> `keys_in_order` (one after the other); names and answers."""
+"""Keys: `key_presses` (which events are presses) -> `keys_in_order` (serialised handling); names and answer keys."""

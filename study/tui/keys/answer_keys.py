@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from study.errors import WrongUseError
 
 RESERVED = "pqrn?"
-"""Pause, leave, repeat, note, help: what a participant must be able to do in any trial."""
+"""Pause, leave, repeat, note, help: always available during a trial."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +14,7 @@ class AnswerKeys:
     second: str = "2"
 
     def answer(self, typed: str) -> int | None:
-        """1 or 2; None where what was typed is neither. The digits are always valid; a locked shift key is no harm."""
+        """1 or 2; None for other keys. The digits are always valid; case is ignored."""
         key = typed.casefold()
         if key in ("1", self.first):
             return 1
@@ -22,7 +22,7 @@ class AnswerKeys:
 
     @property
     def choice(self) -> str:
-        """As a prompt says it, such as "f for 1, j for 2"; "1 or 2" where no others were named."""
+        """Keys in a prompt, such as "f for 1, j for 2"; "1 or 2" by default."""
         if (self.first, self.second) == ("1", "2"):
             return "1 or 2"
         return f"{self.first} for 1, {self.second} for 2"

@@ -1,4 +1,4 @@
-"""Keys as they are printed on a keyboard: F5 and Esc, in the footer as in every text."""
+"""Key names as printed on a keyboard: F5 and Esc, in the footer and in every text."""
 
 import re
 

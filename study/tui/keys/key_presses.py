@@ -1,4 +1,4 @@
-"""Which key events are presses of their own. A terminal tells no releases: a held key is a row of equal events."""
+"""Detect key presses among key events. A terminal reports no releases: a held key is a series of equal events."""
 
 import sys
 import time
@@ -12,14 +12,14 @@ FIRST_REPEAT_S = 0.7
 
 
 class KeyPresses:
-    """Of the keys that answer; several keys of one answer count as one."""
+    """For the answer keys; several keys of one answer count as one."""
 
     def __init__(self) -> None:
         self._last_s: dict[int, float] = {}
 
     def is_press(self, answer: int, at_s: float, armed_s: float) -> bool:
-        """False: the key may still be held since before `armed_s`, or a row of answers comes faster than a person
-        means them. Every event must be told, also those while nothing is asked."""
+        """Whether an event is a press. False: the key may still be held since before `armed_s`, or answers come
+        faster than a person can intend. Every event must be passed, also while nothing is asked."""
         last_s = max(self._last_s.values(), default=float("-inf"))
         same_s = self._last_s.get(answer, float("-inf"))
         self._last_s[answer] = at_s
@@ -28,8 +28,8 @@ class KeyPresses:
 
 
 def arrival_s(event: Key) -> float:
-    """When the key was read, on the clock of `time.monotonic`: Textual stamps it in the thread that reads keys. A key
-    that was read long before it is handled, because the program was held up, keeps its time: it was meant for then."""
+    """When the key was read, on the clock of `time.monotonic`: Textual stamps it in the reading thread. The stamp
+    stays valid if handling is delayed."""
     now_s = time.monotonic()
     # On Windows the stamp is another clock's.
     return event.time if sys.platform != "win32" and event.time <= now_s else now_s

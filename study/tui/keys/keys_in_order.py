@@ -1,7 +1,7 @@
-"""Keys, clicks and pastes one after the other: each is handed on when what the one before it did is done.
+"""Serialise keys, clicks and pastes: each is handed on when the effects of the previous one are complete.
 
-Textual hands a key to the widget that has the keyboard when the key is looked at. Tab, or Enter in a field, moves the
-keyboard only some messages later: of keys that arrive together, those behind it would go into the field before.
+Textual delivers a key to the widget that has the focus when the key is handled. Tab, or Enter in a field, moves the
+focus only some messages later: of keys that arrive together, later ones would otherwise go to the previous field.
 """
 
 import asyncio
@@ -17,11 +17,11 @@ from textual.message_pump import MessagePump
 from study.tui.keys.key_presses import arrival_s
 
 AT_ONCE = ("ctrl+c", "ctrl+q", "ctrl+z")
-"""Take the force off, or suspend: they wait for nothing."""
+"""Remove the force, or suspend: never queued."""
 ROUNDS = 3
-"""From a widget to the application: the key itself, the message that it becomes, what is done about that."""
+"""From a widget to the application: the key itself, the message that it becomes, and its effects."""
 PATIENCE_S = 1.0
-"""A widget that is busy for longer holds up no key."""
+"""A widget that is busy for longer does not delay further keys."""
 
 
 class KeysInOrder:
@@ -39,11 +39,11 @@ class KeysInOrder:
         return self._settling is not None
 
     def forget_earlier(self) -> None:
-        """Something new is asked: a key that was read before now was meant for something else."""
+        """A new question is shown: keys read before now were meant for something else."""
         self._deaf_until_s = time.monotonic()
 
     async def take(self, event: Event) -> None:
-        """Every event of the application, in its own message loop."""
+        """Handle every event of the application, in its message loop."""
         if isinstance(event, Key) and event.key not in AT_ONCE and arrival_s(event) < self._deaf_until_s:
             return  # also where it comes back from a widget: its bindings would be those of another screen
         if not _is_typed(event):
@@ -88,7 +88,7 @@ def _is_typed(event: Event) -> bool:
 
 
 async def _pass_through(nodes: list[MessagePump]) -> None:
-    """Each has then worked through all that was waiting for it, and what it passed on waits at the next."""
+    """Wait until each node has processed its queue, so that what it passed on is queued at the next."""
     for node in nodes:
         handled = asyncio.Event()
         if node.call_later(handled.set):

@@ -1,4 +1,4 @@
-"""Sentences out, lines in: what every part of line mode talks through."""
+"""Dialogue of line mode: sentences out, lines in."""
 
 import textwrap
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from study.tui.line_mode.line_input import LineInput
 from study.workflows.trial.display import SignOfLife
 
 GLANCE_S = 0.05
-"""Longest time between two signs of life: half of what the port allows."""
+"""Interval of the signs of life: half of what the port allows."""
 LINE_WIDTH = 78
 
 
@@ -52,11 +52,11 @@ class Conversation:
         self._out.flush()
 
     def forget(self) -> None:
-        """Drop what a person typed too early."""
+        """Drop lines typed too early."""
         self._lines.forget()
 
     def wait(self, sign_of_life: SignOfLife, until_s: float = float("inf")) -> Line | WaitOver:
-        """The next line. A line that comes together with the end of the stimulus came too late."""
+        """The next line, or why none came. A line that arrives with the end of the stimulus is too late."""
         while True:
             try:
                 text = self._lines.read(GLANCE_S)
@@ -71,7 +71,7 @@ class Conversation:
                 return WaitOver.TIME_LIMIT
 
     def answer(self) -> Line:
-        """The next line while nothing is played. Raises KeyboardInterrupt where no line can come any more."""
+        """The next line while nothing is played. Raises KeyboardInterrupt if no line can come any more."""
         reply = self.wait(_keep_waiting)
         if isinstance(reply, WaitOver):
             raise KeyboardInterrupt
@@ -85,8 +85,7 @@ class Conversation:
         return line
 
     def poll_line(self) -> Line | None:
-        """A line that was typed meanwhile, without waiting for it. From a pipe never: the writer planned its
-        lines for the questions that follow."""
+        """A line typed meanwhile, without waiting. Never from a pipe, whose lines are meant for later questions."""
         if not self._lines.interactive:
             return None
         try:
@@ -96,17 +95,17 @@ class Conversation:
         return None if text is None else Line(text, self.clock.now_s())
 
     def input_is_over(self) -> bool:
-        """Whether the input has ended with no line left in it."""
+        """Whether the input has ended with no line left."""
         return self._lines.ended()
 
 
 def printable(text: str) -> str:
-    """Without the control characters of arrow keys."""
+    """The text without control characters, such as those of arrow keys."""
     return "".join(c for c in text if c.isprintable()).strip()
 
 
 def shown(line: Line) -> str:
-    """What was typed, as a sentence may name it."""
+    """The typed line as a sentence may quote it."""
     plain = printable(line.text)[:20]
     return f"'{plain}'" if plain else "Enter alone"
 

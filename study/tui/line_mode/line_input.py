@@ -1,4 +1,4 @@
-"""Lines from a terminal or a pipe, with a limit of time, so that a waiting program can do something meanwhile."""
+"""Read lines from a terminal or a pipe with a timeout, so that a waiting program can do something meanwhile."""
 
 import os
 import select
@@ -6,7 +6,7 @@ import sys
 
 
 class LineInput:
-    """Reads standard input by itself. `read` returns None when nothing came in time; raises EOFError at its end."""
+    """Reads standard input directly. `read` returns None if nothing came in time; raises EOFError at its end."""
 
     def __init__(self, descriptor: int | None = None) -> None:
         self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
@@ -26,7 +26,7 @@ class LineInput:
         return self._take_line()
 
     def ended(self) -> bool:
-        """Whether no line is left and none can come. Takes none."""
+        """Whether no line is left and none can come. Consumes nothing."""
         while b"\n" not in self._pending and not self._over:
             if not select.select([self._descriptor], [], [], 0.0)[0]:
                 return False
@@ -34,7 +34,7 @@ class LineInput:
         return b"\n" not in self._pending
 
     def forget(self) -> None:
-        """Drop what a person typed or pasted too early. A pipe keeps its lines: its writer planned them."""
+        """Drop lines that a person typed too early. Lines of a pipe are kept."""
         if not self.interactive:
             return
         import termios

@@ -33,7 +33,7 @@ from study.workflows.trial.display import SignOfLife
 
 
 class PlainDisplay:
-    """note: what takes notes and adverse events that are typed during a pause; without it none are offered."""
+    """note: takes notes and adverse events typed during a pause; if None, none are offered."""
 
     def __init__(
         self,

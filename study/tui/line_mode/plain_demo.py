@@ -1,4 +1,4 @@
-"""Line mode: the demonstration, and waiting while something plays or the handle is brought back."""
+"""Line mode: the demonstration, and waiting while something plays or the handle is moved back."""
 
 from collections.abc import Callable
 
@@ -41,7 +41,7 @@ def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_li
 
 
 def show_playing(notice: PlayingNotice, talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
-    """A key typed meanwhile is no answer yet: only p and q are heard."""
+    """Wait for the end. Keys typed meanwhile are no answers: only p and q are accepted."""
     talk.forget()
     if notice.title:  # a gap between two intervals has none
         words = f" ({sentence(notice.picture, notice.number)[3:]})" if notice.picture is not None else ""
@@ -77,6 +77,7 @@ def _glance(talk: Conversation, sign_of_life: SignOfLife, seconds: float) -> Una
 
 
 def _step_vibration(menu: DemoMenu, vibration: int, step: int) -> tuple[int, str]:
+    """The new vibration number and a sentence; unchanged at either end."""
     turned = vibration + step
     if turned < 1:
         return vibration, "This is the first vibration."

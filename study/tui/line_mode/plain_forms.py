@@ -1,4 +1,4 @@
-"""Line mode: forms and the device check, one question after the other."""
+"""Line mode: forms and the device check, one question after another."""
 
 from study.session.views.form_entry import CHECKED
 from study.session.views.form_views import Form, FormField, FormReply
@@ -30,7 +30,7 @@ def fill_in(form: Form, talk: Conversation) -> FormReply:
 
 
 def _confirm_changes(form: Form, answers: dict[str, str], talk: Conversation) -> bool:
-    """False: they are asked again from the first."""
+    """Whether changed answers are confirmed; otherwise the form is asked again."""
     talk.forget()
     told = ", ".join(f"{number} {answers[field.key]}" for number, field in enumerate(form.fields, start=1))
     talk.say("", f"You changed an answer. Your answers are now: {told}.")
@@ -60,7 +60,7 @@ def device_checked(report: DeviceReport, talk: Conversation) -> bool:
 
 
 def _ask(field: FormField, place: str, talk: Conversation) -> str | None:
-    """None: back to the question before."""
+    """The answer; None: back to the previous question."""
     numbered = bool(field.choices) and not any(choice.isdigit() for choice in field.choices)
     talk.say("", f"{place}: {field.label}")
     for number, choice in enumerate(field.choices, start=1):
@@ -80,7 +80,7 @@ def _ask(field: FormField, place: str, talk: Conversation) -> str | None:
 
 
 def _parse_answer(field: FormField, line: Line, numbered: bool) -> str | None:
-    """None: no answer to this question."""
+    """The answer; None if the line is not an answer to this question."""
     text = printable(line.text)
     if not text:
         return None if field.needed else ""

@@ -1,4 +1,4 @@
-"""Line mode: rests and pauses, with nothing played, and what can be written into the log meanwhile."""
+"""Line mode: rests and pauses, with nothing played, and notes for the log."""
 
 from collections.abc import Callable
 
@@ -81,7 +81,7 @@ def _take_note(adverse: bool, talk: Conversation, note: Callable[[NoteAsked], No
 
 
 def _count_down(until_s: float, talk: Conversation, sign_of_life: SignOfLife) -> bool:
-    """Says every ten seconds how long it takes. False where the sign of life ended it."""
+    """Announce the remaining time every ten seconds. False if the sign of life ended the wait."""
     say_at_s = float("-inf")
     while (left_s := until_s - talk.clock.now_s()) > 1e-9:
         now_s = talk.clock.now_s()

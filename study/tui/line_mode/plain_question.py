@@ -1,4 +1,4 @@
-"""Line mode: one trial, and what is said around it."""
+"""Line mode: one trial with its question and instructions."""
 
 from protocols.trial import VoidCause
 from study.session.views.counted import answers_are
@@ -83,6 +83,7 @@ def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: 
 
 
 def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
+    """The reply of a typed line; None if it is none."""
     answer = keys.answer(line.text)
     if answer is not None:
         return Answered(answer, line.at_s)

@@ -1,1 +1,1 @@
-"""Whole screens: each turns a view into cells and keys into a reply, and owns no rules."""
+"""Whole screens: each turns a view into cells and keys into a reply, without rules."""

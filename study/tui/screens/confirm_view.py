@@ -1,4 +1,4 @@
-"""Before the experimenter's view opens where a participant may look on: no single wrong key opens it."""
+"""Confirmation before the experimenter's view opens where a participant may see it: a single key does not open it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
 
 SHOWN_HERE = "The participant's screen showed the experimenter's view: levels, and which answers were right or wrong."
-"""The note in the log of a session whose own screen showed it."""
+"""Note in the log of a session whose own screen showed the view."""
 
 
 class ConfirmView(ModalScreen[bool]):
-    """True where the session's name was typed."""
+    """Returns True if the session's name was typed."""
 
     HELP = """\
 # The experimenter's view
@@ -72,7 +72,7 @@ class ConfirmView(ModalScreen[bool]):
 
 
 def confirm_view(app: App[Any], session: str, go_on: Callable[[], object]) -> None:
-    """go_on: called once, when the session's name was typed."""
+    """Ask for confirmation. go_on: called once, when the session's name was typed."""
 
     def decided(confirmed: bool | None) -> None:
         if confirmed:

@@ -1,4 +1,4 @@
-"""The consent taken back during a sitting, asked for with a word: no single wrong key erases a session."""
+"""Confirmation of a withdrawal of consent during a sitting: a word must be typed."""
 
 from typing import ClassVar
 
@@ -16,7 +16,7 @@ from study.tui.widgets.said import Said
 
 
 class ConfirmWithdrawal(ModalScreen[bool]):
-    """True where the word was typed."""
+    """Returns True if the word was typed."""
 
     HELP = """\
 # Taking the consent back

@@ -73,7 +73,7 @@ class DemoScreen(Screen[DemoChoice]):
             take_off(self, PlayDemo(self._vibration, answer))
 
     def action_heard(self, answer: int) -> None:
-        """The answers are heard in `on_key`; their bindings are there for the footer."""
+        """For the footer only: the answers are handled in `on_key`."""
 
     def action_turn(self, step: int) -> None:
         turned = self._vibration + step
@@ -89,7 +89,7 @@ class DemoScreen(Screen[DemoChoice]):
         self.post_message(self.PauseWanted())
 
     def action_done(self) -> None:
-        """Asked once where something was not felt yet: Enter is pressed out of habit."""
+        """Confirm once if something was not felt yet, because Enter is often pressed by habit."""
         unfelt = 2 * self._menu.vibrations - len(set(self._menu.felt))
         if unfelt and not self._asked:
             self._asked = True

@@ -1,4 +1,4 @@
-"""What the device check found, and what to do about it."""
+"""Findings of the device check, with advice."""
 
 from typing import ClassVar
 

@@ -1,4 +1,4 @@
-"""What shall be diagnosed: recordings or a session, and the model that they are compared with."""
+"""Input of a diagnosis: recordings or a session, and the model to compare with."""
 
 import shlex
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""While a diagnosis is computed: what is being done, how much of it is, and the way out."""
+"""Progress of a running diagnosis, which can be stopped."""
 
 import time
 from collections.abc import Callable
@@ -24,7 +24,7 @@ suggest is fitted, and compared with its rivals on data that no fit has seen.
 
 
 class DiagnosingScreen(Screen[bool]):
-    """Returns true where it was stopped."""
+    """Returns True if it was stopped."""
 
     HELP = HELP
     CSS = """

@@ -1,4 +1,4 @@
-"""One diagnosis: the verdict, the physics named, the rivals passed over, and the numbers behind them."""
+"""View of one diagnosis: the verdict, named effects, rivals, and the numbers behind them."""
 
 from pathlib import Path
 from typing import ClassVar

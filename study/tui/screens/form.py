@@ -1,4 +1,4 @@
-"""A form: consent, exclusion, the set-up, the debrief. It says what is missing, and judges nothing."""
+"""A form: consent, exclusion, set-up, debrief. It shows what is missing and judges nothing."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -40,13 +40,13 @@ KEYS = (
     ("up", "", "↑", "Previous"),
     ("down", "", "↓", "Next"),
 )
-"""Of the footer: the key, where it has this meaning (empty: everywhere), how it is shown, and the meaning."""
+"""Footer entries: key, where it has this meaning (empty: everywhere), how it is shown, meaning."""
 FINISHED = "Go down to Continue and press Enter."
 
 
 class FormScreen(Screen[FormReply]):
-    """The picture of a `FormEntry`. No widget in it has the keyboard: keys, clicks and pastes come to the screen, one
-    after the other, and each is applied to the entry before the next is looked at."""
+    """Shows a `FormEntry`. No widget in it has the focus: keys, clicks and pastes come to the screen in order, and
+    each is applied to the entry before the next."""
 
     HELP = """\
 # A form
@@ -75,7 +75,7 @@ class FormScreen(Screen[FormReply]):
 
     @dataclass
     class Pointed(Message):
-        """Where the mouse was clicked, found out when it was."""
+        """What the mouse was clicked on."""
 
         widget: ChoiceRow | FormQuestion | Button
         choice: int | None = None
@@ -108,7 +108,7 @@ class FormScreen(Screen[FormReply]):
 
     @property
     def stacked(self) -> bool:
-        """Whether the choices under the cursor lie below each other at this width."""
+        """Whether the choices under the cursor are listed vertically at this width."""
         at = self._entry.at
         return at < len(self._entry.form.fields) and self.query(FormQuestion)[at].stacked
 
@@ -129,7 +129,7 @@ class FormScreen(Screen[FormReply]):
         sheet.scroll_relative(y=pages * sheet.size.height, animate=False)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """The footer names no key that would change nothing here."""
+        """The footer shows only keys that have an effect here."""
         if action != "press":
             return True
         key, place = parameters
@@ -141,7 +141,7 @@ class FormScreen(Screen[FormReply]):
         return place in ("", here) and any(after not in (None, self._entry) for after in pressed)
 
     def _forward_event(self, event: Event) -> None:
-        """A click comes to the same queue as the keys, with what it hit: nothing overtakes it on the way."""
+        """Put a click with its target into the queue of the keys, so that order is kept."""
         if isinstance(event, Click) and not event.is_forwarded and (pointed := self._locate_click(event)) is not None:
             self.post_message(pointed)
             return
@@ -169,7 +169,7 @@ class FormScreen(Screen[FormReply]):
         self._take(to)
 
     def _take(self, entry: FormEntry | None) -> bool:
-        """The only place where the entry changes. False: nothing was meant for it."""
+        """Replace the entry (the only place that does). False: the key had no meaning."""
         if entry is None:
             return False
         before, self._entry = self._entry, entry

@@ -1,4 +1,4 @@
-"""Before a trial: the handle is brought to its place."""
+"""Before a trial: the handle is moved to its place."""
 
 from typing import ClassVar
 

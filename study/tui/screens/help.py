@@ -1,4 +1,4 @@
-"""Help in context, over the screen that it is about."""
+"""Help for the screen below it."""
 
 from typing import ClassVar
 

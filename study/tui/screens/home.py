@@ -1,4 +1,4 @@
-"""The start: a new session, and the sessions so far. Shown before the list is there."""
+"""The start screen: a new session, and past sessions. Shown before the list is loaded."""
 
 from typing import ClassVar
 
@@ -134,7 +134,7 @@ class HomeScreen(Screen[None]):
             self._show(self._home)
 
     def show(self, home: HomeView) -> None:
-        """Also later, with a newer view: what is typed and chosen stays."""
+        """Show a view; what was typed and chosen is kept."""
         self._home = home
         if self.query("#name"):
             self._show(home)
@@ -158,7 +158,7 @@ class HomeScreen(Screen[None]):
         self.query_one("#detail", Static).update(describe(looked.line))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """The footer names the way to the half of the screen where the cursor is not."""
+        """The footer names the key to the other half of the screen."""
         here = {"new": "#new", "past": "#past"}.get(action)
         return here is None or not self.query_one(here).has_focus_within
 

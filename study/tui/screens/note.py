@@ -1,4 +1,4 @@
-"""A note for the log, by the person at the screen; or that something happened to the participant."""
+"""A note for the log by the person at the screen, or a report of an adverse event."""
 
 from typing import ClassVar, cast
 
@@ -20,7 +20,7 @@ WRITERS: tuple[Who, ...] = ("participant", "experimenter")
 
 
 class NoteScreen(ModalScreen[NoteAsked | None]):
-    """None: nothing is to be written."""
+    """Returns None if nothing is to be written."""
 
     HELP = """\
 # A note

@@ -1,4 +1,4 @@
-"""One sentence for the log, typed while the session goes on behind it."""
+"""One line for the log, typed while the session continues."""
 
 from collections.abc import Callable
 from typing import ClassVar
@@ -15,7 +15,7 @@ MOST_CHARACTERS = 500
 
 
 class NotePrompt(ModalScreen[str | None]):
-    """Returns the text; None where nothing is to be noted."""
+    """Returns the text; None if nothing is to be noted."""
 
     CSS = """
     NotePrompt { align: center bottom; }

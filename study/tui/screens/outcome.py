@@ -1,4 +1,4 @@
-"""How something ended: what happened, what was saved, and what to do now, with a key for it."""
+"""Panel at the end: what happened, what was saved, and the possible next steps with their keys."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Outcome:
     parts: tuple[tuple[str, str], ...]
     """(heading, text); a heading may be empty."""
     decisions: tuple[Decision, ...]
-    """What can be done now, offered in this order."""
+    """Possible next steps, in this order."""
     grave: bool = True
     """False for good news."""
 
@@ -80,7 +80,7 @@ class OutcomeScreen(ModalScreen[Decision]):
         self.tell(self._outcome)
 
     def tell(self, outcome: Outcome) -> None:
-        """Also later, when more is known."""
+        """Replace the content when more is known."""
         self._outcome = outcome
         if not self.query("#told"):
             return

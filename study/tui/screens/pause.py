@@ -1,4 +1,4 @@
-"""A pause: nothing is played until it is decided how to go on. Notes are taken here."""
+"""A pause: nothing is played until the participant decides how to continue. Notes are taken here."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -28,7 +28,7 @@ CHOICES = {
 
 
 class PauseScreen(Screen[AfterPause]):
-    """leaving: the participant asked to leave, so that is highlighted."""
+    """leaving: the participant asked to leave, so that choice is highlighted."""
 
     HELP = """\
 # Pause

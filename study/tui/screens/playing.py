@@ -1,4 +1,4 @@
-"""While something of a fixed length plays, to which nothing is answered yet."""
+"""While a stimulus of fixed length plays, without a question."""
 
 from typing import ClassVar
 

@@ -1,4 +1,4 @@
-"""After a short practice: how it went, which decides nothing that a participant could lose."""
+"""Result of a short practice."""
 
 from typing import ClassVar
 

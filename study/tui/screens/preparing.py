@@ -1,4 +1,4 @@
-"""While the device is being prepared: what is going on, and for how long. No bar, because the end is not known."""
+"""While the device is prepared: current step and elapsed time. No bar, because the duration is unknown."""
 
 import time
 from collections.abc import Callable
@@ -47,7 +47,7 @@ class PreparingScreen(Screen[None]):
         self.set_interval(TICK_S, self._tick)
 
     def say(self, sentence: str, afresh: bool = False) -> None:
-        """What is going on now; the time goes on, but where this is another wait (afresh)."""
+        """Show the current step; afresh: another wait begins, so the time restarts."""
         self._sentence = sentence
         if afresh:
             self._began_s = self._now_s()
@@ -59,5 +59,6 @@ class PreparingScreen(Screen[None]):
 
 
 def elapsed_words(seconds: float) -> str:
+    """Elapsed time in words."""
     whole = int(seconds)
     return f"{whole} s so far" if whole < 60 else f"{whole // 60} min {whole % 60} s so far"

@@ -1,4 +1,4 @@
-"""An enforced rest: how long it still takes, and what is left to do."""
+"""An enforced rest: the remaining time, and what is left to do."""
 
 import math
 import time
@@ -21,7 +21,7 @@ READY = "When you are ready, press Enter."
 
 
 class RestScreen(Screen[float]):
-    """Returns the seconds rested, never fewer than asked for."""
+    """Returns the seconds rested, never fewer than requested."""
 
     HELP = """\
 # Rest

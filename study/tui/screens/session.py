@@ -1,4 +1,4 @@
-"""One past session: what it was, what came out, and what can be done with it."""
+"""One past session: facts, results, and possible actions."""
 
 from pathlib import Path
 from typing import ClassVar
@@ -72,7 +72,7 @@ class SessionScreen(Screen[None]):
         self._view = view
 
     def show(self, view: SessionView) -> None:
-        """A newer view of it, such as after an analysis; the page stays."""
+        """A newer view, such as after an analysis; the page is kept."""
         page = self.query_one(TabbedContent).active
         self._view = view
 
@@ -146,7 +146,7 @@ class SessionScreen(Screen[None]):
         self.app.push_screen(WithdrawPrompt(self._view.line.subject), decided)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """What this session does not allow is not in the footer."""
+        """The footer shows only what this session allows."""
         line = self._view.line
         match action:
             case "resume":
@@ -179,7 +179,7 @@ def _head(view: SessionView) -> Content:
 
 
 def _facts(facts: tuple[tuple[str, str], ...]) -> Table:
-    """A table that breaks long values below themselves."""
+    """A table that wraps long values."""
     table = Table.grid(padding=(0, 2, 0, 0))
     table.add_column(style="dim", no_wrap=True)
     table.add_column()

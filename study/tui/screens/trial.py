@@ -34,13 +34,13 @@ AFTER = {
     TIME_OVER: "The time for this answer is over. The next vibration comes.",
 }
 WANTED_FOR_S = 3.0
-"""A pause asked for between two trials begins with the next; much later it would be forgotten."""
+"""A pause asked for between two trials begins with the next one within this time."""
 NUM_LOCK = {"end", "down", "kp_begin"}
-"""What a number pad's 1 and 2 send while Num Lock is off."""
+"""Keys that a number pad's 1 and 2 send while Num Lock is off."""
 
 
 class TrialScreen(Screen[None]):
-    """One for a sitting: armed for each question, and dead in between."""
+    """One per sitting: armed for each question, inactive in between."""
 
     HELP = """\
 # A trial
@@ -71,7 +71,7 @@ class TrialScreen(Screen[None]):
 
     @dataclass
     class Replied(Message):
-        """Once for each arming."""
+        """Posted once for each arming."""
 
         reply: Reply
 
@@ -103,7 +103,7 @@ class TrialScreen(Screen[None]):
         self._show()
 
     def arm(self, question: Question) -> None:
-        """From now on one reply counts."""
+        """Accept one reply from now on."""
         self._drop_limit()
         if self._question is not None and run_name(question) != run_name(self._question):
             self._verdict = ""  # of practice: nothing is told about the answers that come now
@@ -122,25 +122,25 @@ class TrialScreen(Screen[None]):
         self._wanted = None
 
     def disarm(self) -> None:
-        """No reply is waited for any more."""
+        """Accept no reply any more."""
         self._armed_s = None
         self._drop_limit()
         if not self._taken:
             self._say(WAIT)
 
     def show_saved(self) -> None:
-        """The answer is on the disk."""
+        """Show that the answer is on the disk."""
         if self._taken:
             self._mark("saved")
             self._say(self._verdict_sentence() or f"{self._taken} saved. {WAIT}")
 
     def show_feedback(self, correct: bool) -> None:
-        """Told in words now, and with the next question."""
+        """Shown now, and with the next question."""
         self._verdict = "right." if correct else "wrong."
         self._say(self._verdict_sentence())
 
     def show_trouble(self, sentence: str) -> None:
-        """Stays until the next trial is over: between two trials there is no time to read it."""
+        """Shown until the next trial is over, so that there is time to read it."""
         self._trouble = sentence
         self._trouble_is_old = False
         if self._composed:
@@ -171,7 +171,7 @@ class TrialScreen(Screen[None]):
             self._say("A moment: the pause comes next.")
 
     def action_heard(self, answer: int) -> None:
-        """The answers are heard in `on_key`; their bindings are there for the footer."""
+        """For the footer only: the answers are handled in `on_key`."""
 
     def _take(self, answer: int, at_s: float) -> None:
         armed_s = self._armed_s
@@ -214,7 +214,7 @@ class TrialScreen(Screen[None]):
         return self._verdict.capitalize()
 
     def _show(self, last: str = "") -> None:
-        """Everything anew: of a trial nothing but the feedback is seen in the next."""
+        """Redraw everything: only the feedback of the last trial remains visible."""
         if not self._composed:
             return
         self.query_one("#trouble", Said).update(self._trouble)
@@ -232,7 +232,7 @@ class TrialScreen(Screen[None]):
 
     @property
     def _composed(self) -> bool:
-        """It may be armed before its first frame."""
+        """Whether it has been drawn; it may be armed before its first frame."""
         return bool(self.query("#said"))
 
     def _mark(self, mark: Mark) -> None:

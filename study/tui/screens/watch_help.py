@@ -1,4 +1,4 @@
-"""What the watcher's screen says of itself."""
+"""Help texts of the experimenter's view."""
 
 GUIDE = "You only watch: S stops, p pauses, n notes. Directions show after the answer."
 

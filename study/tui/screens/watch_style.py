@@ -1,4 +1,4 @@
-"""How the watcher's screen is laid out: two columns in a narrow terminal, three in a wide one."""
+"""Layout of the experimenter's view: two columns in a narrow terminal, three in a wide one."""
 
 STYLE = """
 WatchScreen #standing, WatchScreen #guide { height: 1; padding: 0 1; }

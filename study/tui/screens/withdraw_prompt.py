@@ -1,4 +1,4 @@
-"""Withdrawal, asked for with the code itself: no single wrong key erases a participant."""
+"""Confirmation of a withdrawal by typing the code: a single key does not erase a participant."""
 
 from typing import ClassVar
 
@@ -26,7 +26,7 @@ In a terminal: `hapteq withdraw SESSION`.
 
 
 class WithdrawPrompt(ModalScreen[bool]):
-    """Returns true where the code was typed."""
+    """Returns True if the code was typed."""
 
     HELP = HELP
     CSS = """

@@ -1,4 +1,4 @@
-"""The staircase of one run as it grows: level over trials on a logarithmic scale, on our own braille canvas."""
+"""The staircase of one run while it grows: level over trials on a logarithmic scale, in braille dots."""
 
 import itertools
 import math
@@ -12,9 +12,9 @@ from study.tui.drawing.braille import Canvas
 from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG
 
 LEAST_RANGE = 4.0
-"""Cap over the lowest level drawn, at least: a staircase that hardly moves must not look wild."""
+"""Smallest ratio of the cap to the lowest drawn level: small movements must not look large."""
 DOTS_PER_TRIAL = 4.0
-"""At most; many trials move together."""
+"""Upper limit; many trials are drawn closer together."""
 
 MUTED = "$foreground 65%"
 NEXT = "?"
@@ -22,7 +22,7 @@ LEGEND = f"{RIGHT} right {WRONG} wrong {PEAK}{VALLEY} reversal {NEXT}next ┄cap
 
 _STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error", NEXT: "bold"}
 _FIRST = {WRONG: 1, RIGHT: 0, PEAK: 2, VALLEY: 2, NEXT: 3}
-"""Where several marks fall on one cell, the highest is shown."""
+"""Where several marks share a cell, the highest is shown."""
 
 
 class LevelHistory(Widget):
@@ -78,7 +78,7 @@ def level_history(
 
 
 def _mark(point: StaircasePoint) -> str:
-    """A reversal after a right answer is a peak gone past: down from here; after a wrong one a valley."""
+    """A reversal after a right answer is a peak, after a wrong one a valley."""
     if point.reversal:
         return PEAK if point.correct else VALLEY
     return RIGHT if point.correct else WRONG

@@ -1,4 +1,4 @@
-"""A watched session as lines of text: what changed between two views, and one view as a whole."""
+"""A watched session as lines of text: changes between two views, or one whole view."""
 
 from study.session.watching.watch_view import ClosedTrial, WatchView
 from study.tui.watch.watch_words import (
@@ -25,7 +25,7 @@ LABEL_CELLS = 11
 
 
 def changes(before: WatchView | None, now: WatchView) -> list[str]:
-    """One line for each thing that happened, alarms first, each with a bell. Without a view before: the present."""
+    """One line for each change, alarms first, each with a bell. Without a previous view: the current state."""
     seen = {(alarm.kind, alarm.since) for alarm in before.alarms} if before is not None else set()
     lines = [f"{BELL}ALARM {alarm.sentence}" for alarm in now.alarms if (alarm.kind, alarm.since) not in seen]
     if before is None:
@@ -65,7 +65,7 @@ def status(view: WatchView) -> list[str]:
 
 
 def _new_trials(before: WatchView, now: WatchView) -> list[ClosedTrial]:
-    """Oldest first. A trial that is being measured is told when that is done."""
+    """Oldest first. A trial that is being measured is reported afterwards."""
     told = {(t.run, t.trial, t.attempt) for t in before.last if t.status != "measuring"}
     fresh = [t for t in now.last if (t.run, t.trial, t.attempt) not in told and t.status != "measuring"]
     newest = (before.last[0].run, before.last[0].trial, before.last[0].attempt) if before.last else (-1, 0, 0)

@@ -1,4 +1,4 @@
-"""The panels of the watcher's screen as text: runs, last trials, exposure and device, details."""
+"""Panels of the experimenter's view as text: runs, last trials, exposure and device, details."""
 
 from collections.abc import Sequence
 
@@ -58,7 +58,7 @@ def alarm_lines(unseen: Sequence[Alarm], seen: Sequence[Alarm]) -> Content:
 
 
 def runs_lines(view: WatchView, rows: int) -> Content:
-    """As many runs as there are rows for, the present one among them."""
+    """As many runs as there are rows, the current one among them."""
     lines = [Content.styled("  run            Hz  rev.  n", MUTED)]
     lines += [_run_line(view, run) for run in _around_the_present(view.runs, rows - 1)]
     return Content("\n").join(lines)

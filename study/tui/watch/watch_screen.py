@@ -1,6 +1,6 @@
 """The experimenter's view of a running session: everything but the direction of the open trial.
 
-It follows; all that it can do is to ask the session for a stop or a pause, and to note something.
+It follows read-only; it can request a stop or a pause, and add notes.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from study.tui.watch.watch_words import staircase_title
 
 RING_EVERY_S = 4.0
 FORGOTTEN_AFTER_S = 10.0
-"""An alarm that flickers is not a new one each time; one that comes back after so long is."""
+"""An alarm that returns within this time is the same one; later it is new."""
 
 Key = tuple[str, str]
 
 
 class AlarmBook:
-    """Which alarms were seen, and when the bell rings. Values in, values out; the time is given."""
+    """Which alarms were acknowledged, and when the bell rings. Pure: the time is an argument."""
 
     def __init__(self) -> None:
         self._alarms: tuple[Alarm, ...] = ()
@@ -54,7 +54,7 @@ class AlarmBook:
         return tuple(alarm for alarm in self._alarms if _key(alarm) in self._seen)
 
     def take(self, alarms: Sequence[Alarm], now_s: float) -> bool:
-        """The alarms of now. Returns whether the bell is to ring."""
+        """Update with the current alarms. Returns whether the bell is to ring."""
         self._alarms = tuple(alarms)
         present = {_key(alarm) for alarm in alarms}
         for book in (self._seen, self._rung):
@@ -70,7 +70,7 @@ class AlarmBook:
         return True
 
     def acknowledge(self, now_s: float) -> int:
-        """All that are there are seen. Returns how many were not before."""
+        """Acknowledge all current alarms. Returns how many were new."""
         unseen = self.unseen
         self._seen.update({_key(alarm): now_s for alarm in unseen})
         return len(unseen)
@@ -82,13 +82,13 @@ def _key(alarm: Alarm) -> Key:
 
 LOOK_EVERY_S = 0.1
 UNHEARD_AFTER_S = 2.0
-"""A session looks for requests twenty times a second."""
+"""A session checks for requests twenty times a second."""
 NO_NEWS_AFTER_S = 3.0
 SAID_FOR_S = 8.0
 
 
 class WatchMessage(Message):
-    """A new view; the screen shows whichever came last."""
+    """A new view; the screen shows the latest."""
 
     def __init__(self, view: WatchView) -> None:
         super().__init__()
@@ -154,7 +154,7 @@ class WatchScreen(Screen[None]):
         self.look()
 
     def look(self) -> None:
-        """Ten times a second: is there a new view, must the bell ring, was the stop heard?"""
+        """Ten times a second: check for a new view, the bell, and whether a stop was received."""
         view = self._source.latest()
         if view is not None and view is not self._taken:
             self._taken = view
@@ -199,12 +199,12 @@ class WatchScreen(Screen[None]):
             self._guide(GUIDE, said=False)
 
     def _alarms_of_the_view(self) -> tuple[Alarm, ...]:
-        """No alarm for the end that was asked for here."""
+        """Alarms of the view, except for an end that was requested here."""
         alarms = self.view.alarms if self.view is not None else ()
         return tuple(alarm for alarm in alarms if not (self._stopped_here and alarm.kind == "ended"))
 
     def _own_alarms(self, now_s: float) -> list[Alarm]:
-        """Of what the log cannot tell: that it is read no more, that a stop was not heard."""
+        """Alarms about the view itself: the log is not read any more, or a stop was not received."""
         since = self.view.utc if self.view is not None else ""
         alarms = []
         if self._stop_sent_s is not None and self.view is not None and self.view.standing not in ON:

@@ -1,4 +1,4 @@
-"""The port of the watcher's screen: where its views come from."""
+"""The port that provides views to the experimenter's screen."""
 
 from typing import Protocol
 
@@ -6,13 +6,13 @@ from study.session.watching.watch_view import WatchView
 
 
 class WatchSource(Protocol):
-    """Where views come from; `study.tui.engine.watch_feed.WatchFeed` is one."""
+    """Source of views; implemented by `study.tui.engine.watch_feed.WatchFeed`."""
 
     def latest(self) -> WatchView | None:
-        """At once, without any work: called ten times a second by the event loop."""
+        """The latest view, without blocking: called ten times a second by the event loop."""
         ...
 
     @property
     def problem(self) -> str:
-        """Why no views come any more, a sentence; empty while they come."""
+        """Why no views come any more, a sentence; empty otherwise."""
         ...

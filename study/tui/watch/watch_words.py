@@ -1,4 +1,4 @@
-"""What a watcher reads, in words: shared by the screen and by the lines of `hapteq watch --plain`."""
+"""Texts of the experimenter's view, shared by the screen and `hapteq watch --plain`."""
 
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_parts
@@ -22,7 +22,7 @@ NOT_MEASURED = "answered too early to measure; counts"
 
 
 def clock_time(utc: str) -> str:
-    """On this computer's clock, without the date: "14:05:10 +01:00"; empty where there is no time."""
+    """Local time without the date: "14:05:10 +01:00"; empty if there is no time."""
     date, time, offset = local_parts(utc, machine_zone)
     return f"{time} {offset}" if offset else date
 
@@ -39,7 +39,7 @@ def duration(seconds: float) -> str:
 
 
 def what_goes_on(view: WatchView) -> str:
-    """Without the standing: "trial 12 of test run 2, 35 Hz: waiting for the answer, 4 s"."""
+    """Activity in words: "trial 12 of test run 2, 35 Hz: waiting for the answer, 4 s"."""
     if view.reason:
         return view.reason
     trial, run = view.open_trial, view.present_run
@@ -71,7 +71,7 @@ def staircase_title(view: WatchView) -> str:
 
 
 def verdict(trial: ClosedTrial) -> str:
-    """Right, wrong, void, or not known yet; a catch trial answered wrongly is a lapse."""
+    """Right, wrong, void, or unknown; a catch trial answered wrongly is a lapse."""
     if trial.status == "spoiled":
         return "void"
     if trial.correct is None:

@@ -1,4 +1,4 @@
-"""The experimenter's view in the application itself. A process of its own feeds it, so that no session is held up."""
+"""The experimenter's view inside the application. A separate process feeds it, so that no session is delayed."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Watching:
         self._starting = False
 
     def open_here(self, path: str, ask: Callable[[Request], object]) -> None:
-        """At the participant's own screen: confirmed with the session's name, and noted in its log before it opens.
-        The key that opens it closes it."""
+        """Open on the participant's own screen: confirmed by the session's name, and logged before it opens. The
+        same key closes it."""
         if self._screen is not None and self._app.screen is self._screen:
             self.close()
             return
@@ -40,13 +40,13 @@ class Watching:
         confirm_view(self._app, Path(path).name, go_on)
 
     def confirm(self, path: str, ask: Callable[[Request], object]) -> None:
-        """Of a session at another screen."""
+        """Open the view of a session at another screen, after confirmation."""
         from study.tui.screens.confirm_view import confirm_view
 
         confirm_view(self._app, Path(path).name, lambda: self.open(path, ask))
 
     def open(self, path: str, ask: Callable[[Request], object]) -> None:
-        """Returns at once: the feed is started in a thread, because starting a process takes its time."""
+        """Returns at once: the feed is started in a thread, because starting a process takes time."""
         if self._starting or (self._screen is not None and self._screen in self._app.screen_stack):
             return
         self._starting = True
@@ -64,14 +64,14 @@ class Watching:
         threading.Thread(target=start, name="watch-start", daemon=True).start()
 
     def close(self) -> None:
-        """Leave the view; the session goes on."""
+        """Leave the view; the session continues."""
         screen, self._screen = self._screen, None
         while screen is not None and screen in self._app.screen_stack:
             self._app.pop_screen()
         self.end()
 
     def end(self) -> None:
-        """End the process that reads. Waiting for it is no work for the one that draws."""
+        """End the reading process in a thread, because waiting would block the drawing."""
         feed, self._feed = self._feed, None
         if feed is not None:
             threading.Thread(target=feed.close, name="watch-end", daemon=True).start()

@@ -1,1 +1,1 @@
-"""Parts of screens: each turns values into cells and knows no rules."""
+"""Parts of screens: each turns values into cells, without rules."""

@@ -1,10 +1,10 @@
-"""Frames for words: a card for a few, a sheet that scrolls for more. No wider than the eye can follow a line."""
+"""Frames for text: a card for a little, a sheet that scrolls for more. Limited to a readable width."""
 
 from textual.containers import Vertical, VerticalScroll
 
 
 class Card(Vertical):
-    """In the middle of a screen that aligns it there."""
+    """Centred by the screen's alignment."""
 
     DEFAULT_CSS = """
     Card {

@@ -1,4 +1,4 @@
-"""Exactly one of a few choices, side by side where they fit, else one below the other."""
+"""Exactly one of a few choices, side by side if they fit, otherwise listed vertically."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -17,7 +17,7 @@ GAP = 3
 
 
 class ChoiceRow(Widget, can_focus=True):
-    """Nothing is chosen beforehand, and moving over a choice does not choose it: an agreement must be meant."""
+    """Nothing is preselected, and moving over a choice does not select it: an agreement must be intended."""
 
     DEFAULT_CSS = """
     ChoiceRow { height: auto; width: 1fr; }
@@ -73,7 +73,7 @@ class ChoiceRow(Widget, can_focus=True):
             self._choose(index)
 
     def choice_at(self, x: int, y: int) -> int | None:
-        """The choice that is drawn in a cell; None between them."""
+        """The choice drawn in a cell; None between them."""
         for index, (left, row) in enumerate(self._places(self.size.width)):
             if row == y and left <= x < left + len(self._label(index)):
                 return index
@@ -81,7 +81,7 @@ class ChoiceRow(Widget, can_focus=True):
 
     @property
     def stacked(self) -> bool:
-        """Whether the choices lie below each other at this width."""
+        """Whether the choices are listed vertically at this width."""
         return len({y for _, y in self._places(self.size.width)}) > 1
 
     def action_move(self, step: int) -> None:
@@ -128,7 +128,7 @@ class ChoiceRow(Widget, can_focus=True):
         return [(sum(lengths[:index]) + GAP * index, 0) for index in range(len(lengths))]
 
     def _move_within(self, step: int) -> bool:
-        """Up and down go through choices that lie below each other, and at their ends to the next question."""
+        """Up and Down move through vertically listed choices, and beyond their ends to the next question."""
         there = move_mark(self.cursor, step, len(self._choices), stay=False) if self.stacked else None
         if there is None:
             return False

@@ -1,4 +1,4 @@
-"""One of the two answers: its number, its direction as a large segment, and the same in words."""
+"""One of the two answers: its number, its direction as a large segment, and in words."""
 
 from typing import Literal
 
@@ -15,7 +15,7 @@ from study.tui.drawing.number_picture import large_number
 
 NUMBERS = {1: ("╺┓ ", " ┃ ", "╺┻╸"), 2: ("┏━┓", "┏━┛", "┗━╸")}
 BESIDE = 5
-"""Columns to the left of the drawing that the number needs; as many stay free to its right."""
+"""Columns left of the drawing for the number; the same number stays free on the right."""
 
 Mark = Literal["", "taken", "saved", "now", "felt"]
 
@@ -65,7 +65,7 @@ class DirectionPanel(Widget):
         return Strip([Segment(text.ljust(width)[:width], coloured)], width)
 
     def _make_drawing(self) -> tuple[tuple[str, ...], int]:
-        """The rows, and how many columns are free to their left."""
+        """The rows, and the number of free columns to their left."""
         room = _room(self.size)
         if self.picture is None:
             drawing = large_number(self.number, room.width, room.height)
@@ -80,6 +80,6 @@ class DirectionPanel(Widget):
 
 
 def _room(size: Size) -> Size:
-    """A square in the eye: cells are twice as high as wide."""
+    """A visually square area: cells are twice as high as wide."""
     rows = max(1, min(size.height - 1, (size.width - 2 * BESIDE) // 2))
     return Size(2 * rows, rows)

@@ -1,4 +1,4 @@
-"""One field of a form: what is asked, and where the answer is seen. A picture: the form's screen has the keyboard."""
+"""One field of a form: the question and its answer. Display only: the form's screen has the focus."""
 
 from rich.text import Text
 from textual.app import ComposeResult

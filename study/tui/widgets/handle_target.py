@@ -1,4 +1,4 @@
-"""Where the handle is, and the ring in which a trial may start."""
+"""Position of the handle, and the circle in which a trial may start."""
 
 import math
 
@@ -13,7 +13,7 @@ from study.tui.drawing.braille import Canvas
 
 
 class HandleTarget(Widget):
-    """Right and up are right and up in the picture. A handle far away is drawn at the edge."""
+    """Right and up as in the picture. A handle far away is drawn at the edge."""
 
     DEFAULT_CSS = """
     HandleTarget { height: 1fr; min-height: 5; }

@@ -1,4 +1,4 @@
-"""Many lines of text to scroll through: only those in sight are drawn, and long ones break between words."""
+"""Many lines of text to scroll: only visible ones are drawn, and long ones wrap between words."""
 
 import re
 import textwrap
@@ -9,7 +9,7 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 _LEAD = re.compile(r".{1,16}?\s{2,}")
-"""A time or a name before the text: what is broken off stands below the text, not below its lead."""
+"""A time or name before the text: continuation lines are aligned with the text."""
 
 
 class LongText(ScrollView, can_focus=True):

@@ -1,4 +1,4 @@
-"""Who, what, on which device: the form that begins a session. What is wrong is said beside it while it is typed."""
+"""The form that begins a session: participant, protocol, device. Problems are shown while typing."""
 
 from typing import ClassVar
 
@@ -14,7 +14,7 @@ from study.tui.home_messages import BeginWanted
 
 SIMULATED = "simulated"
 NOTHING_YET = [("…", "")]
-"""Until the choices are known. Nothing can be chosen that is none of them."""
+"""Before the choices are known; cannot be selected."""
 
 
 class NewSessionForm(Vertical):
@@ -54,7 +54,7 @@ class NewSessionForm(Vertical):
         yield Button("Begin (F5)", variant="primary", compact=True, id="begin", disabled=True)
 
     def show(self, home: HomeView) -> None:
-        """Choices that were made stay made, as far as they are still there."""
+        """Show the choices; earlier selections are kept if still available."""
         self._home = home
         self._offer("#protocol", [(_protocol_prompt(p.name, p.locked), p.name) for p in home.protocols])
         self._offer("#device", [(_device_prompt(name), name) for name in home.devices])
@@ -116,7 +116,7 @@ class NewSessionForm(Vertical):
         return self.query_one("#code", Input).value.strip()
 
     def _standing_problem(self, code: str) -> str:
-        """What the list already knows against a code; the program that begins a session checks again."""
+        """What the list already says against a code; the program that begins a session checks again."""
         return next((f"{code} withdrew: this code is not given again." for line in self._sessions(code)
                      if line.standing == "withdrawn"), "")  # fmt: skip
 
@@ -172,5 +172,5 @@ def _file_name(path: str) -> str:
 
 
 def _name(protocol: str, home: HomeView | None) -> str:
-    """A file is named after its protocol as a rule; where it is not, the notice does not come."""
+    """A file is usually named after its protocol; otherwise the notice is not shown."""
     return protocol.replace("\\", "/").rpartition("/")[2].removesuffix(".toml")

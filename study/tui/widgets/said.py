@@ -1,4 +1,4 @@
-"""Text that is shown as it is: square brackets in it are no markup."""
+"""Text shown literally: square brackets are not markup."""
 
 from textual.widgets import Static
 

@@ -1,4 +1,4 @@
-"""One line above a trial: where in the session it stands, and how much of it is left."""
+"""One line above a trial: position in the session, and how much is left."""
 
 from rich.segment import Segment
 from rich.style import Style

@@ -1,4 +1,4 @@
-"""Past sessions, latest first: one row each, with what can be done with it as keys."""
+"""Past sessions, latest first: one row each, with actions as keys."""
 
 from collections.abc import Mapping
 from textwrap import wrap
@@ -18,16 +18,17 @@ from study.tui.standing_words import STYLES, standing_words
 
 _NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = "Session", "Standing", "Begun", "Runs", "Answers", "Protocol"
 _FIXED = {_STANDING: 12, _RUNS: 5, _ANSWERS: 7}
-"""Widths in cells, so that little has to be measured in a long list. The protocol has what is left, and wraps."""
+"""Widths in cells, so that little has to be measured in a long list. The protocol gets the remaining width, and
+wraps."""
 _LEAST_PROTOCOL, _PADDING = 10, 2
 
 AT_ONCE = 60
-"""Rows: more than any terminal shows."""
+"""Rows added at once: more than any terminal shows."""
 _BREATH_S = 0.01
 
 
 class SessionTable(DataTable[Content | str]):
-    """Rows are made when they are there to be seen: the table itself draws only those."""
+    """Rows are created in parts: the table draws only visible ones."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("enter", "select_cursor", "Open"),
@@ -36,7 +37,7 @@ class SessionTable(DataTable[Content | str]):
     ]
 
     class Looked(Message):
-        """Another session is under the cursor."""
+        """The cursor moved to another session."""
 
         def __init__(self, line: SessionLine) -> None:
             super().__init__()
@@ -50,7 +51,7 @@ class SessionTable(DataTable[Content | str]):
         self._fitted_to = 0
 
     def show(self, lines: tuple[SessionLine, ...]) -> None:
-        """The cursor stays on its session, as far as it is still there."""
+        """Show the sessions; the cursor stays on its session if that is still listed."""
         chosen = self._chosen
         self._lines = lines
         offset, self._begun = local_column([line.begun_utc for line in lines], machine_zone)
@@ -66,7 +67,8 @@ class SessionTable(DataTable[Content | str]):
             self.show(self._lines)
 
     def _fit_columns(self, begun: str) -> dict[str, int]:
-        """By title. Answers, and then runs, give way to the protocol: the sentence below the list has them too."""
+        """Column widths by title. Answers, then runs, are dropped in favour of the protocol: the sentence below the
+        list contains them."""
         self._fitted_to = self.size.width
         names, protocols = ([getattr(line, which) for line in self._lines] for which in ("name", "protocol"))
         widths = {_NAME: max(map(len, (_NAME, *names))), _STANDING: _FIXED[_STANDING]}
@@ -78,12 +80,12 @@ class SessionTable(DataTable[Content | str]):
         return widths | {_PROTOCOL: min(wanted, max(_LEAST_PROTOCOL, self._room(widths)))}
 
     def _room(self, widths: Mapping[str, int]) -> int:
-        """What other columns leave to the protocol, beside the bar that scrolls."""
+        """Width left for the protocol beside the other columns and the scroll bar."""
         bar = self.styles.scrollbar_size_vertical if len(self._lines) >= self.size.height else 0
         return self.size.width - bar - sum(widths.values()) - _PADDING * (len(widths) + 1)
 
     def _add_more(self, lines: tuple[SessionLine, ...], chosen: str) -> None:
-        """A long list comes in parts, so that keys are heard in between."""
+        """Add a long list in parts, so that keys are handled in between."""
         if lines is not self._lines:
             return  # a newer list came meanwhile
         have = self.row_count
@@ -116,7 +118,7 @@ class SessionTable(DataTable[Content | str]):
             self.post_message(WatchWanted(self._chosen.path))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Not in the footer where it does nothing for the session under the cursor."""
+        """The footer shows only actions that apply to the session under the cursor."""
         wanted = {"resume": "unfinished", "watch": "running"}.get(action)
         return wanted is None or (self._chosen is not None and self._chosen.standing == wanted)
 

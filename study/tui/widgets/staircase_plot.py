@@ -1,4 +1,4 @@
-"""One staircase: its title, its picture in whatever room there is, and the run in a sentence."""
+"""One staircase: its title, its picture in the available space, and the run in a sentence."""
 
 import itertools
 
@@ -34,7 +34,7 @@ class StaircasePlot(Widget):
 
 
 def _apply_styles(line: str) -> Content:
-    """Marks of one kind beside each other are one piece: fewer pieces are drawn faster."""
+    """Style runs of equal marks as one piece: fewer pieces are drawn faster."""
     parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], MUTED)]
     for style, characters in itertools.groupby(line[LABEL_COLUMNS:], key=_STYLES.get):
         text = "".join(characters)

@@ -1,4 +1,4 @@
-"""A table that is only read: its header in bold, as wide as it needs, so put it where it can be scrolled."""
+"""A read-only table: bold header, as wide as needed, to be placed in a scrollable container."""
 
 from textual.content import Content
 from textual.widgets import Static
