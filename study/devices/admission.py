@@ -61,7 +61,7 @@ def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
     _within("spring_frequency_hz", settings.spring_frequency_hz, 10.0, zero=True)
     _within("spring_damping_n_s_per_m", settings.spring_damping_n_s_per_m, 20.0, zero=True)
     if not all(math.isfinite(component) for component in settings.place_m):
-        raise _refused_settings(f"place_m is {settings.place_m}; it must be three numbers, in metres.")
+        raise _settings_error(f"place_m is {settings.place_m}; it must be three numbers, in metres.")
 
 
 def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: DeviceSettings) -> None:
@@ -79,10 +79,10 @@ def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: Devic
 def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> None:
     """Raises `DeviceError` for a loop that cannot be held within the limits."""
     if stimulus.fade_shape not in FADE_SHAPES:
-        raise _refused(f"its fade shape is {stimulus.fade_shape!r}; known are {' and '.join(FADE_SHAPES)}")
+        raise _refusal(f"its fade shape is {stimulus.fade_shape!r}; known are {' and '.join(FADE_SHAPES)}")
     for name, seconds in (("fade_in_s", stimulus.fade_in_s), ("fade_out_s", stimulus.fade_out_s)):
         if not 0 <= seconds <= 10:
-            raise _refused(f"its {name} is {seconds}; it must lie between 0 and 10 s")
+            raise _refusal(f"its {name} is {seconds}; it must lie between 0 and 10 s")
     _check_forces(stimulus.loop, limits, rate_hz)
     samples = stimulus.loop.samples
     _check_steps(np.diff(samples, axis=0, append=samples[:1]), limits, rate_hz)
@@ -99,22 +99,22 @@ def check_commands(commands: Signal, limits: Limits, rate_hz: float) -> None:
 
 def _check_forces(force: Signal, limits: Limits, rate_hz: float) -> None:
     if force.sample_rate_hz != rate_hz:
-        raise _refused(f"it was made for {force.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz")
+        raise _refusal(f"it was made for {force.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz")
     if force.samples.shape[1] != 3 or not len(force):
-        raise _refused(f"its samples have the shape {force.samples.shape}; it must be (n, 3) with n > 0")
+        raise _refusal(f"its samples have the shape {force.samples.shape}; it must be (n, 3) with n > 0")
     if (force.quantity, force.unit) != ("force", "N"):
-        raise _refused(f"it is {force.quantity} in {force.unit}; it must be force in N")
+        raise _refusal(f"it is {force.quantity} in {force.unit}; it must be force in N")
     if not np.isfinite(force.samples).all():
-        raise _refused("some of its samples are not numbers")
+        raise _refusal("some of its samples are not numbers")
     peak_n = float(np.linalg.norm(force.samples, axis=1).max())
     if peak_n > limits.stimulus_cap_n * TOLERANCE:
-        raise _refused(f"it reaches {peak_n:.4g} N; the cap of the stimulus is {limits.stimulus_cap_n:g} N")
+        raise _refusal(f"it reaches {peak_n:.4g} N; the cap of the stimulus is {limits.stimulus_cap_n:g} N")
 
 
 def _check_steps(steps: FloatArray, limits: Limits, rate_hz: float) -> None:
     steepest = float(np.linalg.norm(steps, axis=1).max()) * rate_hz
     if steepest > limits.slew_n_per_s * TOLERANCE:
-        raise _refused(f"it changes by {steepest:.4g} N/s; the slew limit is {limits.slew_n_per_s:g} N/s")
+        raise _refusal(f"it changes by {steepest:.4g} N/s; the slew limit is {limits.slew_n_per_s:g} N/s")
 
 
 def _check_info(info: DeviceInfo) -> None:
@@ -135,7 +135,7 @@ def _check_info(info: DeviceInfo) -> None:
 def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
     limits, beyond = settings.limits, settings.beyond_hand_ceiling
     if beyond and settings.hand_on_handle:
-        raise _refused_settings("beyond_hand_ceiling is set while a hand is on the handle.")
+        raise _settings_error("beyond_hand_ceiling is set while a hand is on the handle.")
     ceiling_n = info.max_force_n if beyond else min(info.max_force_n, HAND_TOTAL_CAP_N)
     stimulus_ceiling_n = ceiling_n if beyond else min(ceiling_n, HAND_STIMULUS_CAP_N)
     _within("total_cap_n", limits.total_cap_n, ceiling_n)
@@ -146,10 +146,10 @@ def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
 def _within(name: str, value: float, highest: float, *, zero: bool = False) -> None:
     if not (0 < value <= highest or (zero and value == 0)):
         allowed = "at least 0" if zero else "above 0"
-        raise _refused_settings(f"{name} is {value:g}; it must be {allowed} and at most {highest:g}.")
+        raise _settings_error(f"{name} is {value:g}; it must be {allowed} and at most {highest:g}.")
 
 
-def _refused_settings(happened: str) -> DeviceError:
+def _settings_error(happened: str) -> DeviceError:
     return DeviceError(
         "The device was not opened: its limits are not safe",
         happened,
@@ -157,7 +157,7 @@ def _refused_settings(happened: str) -> DeviceError:
     )
 
 
-def _refused(why: str) -> DeviceError:
+def _refusal(why: str) -> DeviceError:
     return DeviceError(
         "The device did not play this: it is not within the limits",
         f"Nothing has moved. The stimulus was refused because {why}.",

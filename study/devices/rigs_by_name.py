@@ -16,15 +16,15 @@ from study.errors import DeviceError
 
 def simulated_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
     """Raises `DeviceError` for a place where there is no workspace."""
-    return _simulated(settings, seed, friction=True)
+    return _build_simulated(settings, seed, friction=True)
 
 
 def frictionless_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
     """As `simulated_rig`."""
-    return _simulated(settings, seed, friction=False)
+    return _build_simulated(settings, seed, friction=False)
 
 
-def _simulated(settings: DeviceSettings, seed: int, friction: bool) -> CompiledRig:
+def _build_simulated(settings: DeviceSettings, seed: int, friction: bool) -> CompiledRig:
     try:
         return build_omega3(seed=seed, hand=settings.hand_on_handle, place_m=settings.place_m, friction=friction)
     except ValueError as error:

@@ -79,7 +79,7 @@ class SafeDevice:
     def release(self) -> Played:
         stimulus = self._held
         if stimulus is None:
-            raise _refused("Nothing is held, so nothing can be released.", "Call hold first.")
+            raise _refusal("Nothing is held, so nothing can be released.", "Call hold first.")
         self._governor.ask_release()
         self._wait_until_still(stimulus.fade_out_s)
         self._held = None
@@ -169,10 +169,10 @@ class SafeDevice:
 
     def _must_be_idle(self) -> None:
         if self._closing:
-            raise _refused("The device is closed.", "Open it again.")
+            raise _refusal("The device is closed.", "Open it again.")
         self._must_be_there()
         if self._governor.stop_asked:
-            raise _refused("The emergency stop was pressed.", "Make sure that all is well, then open the device again.")
+            raise _refusal("The emergency stop was pressed.", "Make sure that all is well, then open the device again.")
         if self._held is not None:
             raise _still_playing()
 
@@ -220,8 +220,8 @@ class SafeDevice:
 
 
 def _still_playing() -> DeviceError:
-    return _refused("It is still playing.", "Call release first.")
+    return _refusal("It is still playing.", "Call release first.")
 
 
-def _refused(happened: str, do_now: str) -> DeviceError:
+def _refusal(happened: str, do_now: str) -> DeviceError:
     return DeviceError("The device cannot do this now", happened, do_now)

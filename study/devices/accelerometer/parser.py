@@ -105,9 +105,9 @@ class PacketParser:
         self._rest = stream[keep_from:].copy()
         packets = _packets_at(stream, starts)
         spoiled = keep_from - SIZE * len(starts)
-        return self._counted_on(packets, spoiled)
+        return self._unwrap_counters(packets, spoiled)
 
-    def _counted_on(self, packets: npt.NDArray[np.void], spoiled: int) -> Samples:
+    def _unwrap_counters(self, packets: npt.NDArray[np.void], spoiled: int) -> Samples:
         sequence = packets["sequence"].astype(np.int64)
         time_us = packets["time_us"].astype(np.int64)
         before = self._last if self._last is not None or not len(packets) else (int(sequence[0]) - 1, int(time_us[0]))

@@ -25,7 +25,7 @@ def calibrate_on_table(path: str, baud: int, before_each: Callable[[str], None],
     """
     port = open_serial(path, baud)
     try:
-        calibration = calibrate(tuple(_lying(port, position, before_each, rest_s) for position in POSITIONS))
+        calibration = calibrate(tuple(_record_position(port, position, before_each, rest_s) for position in POSITIONS))
     except ValueError as error:
         raise DeviceError("The accelerometer was not calibrated", f"{error}.", "Do it again.") from error
     finally:
@@ -52,7 +52,7 @@ def toml_of(calibration: Calibration, path: str, baud: int) -> str:
     )
 
 
-def _lying(port: Port, position: str, before_each: Callable[[str], None], rest_s: float) -> FloatArray:
+def _record_position(port: Port, position: str, before_each: Callable[[str], None], rest_s: float) -> FloatArray:
     """Raw samples (n, 3)."""
     before_each(position)
     while len(port.read(AT_ONCE)) == AT_ONCE:

@@ -20,7 +20,7 @@ def played_loop(governor: Governor, info: DeviceInfo) -> Played:
         return Played(recording=None, health=governor.health())
     amplitude_n = float(np.linalg.norm(loop, axis=1).max())
     segment = Segment(start=0, stop=kept, kind="sine", amplitude=amplitude_n, period=len(loop))
-    return _played(rows[-kept:], governor, info, (segment,))
+    return _make_played(rows[-kept:], governor, info, (segment,))
 
 
 def played_once(governor: Governor, info: DeviceInfo) -> Played:
@@ -28,10 +28,10 @@ def played_once(governor: Governor, info: DeviceInfo) -> Played:
     health = governor.health()
     if health.fault is not Fault.NONE or len(governor.rows()) < len(governor.loop):
         return Played(recording=None, health=health)
-    return _played(governor.rows(), governor, info, ())
+    return _make_played(governor.rows(), governor, info, ())
 
 
-def _played(rows: FloatArray, governor: Governor, info: DeviceInfo, segments: tuple[Segment, ...]) -> Played:
+def _make_played(rows: FloatArray, governor: Governor, info: DeviceInfo, segments: tuple[Segment, ...]) -> Played:
     rate_hz = info.sample_rate_hz
     acceleration = ("acceleration", "m/s^2", ("ax", "ay", "az"))
     force = ("force", "N", ("fx", "fy", "fz"))

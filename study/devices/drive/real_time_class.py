@@ -66,7 +66,7 @@ class _Users:
 
     def enter(self) -> Granted:
         with self._lock:
-            granted, undo = _asked_for()  # each anew: the class is a thread's, and memory was mapped since
+            granted, undo = _request_class()  # each anew: the class is a thread's, and memory was mapped since
             if self._count == 0:
                 self._switch_s = sys.getswitchinterval()
                 sys.setswitchinterval(min(SWITCH_S, self._switch_s))
@@ -128,7 +128,7 @@ def _may_starve_others() -> bool:
         return False
 
 
-def _asked_for() -> tuple[Granted, Callable[[], None]]:
+def _request_class() -> tuple[Granted, Callable[[], None]]:
     """And what takes back what the thread's end does not."""
     if platform.system() == "Linux":
         return _of_linux(ctypes.CDLL(None, use_errno=True))

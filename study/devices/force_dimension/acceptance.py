@@ -53,16 +53,16 @@ def check_accepted(info: DeviceInfo, today: date) -> None:
         accepted_on = date.fromisoformat(document["accepted_on"])
         known = (document["format"], document["version"], document["device"], document["details"])
     except FileNotFoundError:
-        raise _locked(info, f"There is no acceptance of it ({path})") from None
+        raise _lock_error(info, f"There is no acceptance of it ({path})") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise _locked(info, f"{path} is no acceptance ({type(error).__name__})") from error
+        raise _lock_error(info, f"{path} is no acceptance ({type(error).__name__})") from error
     if known != (FORMAT, VERSION, info.name, info.details):
-        raise _locked(info, f"Another was accepted ({known[2]}, {known[3]}); this is {info.name}, {info.details}")
+        raise _lock_error(info, f"Another was accepted ({known[2]}, {known[3]}); this is {info.name}, {info.details}")
     if not accepted_on <= today <= accepted_on + VALID_FOR:
-        raise _locked(info, f"It was accepted on {accepted_on}; that holds for {VALID_FOR.days} days")
+        raise _lock_error(info, f"It was accepted on {accepted_on}; that holds for {VALID_FOR.days} days")
 
 
-def _locked(info: DeviceInfo, happened: str) -> DeviceError:
+def _lock_error(info: DeviceInfo, happened: str) -> DeviceError:
     option = info.name.replace(".", "")
     return DeviceError(
         f"The {info.name} is locked for hands",

@@ -40,16 +40,16 @@ def prove_force_goes(device: Device, rig: Silenced) -> float:
     device.hold(_push(device.info.sample_rate_hz))
     _attend(device, HELD_S)
     if device.fault() is not Fault.NONE or not rig.force_on():
-        raise _failed(f"The force did not last: {device.fault().value}.")
+        raise _not_accepted_error(f"The force did not last: {device.fault().value}.")
     if device.health().peak_command_n < REACHED * FORCE_N:
-        raise _failed(f"The force only reached {device.health().peak_command_n:.2f} N.")
+        raise _not_accepted_error(f"The force only reached {device.health().peak_command_n:.2f} N.")
     silent_since_s = rig.withhold(WITHHELD_S)
     limit_s = rig.drops_force_after_s + MARGIN_S
     while rig.force_on():
         if time.monotonic() - silent_since_s > limit_s and rig.force_on():
             rig.withhold(0.0)
             device.stop()
-            raise _failed(f"The force was still there {1000 * limit_s:.0f} ms after the last command.")
+            raise _not_accepted_error(f"The force was still there {1000 * limit_s:.0f} ms after the last command.")
         time.sleep(EVERY_S)
     gone_after_s = time.monotonic() - silent_since_s
     device.release()
@@ -69,7 +69,7 @@ def _attend(device: Device, seconds: float) -> None:
         device.keep_alive()
 
 
-def _failed(happened: str) -> DeviceError:
+def _not_accepted_error(happened: str) -> DeviceError:
     return DeviceError(
         "The device was not accepted",
         happened,

@@ -65,14 +65,14 @@ class Library:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._functions = _bound(_loaded(path), path)
+        self._functions = _bind(_load(path), path)
         self.version = self._version()
         if self.version[:3] < OLDEST_SDK:
-            raise _too_old(f"{path} is version {_dotted(self.version)}")
+            raise _too_old(f"{path} is version {_version_words(self.version)}")
 
     @property
     def version_text(self) -> str:
-        return _dotted(self.version)
+        return _version_words(self.version)
 
     def function(self, name: str) -> Callable[..., Any]:
         """Unchecked, for calls at every tick: what it returns is for `checked` to judge."""
@@ -97,7 +97,7 @@ class Library:
         return major, minor, release, revision
 
 
-def _loaded(path: Path) -> ctypes.CDLL:
+def _load(path: Path) -> ctypes.CDLL:
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
@@ -109,7 +109,7 @@ def _loaded(path: Path) -> ctypes.CDLL:
         ) from error
 
 
-def _bound(loaded: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
+def _bind(loaded: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
     missing = [name for name in SIGNATURES if not hasattr(loaded, name)]
     if missing:
         raise _too_old(f"{path} has no {', '.join(missing)}")
@@ -121,7 +121,7 @@ def _bound(loaded: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
     return functions
 
 
-def _dotted(version: tuple[int, ...]) -> str:
+def _version_words(version: tuple[int, ...]) -> str:
     return ".".join(map(str, version))
 
 
@@ -129,5 +129,5 @@ def _too_old(happened: str) -> DeviceError:
     return DeviceError(
         "The device's library is too old",
         f"{happened}.",
-        f"Install the vendor's SDK {_dotted(OLDEST_SDK)} or newer, and set FDSDK to its folder.",
+        f"Install the vendor's SDK {_version_words(OLDEST_SDK)} or newer, and set FDSDK to its folder.",
     )

@@ -84,11 +84,11 @@ class ForceDimensionRig:
             if self._reads % LOOK_EVERY == 0:
                 self._look()
         except LibraryError as error:
-            raise self._failed(f"The library says: {error}") from error
+            raise self._fail(f"The library says: {error}") from error
         self._reads += 1
         self._stale = self._stale + 1 if repeated else 0
         if self._stale >= STALE_FOR:
-            raise self._failed(f"It repeated its last position {self._stale} times")
+            raise self._fail(f"It repeated its last position {self._stale} times")
         reading[SENSOR_CLIPPED] = 0.0
         if self._accelerometer is not None:
             reading[ACCELERATION], clipped = self._accelerometer.latest()
@@ -108,14 +108,14 @@ class ForceDimensionRig:
             return
         if not norm <= self._cap_n * ROUNDING:
             self._write_zero()
-            raise self._failed(f"A force of {norm:g} N was refused; at most {self._cap_n:g} N may be sent")
+            raise self._fail(f"A force of {norm:g} N was refused; at most {self._cap_n:g} N may be sent")
         if self._failure is not None:
             raise self._failure
         if not self._sending.acquire(timeout=LOCK_S):
-            raise self._failed("An earlier force is still being sent")
+            raise self._fail("An earlier force is still being sent")
         try:
             if self._closed.is_set():
-                raise self._failed("It is closed")
+                raise self._fail("It is closed")
             self._send(x, y, z)
         finally:
             self._sending.release()
@@ -131,7 +131,7 @@ class ForceDimensionRig:
         try:
             return self._handle.status().force_on
         except LibraryError as error:
-            raise self._failed(f"The library says: {error}") from error
+            raise self._fail(f"The library says: {error}") from error
 
     def close(self) -> None:
         self._withheld_until_s = 0.0
@@ -152,11 +152,11 @@ class ForceDimensionRig:
                 self._wake()
             scaled = self._handle.set_force(x, y, z)
         except LibraryError as error:
-            raise self._failed(f"The library says: {error}") from error
+            raise self._fail(f"The library says: {error}") from error
         self._sent_s, self._sent_zero = time.monotonic(), x == y == z == 0.0
         self._scaled = self._scaled + 1 if scaled else 0
         if self._scaled >= SCALED_FOR:
-            raise self._failed("Its motors cannot give the force that is asked for, and give less")
+            raise self._fail("Its motors cannot give the force that is asked for, and give less")
 
     def _write_zero(self) -> None:
         """Past everything: neither a lock nor an earlier failure may hold up a zero. It wakes no sleeping device."""
@@ -167,12 +167,12 @@ class ForceDimensionRig:
             self._handle.set_force(0.0, 0.0, 0.0)
             if not self._sent_zero and self._silent_for_too_long() and not (status := self._handle.status()).force_on:
                 # A force was cut off: its call may hang still, and must find a device that takes none.
-                self._failed(f"It let its force go: {status.why_off}")
+                self._fail(f"It let its force go: {status.why_off}")
             self._sent_zero, self._scaled = True, 0
             if not self._silent_for_too_long():
                 self._sent_s = time.monotonic()
         except LibraryError as error:
-            raise self._failed(f"The library says: {error}") from error
+            raise self._fail(f"The library says: {error}") from error
         finally:
             if got:
                 self._sending.release()
@@ -185,7 +185,7 @@ class ForceDimensionRig:
         self._pressed = frozenset(bit for bit in range(32) if mask >> bit & 1)
         status = self._handle.status()
         if not status.force_on and not (self._sent_zero and status.off_cause == WATCHDOG_CAUSE):
-            raise self._failed(f"It let its force go: {status.why_off}")
+            raise self._fail(f"It let its force go: {status.why_off}")
 
     def _wake(self) -> None:
         """After a silence that was longer than the watchdog. In the middle of a force that is an end; with none it is
@@ -194,7 +194,7 @@ class ForceDimensionRig:
         if status.force_on:
             return
         if not (self._sent_zero and status.off_cause == WATCHDOG_CAUSE):
-            raise self._failed(f"It let its force go: {status.why_off}")
+            raise self._fail(f"It let its force go: {status.why_off}")
         self._handle.enable_force()
 
     def _rest(self) -> None:
@@ -208,7 +208,7 @@ class ForceDimensionRig:
                     except DeviceError:
                         return
 
-    def _failed(self, happened: str) -> DeviceError:
+    def _fail(self, happened: str) -> DeviceError:
         """The first failure stays: the next call says the same."""
         if self._failure is None:
             self._failure = DeviceError(

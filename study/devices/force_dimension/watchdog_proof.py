@@ -26,13 +26,15 @@ def prove_watchdog(
     Raises `DeviceError` where it holds on, and `LibraryError`.
     """
     if drops_after_s <= 0:
-        raise _unproven("It has no watchdog, or none that can be set.")
-    if not any(_armed(handle, now_s, sleep) for _ in range(ATTEMPTS)):
-        raise _unproven(f"It does not keep taking forces: {handle.status().why_off}.")
+        raise _proof_error("It has no watchdog, or none that can be set.")
+    if not any(_send_zeros(handle, now_s, sleep) for _ in range(ATTEMPTS)):
+        raise _proof_error(f"It does not keep taking forces: {handle.status().why_off}.")
     silent_since_s = now_s()
     while (status := handle.status()).force_on:
         if now_s() - silent_since_s > drops_after_s + MARGIN_S and handle.status().force_on:
-            raise _unproven(f"{1000 * (now_s() - silent_since_s):.0f} ms after the last command it still takes forces.")
+            raise _proof_error(
+                f"{1000 * (now_s() - silent_since_s):.0f} ms after the last command it still takes forces."
+            )
         sleep(EVERY_S)
     took_s = now_s() - silent_since_s
     _check_reason(status)
@@ -40,7 +42,7 @@ def prove_watchdog(
     return took_s
 
 
-def _armed(handle: Handle, now_s: Callable[[], float], sleep: Callable[[float], None]) -> bool:
+def _send_zeros(handle: Handle, now_s: Callable[[], float], sleep: Callable[[float], None]) -> bool:
     """Zero forces for a while. Whether the device takes them to the end."""
     handle.enable_force()
     until_s = now_s() + ARMED_FOR_S
@@ -53,12 +55,12 @@ def _armed(handle: Handle, now_s: Callable[[], float], sleep: Callable[[float], 
 
 def _check_reason(status: Status) -> None:
     if status.off_cause != WATCHDOG_CAUSE:
-        raise _unproven(f"It let go for another reason: {status.why_off}.")
+        raise _proof_error(f"It let go for another reason: {status.why_off}.")
     if not status.braking:
-        raise _unproven("It let go without its brakes.")
+        raise _proof_error("It let go without its brakes.")
 
 
-def _unproven(happened: str) -> DeviceError:
+def _proof_error(happened: str) -> DeviceError:
     return DeviceError(
         "The device's watchdog is not proved",
         f"{happened} If this program died, the device would hold its last force.",

@@ -85,7 +85,7 @@ def _hear(state: FloatArray, settings: FloatArray) -> None:
 
 
 @part
-def _risen(ticks: float, length: float, raised_cosine: float) -> float:
+def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
     """From 0 at 0 ticks to 1 at `length`."""
     if ticks >= length:
         return 1.0
@@ -101,10 +101,10 @@ def _gains(state: FloatArray) -> tuple[float, float]:
     """Of stimulus and spring, at this tick. A release in the middle of a fade-in starts from where that was."""
     tick, cosine = state[TICK], state[RAISED_COSINE]
     if state[PHASE] == PLAYING:
-        state[STIMULUS_GAIN] = _risen(tick, state[FADE_IN], cosine)
-        state[SPRING_GAIN] = _risen(tick - state[START], state[SPRING_RAMP], cosine)
+        state[STIMULUS_GAIN] = _fade_share(tick, state[FADE_IN], cosine)
+        state[SPRING_GAIN] = _fade_share(tick - state[START], state[SPRING_RAMP], cosine)
         return state[STIMULUS_GAIN], state[SPRING_GAIN]
-    left = 1.0 - _risen(tick - state[RELEASED_AT], state[FADE_OUT], cosine)
+    left = 1.0 - _fade_share(tick - state[RELEASED_AT], state[FADE_OUT], cosine)
     return left * state[STIMULUS_GAIN], left * state[SPRING_GAIN]
 
 

@@ -77,7 +77,7 @@ def replay_rig(path: Path) -> CompiledRig:
     try:
         recording = read_recording(path)
     except StudyError as problem:
-        raise _refused(f"{problem.title}: {problem.happened}") from problem
+        raise _refusal(f"{problem.title}: {problem.happened}") from problem
     readings, excitation = _readings(recording, path), _excitation(recording, path)
     rate_hz, state = recording.sample_rate_hz, np.zeros(OVER + 1)
     state[LENGTH] = len(readings)
@@ -123,9 +123,9 @@ def _readings(recording: Recording, path: Path) -> FloatArray:
     """(n, READING_SIZE). Where the sensor clipped is not known any more."""
     position, response = recording.position, recording.response
     if position is None or position.samples.shape[1] != 3 or set(position.units) != {"m"}:
-        raise _refused(f"{path.name} has no position of a handle, three channels in metres.")
+        raise _refusal(f"{path.name} has no position of a handle, three channels in metres.")
     if response.samples.shape[1] != 3 or set(response.units) != {"m/s^2"}:
-        raise _refused(f"{path.name} has no acceleration of a handle as its response, three channels in m/s^2.")
+        raise _refusal(f"{path.name} has no acceleration of a handle as its response, three channels in m/s^2.")
     readings = np.zeros((len(recording), READING_SIZE))
     readings[:, POSITION] = position.samples
     readings[:, ACCELERATION] = readings[:, TRUE_ACCELERATION] = response.samples
@@ -141,11 +141,11 @@ def _noise_mps2(acceleration: FloatArray) -> float:
 def _excitation(recording: Recording, path: Path) -> FloatArray:
     decided: Signal = recording.command if recording.excitation is None else recording.excitation
     if decided.samples.shape[1] != 3 or set(decided.units) != {"N"}:
-        raise _refused(f"{path.name} has no force on a handle as its command, three channels in N.")
+        raise _refusal(f"{path.name} has no force on a handle as its command, three channels in N.")
     return np.nan_to_num(np.asarray(decided.samples, dtype=np.float64))
 
 
-def _refused(happened: str) -> DeviceError:
+def _refusal(happened: str) -> DeviceError:
     return DeviceError(
         "This cannot be replayed", happened, f"Give a recording of `hapteq record`, as --device {REPLAY}FILE.h5."
     )
