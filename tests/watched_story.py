@@ -19,7 +19,7 @@ from study.session.state.due_trial import Present
 from study.session.state.machine import Finish, Rest, next_action
 from study.session.watching.live import Live
 from study.session.watching.watched import Watched, begin_watching, follow
-from study.session.watching.watching import Beside, watch_view
+from study.session.watching.watching import LiveInfo, watch_view
 
 BEGAN = datetime(2026, 11, 22, 10, 0, tzinfo=UTC)
 
@@ -114,7 +114,7 @@ class Story:
         return self.tell(SessionClosed(at(self.seconds + 4), "completed"))
 
     def view(self, live: Live | None = None, later: float = 4.0, before=None, writer: bool | None = None):
-        return watch_view(self.watched, Beside(live, writer), at(self.seconds + later), before)
+        return watch_view(self.watched, LiveInfo(live, writer), at(self.seconds + later), before)
 
     def live(self, activity="trial", age_s: float = 0.1, since_s: float = 1.0, later: float = 4.0, **changes) -> Live:
         now = self.seconds + later

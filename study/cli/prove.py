@@ -12,7 +12,7 @@ from study.cli.seed import check_seed
 
 if TYPE_CHECKING:
     from study.evaluation.bank.seal_cases import BankPlan
-    from study.evaluation.bank.sealed_bank import Wishes
+    from study.evaluation.bank.sealed_bank import BankOptions
 
 Found = TypeVar("Found")
 
@@ -40,25 +40,25 @@ def prove(
     from study.evaluation.bank.proof_summary import proof_lines, summary
     from study.evaluation.bank.prove import prove as proved
     from study.evaluation.bank.seal_cases import BankPlan
-    from study.evaluation.bank.sealed_bank import Wishes
+    from study.evaluation.bank.sealed_bank import BankOptions
     from study.evaluation.bank.write_proof import write_proof, write_table
 
-    plan, wishes = BankPlan(seed, cases, brief), Wishes(workers, keep, controls)
+    plan, options = BankPlan(seed, cases, brief), BankOptions(workers, keep, controls)
     if laws:
-        _prove_laws(out, plan, wishes, table, as_json)
+        _prove_laws(out, plan, options, table, as_json)
         return
-    proof = _with_steps(lambda said: proved(out, plan, wishes, said))
+    proof = _with_steps(lambda said: proved(out, plan, options, said))
     write_proof(proof)
     if table is not None:
         write_table(table, proof)
     typer.echo(json.dumps(summary(proof), indent=2) if as_json else "\n".join(proof_lines(proof)))
 
 
-def _prove_laws(out: Path, plan: "BankPlan", wishes: "Wishes", table: Path | None, as_json: bool) -> None:
+def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path | None, as_json: bool) -> None:
     from study.evaluation.bank.laws.prove_laws import prove_laws
     from study.evaluation.bank.laws.write_laws import law_lines, law_summary, write_law_table, write_laws
 
-    proof = _with_steps(lambda said: prove_laws(out, plan, wishes, said))
+    proof = _with_steps(lambda said: prove_laws(out, plan, options, said))
     write_laws(proof)
     if table is not None:
         write_law_table(table, proof)

@@ -27,7 +27,7 @@ from study.importing.time_base import NUMBERED_HZ, time_base
 _NAMED = 3
 
 
-class Said:
+class ImportNotes:
     """Sentences about an import, each told once: what holds for all parts is not repeated for each."""
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ def build_recording(
 ) -> Built:
     """on_progress: share done, 0 to 1. Raises CannotReadError, ImportRefusedError."""
     what = files[0].name if len(files) == 1 else f"{files[0].name} with {len(files) - 1} more"
-    said = Said()
+    said = ImportNotes()
     try:
         units = _units(wanted)
         planned = part_files(wanted, files)
@@ -99,7 +99,7 @@ class _Counter:
         self.on_progress(min(1.0, self.done / self.steps))
 
 
-def _part(wanted: ImportMap, files: PartFiles, said: Said, counter: _Counter, budget: Budget) -> _Part:
+def _part(wanted: ImportMap, files: PartFiles, said: ImportNotes, counter: _Counter, budget: Budget) -> _Part:
     read: dict[Path, Arrays] = {}
     loggers = []
     for clock in wanted.clock:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from study.importing.arrays.arrays import Arrays
 from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap
-from study.importing.map_format.signal_words import Named, name_signal, open_roles, plain_names, roles_of
+from study.importing.map_format.signal_words import ParsedName, name_signal, open_roles, plain_names, roles_of
 
 _TIME = re.compile(r"(t|time|zeit|temps)(_?(s|ms|us))?", re.IGNORECASE)
 
@@ -47,18 +47,18 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
     )
 
 
-def _columns(arrays: Arrays) -> tuple[list[Named], list[Named]]:
+def _columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
     """Stamps with their unit, and all others."""
     columns = [name_signal(header) for header in arrays.by_name]
     times = [column for column in columns if column.unit and _is_time(column) and column.quantity == "time"]
     return times, [column for column in columns if column not in times]
 
 
-def _is_time(column: Named) -> bool:
+def _is_time(column: ParsedName) -> bool:
     return bool(_TIME.fullmatch(column.name))
 
 
-def _open_time(times: Sequence[Named], rest: Sequence[Named]) -> Iterator[str]:
+def _open_time(times: Sequence[ParsedName], rest: Sequence[ParsedName]) -> Iterator[str]:
     bare = [column.header for column in rest if _is_time(column)]
     if len(times) > 1:
         yield f"which of {' and '.join(repr(column.header) for column in times)} is the time is open"

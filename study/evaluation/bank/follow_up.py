@@ -38,13 +38,13 @@ def follow_up(
     folder: ProofFolder,
     plan: BankPlan,
     outcomes: Sequence[Outcome],
-    wishes: tuple[int, bool],
+    options: tuple[int, bool],
     on_done: Callable[[int, int], None],
 ) -> tuple[FollowUp, ...]:
-    """Follow up single-effect cases with several returned effects. wishes: number of processes, and whether
+    """Follow up single-effect cases with several returned effects. options: number of processes, and whether
     recordings are kept after they are answered. Resumable: after an interruption the same call continues. Raises
     StudyError."""
-    workers, keep = wishes
+    workers, keep = options
     starts = [
         outcome for outcome in outcomes if outcome.kind == "single" and len(outcome.returned) > len(outcome.named) > 0
     ]

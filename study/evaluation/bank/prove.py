@@ -16,7 +16,7 @@ from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proo
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.bank.seal_cases import BankPlan, drawable_cases, read_case_names, redraw_recording, seal_cases
-from study.evaluation.bank.sealed_bank import Progress, Wishes, answer_bank, engines, resumable, reveal_bank
+from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank, engines, resumable, reveal_bank
 
 
 def reveal_cases(folder: ProofFolder, cases: int) -> tuple[Outcome, ...]:
@@ -68,23 +68,23 @@ class Proof:
     """Cases of the second physics engine, where it is not installed."""
 
 
-def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> Proof:
+def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> Proof:
     """Run or continue the bank in the folder `path`. Resumable. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
     numbers = [each.number for each in drawable_cases(plan)]
     with resumable(path):
-        seal = seal_cases(folder, plan, wishes.workers, lambda done: on_progress("sealing", done, len(numbers)))
+        seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = read_case_names(folder, numbers)
-        _answer_cases(folder, plan, wishes, dict(zip(names, numbers, strict=True)), on_progress)
+        _answer_cases(folder, plan, options, dict(zip(names, numbers, strict=True)), on_progress)
         outcomes = reveal_cases(folder, plan.cases)
         followed = follow_up(
             folder,
             plan,
             outcomes,
-            (wishes.workers, wishes.keep),
+            (options.workers, options.keep),
             lambda done, of: on_progress("following up", done, of),
         )
-        controls = _controls(path, plan, wishes, on_progress)
+        controls = _controls(path, plan, options, on_progress)
     return Proof(
         folder, plan, seal, outcomes, score(outcomes, followed), engines(folder, names), _beside(path), controls,
         followed, plan.cases - len(numbers),
@@ -101,18 +101,18 @@ def _beside(path: Path) -> tuple[str, ...]:
 
 
 def _answer_cases(
-    folder: ProofFolder, plan: BankPlan, wishes: Wishes, numbers: Mapping[str, int], on_progress: Progress
+    folder: ProofFolder, plan: BankPlan, options: BankOptions, numbers: Mapping[str, int], on_progress: Progress
 ) -> None:
     """Diagnose all open cases; deleted recordings are drawn again first. numbers: case number by case name."""
     for name, number in numbers.items():
         if not is_answered(folder.open / name) and not (folder.open / name / RECORDING).exists():
             redraw_recording(folder.open / name, plan, read_label(folder.label(number)))
-    answer_bank(folder, numbers, tuple(numbers), wishes, on_progress)
+    answer_bank(folder, numbers, tuple(numbers), options, on_progress)
 
 
-def _controls(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> tuple[Controlled, ...]:
+def _controls(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> tuple[Controlled, ...]:
     found: tuple[Controlled, ...] = ()
-    for seed in range(plan.seed, plan.seed + CONTROL_TURNS) if wishes.controls else ():
+    for seed in range(plan.seed, plan.seed + CONTROL_TURNS) if options.controls else ():
         there = path / "controls" / str(seed)
-        found += run_controls(there, seed, wishes.workers, lambda done, of: on_progress("controls", done, of))
+        found += run_controls(there, seed, options.workers, lambda done, of: on_progress("controls", done, of))
     return found

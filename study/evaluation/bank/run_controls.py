@@ -11,7 +11,7 @@ from study.errors import StudyError
 from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
-from study.evaluation.challenge.controls import CONTROLS, Asked, Control
+from study.evaluation.challenge.controls import CONTROLS, Control, ControlInput
 from study.evaluation.challenge.rig import Rig
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
@@ -78,7 +78,7 @@ def _names(known: Path, begun: str) -> tuple[str, ...] | None:
     return tuple(names) if ours and names else None
 
 
-def _write(place: Path, asked: Asked) -> None:
+def _write(place: Path, asked: ControlInput) -> None:
     place.mkdir(exist_ok=True)
     write_recording(place / RECORDING, asked.recording, precision="float32", overwrite=True)
     write_mechanical_model(place / MODEL, asked.model, overwrite=True)

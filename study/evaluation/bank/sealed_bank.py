@@ -24,7 +24,7 @@ Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
+class BankOptions:
     """How a bank is run."""
 
     workers: int = 2
@@ -49,7 +49,7 @@ def resumable(path: Path) -> Iterator[None]:
 
 
 def answer_bank(
-    folder: ProofFolder, names: Iterable[str], asked: Sequence[str], wishes: Wishes, on_progress: Progress
+    folder: ProofFolder, names: Iterable[str], asked: Sequence[str], options: BankOptions, on_progress: Progress
 ) -> None:
     """Diagnose the cases in `asked` that have no answer. names: all cases, for the progress."""
     every = tuple(names)
@@ -59,11 +59,11 @@ def answer_bank(
     def on_answered(name: str) -> None:
         nonlocal done
         done += 1
-        if not wishes.keep:
+        if not options.keep:
             forget_recording(folder.open / name)
         on_progress("diagnosing", done, len(every))
 
-    ask_engine(folder, asked, wishes.workers, on_answered)
+    ask_engine(folder, asked, options.workers, on_answered)
 
 
 def reveal_bank(

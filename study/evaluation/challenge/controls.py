@@ -20,7 +20,7 @@ WRONG = "mains_hum"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Asked:
+class ControlInput:
     """Input of one diagnosis."""
 
     recording: Recording
@@ -34,35 +34,35 @@ class Control:
 
     name: str
     claim: str
-    draw: Callable[[int, Rig], tuple[Asked, ...]]
+    draw: Callable[[int, Rig], tuple[ControlInput, ...]]
 
 
-def _strong(seed: int, rig: Rig) -> Case:
+def _draw_strong(seed: int, rig: Rig) -> Case:
     return draw_case(seed, (CONCEALED,), "calibrated", STRONG, "a", rig)
 
 
-def _clean(seed: int, rig: Rig) -> Case:
+def _draw_clean(seed: int, rig: Rig) -> Case:
     return draw_case(seed, (), "calibrated", None, "a", rig)
 
 
-def _plain(seed: int, rig: Rig) -> tuple[Asked, ...]:
-    case = _clean(seed, rig)
-    return (Asked(case.recording, case.model),)
+def _plain_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    case = _draw_clean(seed, rig)
+    return (ControlInput(case.recording, case.model),)
 
 
-def _shuffle_in_time(seed: int, rig: Rig) -> tuple[Asked, ...]:
-    case = _strong(seed, rig)
+def _shuffle_in_time(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    case = _draw_strong(seed, rig)
     order = np.random.default_rng(seed).permutation(len(case.recording))
-    return (Asked(_map_samples(case.recording, lambda samples: samples[order], command=False), case.model),)
+    return (ControlInput(_map_samples(case.recording, lambda samples: samples[order], command=False), case.model),)
 
 
-def _other_model(seed: int, rig: Rig) -> tuple[Asked, ...]:
+def _other_model_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
     """Recording of one device with the model of another, whose tolerances are as tight as its own."""
-    return (Asked(_strong(seed, rig).recording, _clean(seed + 1, rig).model),)
+    return (ControlInput(_draw_strong(seed, rig).recording, _draw_clean(seed + 1, rig).model),)
 
 
-def _silent(seed: int, rig: Rig) -> tuple[Asked, ...]:
-    case, random = _clean(seed, rig), np.random.default_rng(seed)
+def _silent_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    case, random = _draw_clean(seed, rig), np.random.default_rng(seed)
     shape = case.recording.response.samples.shape
     noise = np.array(NOISE_MPS2)[list(rig.axes)] * random.normal(size=shape)
     recording = replace(
@@ -72,13 +72,13 @@ def _silent(seed: int, rig: Rig) -> tuple[Asked, ...]:
         position=None,
         segments=(),
     )
-    return (Asked(recording, case.model),)
+    return (ControlInput(recording, case.model),)
 
 
-def _permute_channels(seed: int, rig: Rig) -> tuple[Asked, ...]:
+def _permute_channels(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
     """Channels of command, response and position in reverse order; each keeps its name."""
     two = replace(rig, axes=(0, 1))
-    case = _strong(seed, two)
+    case = _draw_strong(seed, two)
     recording, model = case.recording, case.model
     if recording.position is None:
         return ()
@@ -89,32 +89,32 @@ def _permute_channels(seed: int, rig: Rig) -> tuple[Asked, ...]:
         position=_reverse_channels(recording.position),
     )
     other = replace(model, input=model.input[:, ::-1], output=model.output[::-1])
-    return Asked(recording, model), Asked(turned, other)
+    return ControlInput(recording, model), ControlInput(turned, other)
 
 
-def _exchange_axes(seed: int, rig: Rig) -> tuple[Asked, ...]:
+def _exchange_axes(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
     """The readings of two axes exchange their names, in command, response, position and model."""
     two = replace(rig, axes=(0, 1))
-    case = _strong(seed, two)
+    case = _draw_strong(seed, two)
     turned = _map_samples(case.recording, lambda samples: samples[:, ::-1])
     other = replace(case.model, input=case.model.input[:, ::-1], output=case.model.output[::-1])
-    return Asked(case.recording, case.model), Asked(turned, other)
+    return ControlInput(case.recording, case.model), ControlInput(turned, other)
 
 
-def _mirror_signs(seed: int, rig: Rig) -> tuple[Asked, ...]:
+def _mirror_signs(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
     case = draw_case(seed, (PUSHED,), "calibrated", STRONG, "a", rig)
     turned = _map_samples(case.recording, lambda samples: -samples)
-    return Asked(case.recording, case.model), Asked(turned, case.model)
+    return ControlInput(case.recording, case.model), ControlInput(turned, case.model)
 
 
-def _fewer(seed: int, rig: Rig) -> tuple[Asked, ...]:
-    case = _strong(seed, rig)
+def _exclude_irrelevant(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    case = _draw_strong(seed, rig)
     irrelevant = tuple(effect_name.name for effect_name in EFFECT_NAMES if effect_name.place == "sensor")
-    return Asked(case.recording, case.model, irrelevant), Asked(case.recording, case.model)
+    return ControlInput(case.recording, case.model, irrelevant), ControlInput(case.recording, case.model)
 
 
-def _rename_channels(seed: int, rig: Rig) -> tuple[Asked, ...]:
-    case = _strong(seed, rig)
+def _rename_channels(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    case = _draw_strong(seed, rig)
     recording, new = case.recording, tuple(f"q{number}" for number in range(len(rig.axes)))
     other = replace(
         recording,
@@ -123,13 +123,13 @@ def _rename_channels(seed: int, rig: Rig) -> tuple[Asked, ...]:
         response=replace(recording.response, channels=tuple(f"a{name}" for name in new)),
         position=None if recording.position is None else replace(recording.position, channels=new),
     )
-    return Asked(recording, case.model), Asked(other, replace(case.model, name="another"))
+    return ControlInput(recording, case.model), ControlInput(other, replace(case.model, name="another"))
 
 
-def _one_wrong(seed: int, rig: Rig) -> tuple[Asked, ...]:
-    case = _strong(seed, rig)
+def _allow_one_wrong(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    case = _draw_strong(seed, rig)
     return (
-        Asked(
+        ControlInput(
             case.recording,
             case.model,
             tuple(effect_name.name for effect_name in EFFECT_NAMES if effect_name.name != WRONG),
@@ -158,13 +158,13 @@ def _reverse_channels(signal: Signal) -> Signal:
 
 CONTROLS = (
     Control("a recording shuffled in time", "no name", _shuffle_in_time),
-    Control("the model of another device", "not explained", _other_model),
-    Control("a silent recording", "no name", _silent),
+    Control("the model of another device", "not explained", _other_model_input),
+    Control("a silent recording", "no name", _silent_input),
     Control("axes in another order", "same", _permute_channels),
     Control("axes exchanged", "axis exchanged", _exchange_axes),
     Control("everything mirrored", "opposite", _mirror_signs),
-    Control("strength zero", "nothing", _plain),
-    Control("irrelevant hypotheses added", "same", _fewer),
+    Control("strength zero", "nothing", _plain_input),
+    Control("irrelevant hypotheses added", "same", _exclude_irrelevant),
     Control("other names of device and channels", "same but axes", _rename_channels),
-    Control("a catalogue of one wrong hypothesis", "not explained", _one_wrong),
+    Control("a catalogue of one wrong hypothesis", "not explained", _allow_one_wrong),
 )

@@ -15,7 +15,7 @@ from study.evaluation.challenge.device import Device, motion
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ, DrivePlan, draw_plan
 from study.evaluation.challenge.effects import actuator, decoys, friction, hand, inertia_and_drag, sensor, springs
 from study.evaluation.challenge.extras import with_extras
-from study.evaluation.challenge.hidden import Circumstances, HiddenEffect
+from study.evaluation.challenge.hidden import EffectContext, HiddenEffect
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.rig import WHOLE, Rig
 from study.evaluation.challenge.sensor import NOISE_MPS2, POSITION_NOISE_M, POSITION_STEP_M, RANGE_MPS2, read
@@ -149,7 +149,7 @@ def _conceal(
     for effect, strength in zip(hidden, strengths, strict=True):
         axis = rig.axes[int(random.integers(len(rig.axes)))]
         travel = np.abs(position).max(axis=0)
-        at = Circumstances(random, float(strength), bench, axis, travel, peak, rig.axes)
+        at = EffectContext(random, float(strength), bench, axis, travel, peak, rig.axes)
         values = effect.draw(at)
         device = effect.build(device, axis, values)
         truth.append(truth_of(effect, axis, values))

@@ -16,7 +16,7 @@ Values = Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Circumstances:
+class EffectContext:
     """What a draw may use, so that a strength means the same on every bench."""
 
     random: np.random.Generator
@@ -55,7 +55,7 @@ class HiddenEffect:
     place: Place
     of_axis: bool
     """It acts on one axis; otherwise on all."""
-    draw: Callable[[Circumstances], dict[str, float]]
+    draw: Callable[[EffectContext], dict[str, float]]
     """Parameters by name: those of the vocabulary, and what else `build` needs."""
     build: Callable[[Device, int, Values], Device]
 

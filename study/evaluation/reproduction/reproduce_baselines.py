@@ -17,13 +17,17 @@ from study.evaluation.reproduction.reproduction_plan import CENTRE, EDGE, Place,
 
 
 @dataclass(frozen=True, slots=True)
-class _Where:
+class _Placement:
     words: str
     place_m: Place
     hand: bool
 
 
-_WHERE = (_Where("centre", CENTRE, False), _Where("edge", EDGE, False), _Where("in the hand", CENTRE, True))
+_PLACEMENTS = (
+    _Placement("centre", CENTRE, False),
+    _Placement("edge", EDGE, False),
+    _Placement("in the hand", CENTRE, True),
+)
 
 
 def play_baselines(
@@ -35,9 +39,9 @@ def play_baselines(
     estimate: frequency response at the centre, including the spring.
     """
     inverses = baseline_inverses(models.centre, estimate, _lines_hz(plan, models.centre.sample_rate_hz))
-    wanted = len(_WHERE) * len(inverses) + 2
+    wanted = len(_PLACEMENTS) * len(inverses) + 2
     found: list[PlayedResponse] = []
-    for where in _WHERE:
+    for where in _PLACEMENTS:
         for inverse in inverses:
             playing = Playing(f"{inverse.name}, {where.words}", _driver(plan, inverse), where.place_m, hand=where.hand)
             played = replace(play_row(plan, playing), multiply_adds=inverse.multiply_adds)
@@ -48,7 +52,7 @@ def play_baselines(
     return tuple(found)
 
 
-def _for_the_place(where: _Where, models: PlacedModels) -> tuple[Playing, ...]:
+def _for_the_place(where: _Placement, models: PlacedModels) -> tuple[Playing, ...]:
     if where.hand:
         return (Playing("model identified in the hand", single_model_driver(models.hand), hand=True),)
     if where.place_m == EDGE:

@@ -36,14 +36,16 @@ class PlacedModels:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Played:
+class EqualizedPlayback:
     rows: EqualizedRows
     others: tuple[PlayedResponse, ...]
     """Rows of the table only."""
     remarks: tuple[str, ...]
 
 
-def play_equalized(plan: ReproductionPlan, models: PlacedModels, on_share: Callable[[float], None]) -> Played:
+def play_equalized(
+    plan: ReproductionPlan, models: PlacedModels, on_share: Callable[[float], None]
+) -> EqualizedPlayback:
     """Play all rows. on_share: progress, 0 to 1."""
     blended = blended_at(models.workspace, EDGE)
     interpolated, remarks = _interpolate_modes(models.workspace)
@@ -111,7 +113,7 @@ def _clipping_remarks(found: Mapping[str, PlayedResponse]) -> Sequence[str]:
     ]
 
 
-def _sort_rows(found: Mapping[str, PlayedResponse], remarks: tuple[str, ...]) -> Played:
+def _sort_rows(found: Mapping[str, PlayedResponse], remarks: tuple[str, ...]) -> EqualizedPlayback:
     named = EqualizedRows.__dataclass_fields__
     rows = EqualizedRows(**{name: found[name] for name in named})
-    return Played(rows, tuple(row for name, row in found.items() if name not in named), remarks)
+    return EqualizedPlayback(rows, tuple(row for name, row in found.items() if name not in named), remarks)

@@ -18,7 +18,7 @@ from study.devices.opening import FRICTIONLESS
 from study.errors import LeftError, StudyError
 from study.evaluation.reproduction.reproduce_baselines import play_baselines
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, play_equalized
-from study.evaluation.reproduction.reproduce_recordings import Recorded, Wanted, record_or_load
+from study.evaluation.reproduction.reproduce_recordings import CachedRecording, RecordingRequest, record_or_load
 from study.evaluation.reproduction.reproduction_plan import BETWEEN, ReproductionPlan, Steps
 from study.evaluation.reproduction.reproduction_results import Results
 from study.evaluation.reproduction.write_reproduction import WrittenReproduction, write_reproduction_folder
@@ -48,7 +48,9 @@ class ReproducedModel:
         return UsedModel(name.replace("_", " "), quality.expected_error, quality.held_out_error, quality.held_out_noise)
 
 
-def identify_or_load(plan: ReproductionPlan, recorded: Recorded, on_share: Callable[[float], None]) -> ReproducedModel:
+def identify_or_load(
+    plan: ReproductionPlan, recorded: CachedRecording, on_share: Callable[[float], None]
+) -> ReproducedModel:
     """Load the cached model, or identify it; a cached file of another recording, order or band, or without its
     quality, is replaced."""
     path = plan.models / recorded.path.name
@@ -104,15 +106,15 @@ def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]
         ) from interruption
 
 
-def _recordings_to_make(plan: ReproductionPlan) -> Mapping[str, Wanted]:
+def _recordings_to_make(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:
     asked = plan.protocols
     wanted = (
-        Wanted("ellipsoid", asked.ellipsoid),
-        Wanted("sweep", asked.sweep),
-        Wanted(CENTRE_NAME, asked.band),
-        *(Wanted(name, asked.band, place) for name, place in zip(_between_names(), BETWEEN, strict=True)),
-        Wanted(SLICK_NAME, asked.band, device=FRICTIONLESS),
-        Wanted(HAND_NAME, asked.hand),
+        RecordingRequest("ellipsoid", asked.ellipsoid),
+        RecordingRequest("sweep", asked.sweep),
+        RecordingRequest(CENTRE_NAME, asked.band),
+        *(RecordingRequest(name, asked.band, place) for name, place in zip(_between_names(), BETWEEN, strict=True)),
+        RecordingRequest(SLICK_NAME, asked.band, device=FRICTIONLESS),
+        RecordingRequest(HAND_NAME, asked.hand),
     )
     return {each.name: each for each in wanted}
 
@@ -125,7 +127,9 @@ def _model_names() -> tuple[str, ...]:
     return (CENTRE_NAME, *_between_names(), SLICK_NAME, HAND_NAME)
 
 
-def _weights(plan: ReproductionPlan, wanted: Mapping[str, Wanted], models: tuple[str, ...]) -> dict[str, float]:
+def _weights(
+    plan: ReproductionPlan, wanted: Mapping[str, RecordingRequest], models: tuple[str, ...]
+) -> dict[str, float]:
     return {
         **{f"recording {name}": RECORDING_S for name in wanted},
         "study": SUBJECT_S * plan.subjects / plan.workers,
@@ -154,7 +158,7 @@ def _sit(plan: ReproductionPlan, steps: Steps) -> Collected:
 
 def _results(
     plan: ReproductionPlan,
-    recordings: Mapping[str, Recorded],
+    recordings: Mapping[str, CachedRecording],
     identified: Mapping[str, ReproducedModel],
     collected: Collected,
     steps: Steps,

@@ -18,7 +18,7 @@ from study.workflows.recording.record_device import RecordingPlan, record_device
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class RecordingRequest:
     """A recording to make. name: of the file, without its ending."""
 
     name: str
@@ -28,13 +28,15 @@ class Wanted:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recorded:
+class CachedRecording:
     path: Path
     recording: Recording
     warnings: tuple[str, ...]
 
 
-def record_or_load(plan: ReproductionPlan, wanted: Wanted, on_share: Callable[[float], None]) -> Recorded:
+def record_or_load(
+    plan: ReproductionPlan, wanted: RecordingRequest, on_share: Callable[[float], None]
+) -> CachedRecording:
     """Load the cached recording, or make it. Raises StudyError where the folder holds a recording of another run."""
     path = plan.recordings / f"{wanted.name}.h5"
     protocol = read_recording_protocol(wanted.protocol).protocol
@@ -45,10 +47,12 @@ def record_or_load(plan: ReproductionPlan, wanted: Wanted, on_share: Callable[[f
         record_device(recording, lambda seconds: on_share(seconds / total_s))
         found = read_recording(path)
     on_share(1.0)
-    return Recorded(path, found, _reduced_amplitude_warnings(found))
+    return CachedRecording(path, found, _reduced_amplitude_warnings(found))
 
 
-def _kept(path: Path, plan: ReproductionPlan, wanted: Wanted, protocol: RecordingProtocol) -> Recording | None:
+def _kept(
+    path: Path, plan: ReproductionPlan, wanted: RecordingRequest, protocol: RecordingProtocol
+) -> Recording | None:
     """The cached recording; None where there is none or only an unfinished one, which is removed."""
     if not path.exists():
         return None

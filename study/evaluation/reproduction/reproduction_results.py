@@ -9,7 +9,7 @@ from analysis.evaluation.reproduction.played_response import PlayedResponse
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from equalizer.identification.state_space.held_out import HeldOut
-from study.evaluation.reproduction.reproduce_equalized import Played
+from study.evaluation.reproduction.reproduce_equalized import EqualizedPlayback
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -18,7 +18,7 @@ class Results:
     ellipsoids: tuple[EllipsoidResult, ...]
     device: MeasuredDevice
     device_name: str
-    played: Played
+    played: EqualizedPlayback
     baselines: tuple[PlayedResponse, ...]
     models: tuple[UsedModel, ...]
     tested: HeldOut | None

@@ -39,7 +39,7 @@ _MOTIONS, _PLACES = ("acceleration", "velocity"), ("position", "angle")
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
+class ParsedName:
     """A header or an array's name, understood as far as it goes."""
 
     header: str
@@ -57,14 +57,14 @@ class Named:
         return not self.doubt
 
 
-def plain_names(columns: Sequence[Named]) -> list[str]:
+def plain_names(columns: Sequence[ParsedName]) -> list[str]:
     """Names without the unit at their end (`displacement_in` is `displacement`, for samples go to SI), where that is
     sure and no two columns would be called alike."""
     plain = [_without_unit(column) for column in columns]
     return [name if plain.count(name) == 1 else column.name for name, column in zip(plain, columns, strict=True)]
 
 
-def _without_unit(column: Named) -> str:
+def _without_unit(column: ParsedName) -> str:
     before, unit = _unit_at_end(column.name)
     return before if unit and unit == column.unit and not column.doubt else column.name
 
@@ -77,7 +77,7 @@ def unit_in(header: str) -> tuple[str, str]:
     return match["name"].strip(), plain_unit(match["unit"].strip())
 
 
-def name_signal(header: str) -> Named:
+def name_signal(header: str) -> ParsedName:
     name, unit = unit_in(header)
     words = [_QUANTITY[part.lower()] for part in _WORD.findall(name) if part.lower() in _QUANTITY]
     word = words[-1] if words else ""  # the last says it: a load angle is an angle
@@ -85,26 +85,26 @@ def name_signal(header: str) -> Named:
     try:
         known = parse_unit(told)
     except UnknownUnitError:
-        return Named(header, name, "", word, f"'{unit}' is not a unit known here" if unit else "")
+        return ParsedName(header, name, "", word, f"'{unit}' is not a unit known here" if unit else "")
     by_unit = "time" if known.si == "s" else quantity_of(known.si)
     if not word:
         doubt = "" if unit else f"whether {told} is its unit is not sure, for no word says what it is"
-        return Named(header, name, told, by_unit, doubt)
+        return ParsedName(header, name, told, by_unit, doubt)
     try:
         check_quantity(word, known)
     except UnknownUnitError:
-        return Named(header, name, told, by_unit, f"its name says {word}, its unit, {told}, says {by_unit}")
-    return Named(header, name, told, word, "")
+        return ParsedName(header, name, told, by_unit, f"its name says {word}, its unit, {told}, says {by_unit}")
+    return ParsedName(header, name, told, word, "")
 
 
-def roles_of(columns: Sequence[Named]) -> Sequence[SignalRole] | None:
+def roles_of(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
     """By quantity: forces are commands, where there are none voltages or currents; accelerations and velocities are
     responses, places responses where there are no others; what is known and none of these is a condition. None where
     something is left open, or a name says else (`open_roles` says what)."""
     return None if open_roles(columns) else [role for column in columns if (role := _role(column, columns))]
 
 
-def open_roles(columns: Sequence[Named]) -> tuple[str, ...]:
+def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
     """What names and quantities leave open, a clause each; empty where they tell all roles."""
     roles = [_role(column, columns) for column in columns]
     found = []
@@ -125,20 +125,20 @@ def open_roles(columns: Sequence[Named]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def propose_roles(columns: Sequence[Named]) -> list[SignalRole | Literal[""]]:
+def propose_roles(columns: Sequence[ParsedName]) -> list[SignalRole | Literal[""]]:
     """By names, then by quantity; empty where that leaves it open. A reference is a helper, and so are currents and
     voltages beside a force."""
     return [_said_role(column, columns) or _role(column, columns) for column in columns]
 
 
-def _role(column: Named, columns: Sequence[Named]) -> SignalRole | Literal[""]:
+def _role(column: ParsedName, columns: Sequence[ParsedName]) -> SignalRole | Literal[""]:
     if _said_role(column, columns) == "condition":
         return "condition"
     known = column.quantity not in ("", "1", "time", *_DRIVES, *_FEEDS, *_MOTIONS, *_PLACES)
     return _by_quantity(columns).get(column.quantity, "condition" if known else "")
 
 
-def _said_role(column: Named, columns: Sequence[Named]) -> SignalRole | Literal[""]:
+def _said_role(column: ParsedName, columns: Sequence[ParsedName]) -> SignalRole | Literal[""]:
     words = [part.lower() for part in _WORD.findall(column.name)]
     said: SignalRole | Literal[""] = next((_SAID[word] for word in words if word in _SAID), "")
     firsts = {other.name.split("_")[0].lower() for other in columns}
@@ -147,7 +147,7 @@ def _said_role(column: Named, columns: Sequence[Named]) -> SignalRole | Literal[
     return _SHORT.get(words[0], "")
 
 
-def _by_quantity(columns: Sequence[Named]) -> dict[str, SignalRole]:
+def _by_quantity(columns: Sequence[ParsedName]) -> dict[str, SignalRole]:
     quantities = {column.quantity for column in columns if _said_role(column, columns) != "condition"}
     answers = _MOTIONS if quantities & set(_MOTIONS) else _PLACES
     by_quantity: dict[str, SignalRole] = {}

@@ -15,7 +15,7 @@ STEPS = {"down": 1, "up": -1, "tab": 1, "shift+tab": -1}
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class FieldEntry:
     """Content of one field."""
 
     answer: str = ""
@@ -28,7 +28,7 @@ class Given:
 @dataclass(frozen=True, slots=True)
 class FormEntry:
     form: Form
-    given: tuple[Given, ...]
+    given: tuple[FieldEntry, ...]
     """In the order of the form's fields."""
     at: int = 0
     """Index of the field under the cursor; the number of fields means Continue, below the last."""
@@ -48,7 +48,7 @@ class FormEntry:
 
 def blank_entry(form: Form) -> FormEntry:
     """An empty entry for this form."""
-    return FormEntry(form, (Given(),) * len(form.fields))
+    return FormEntry(form, (FieldEntry(),) * len(form.fields))
 
 
 def reply_of(entry: FormEntry) -> FormReply:
@@ -166,7 +166,7 @@ def _with(
 ) -> FormEntry:
     """The entry with changes to the field under the cursor; None leaves a value."""
     before = entry.given[entry.at]
-    now = Given(
+    now = FieldEntry(
         before.answer if answer is None else answer,
         before.marked if marked is None else marked,
         before.caret if caret is None else caret,

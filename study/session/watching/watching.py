@@ -23,7 +23,7 @@ from study.session.watching.watched_trials import (
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class LiveInfo:
     """What is known about a session besides its log."""
 
     live: Live | None = None
@@ -33,7 +33,7 @@ class Beside:
     """Why the log cannot be followed any further; empty where it can."""
 
 
-def watch_view(watched: Watched, beside: Beside, now_utc: str, before: WatchView | None = None) -> WatchView:
+def watch_view(watched: Watched, beside: LiveInfo, now_utc: str, before: WatchView | None = None) -> WatchView:
     """The view at `now_utc`. before: the previous view, so that a lasting alarm keeps its start time."""
     state = watched.state
     live = _of_this_sitting(watched, beside.live)

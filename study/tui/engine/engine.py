@@ -22,7 +22,7 @@ from study.tui.engine.screen_link import ScreenLink
 from study.tui.engine.to_engine import Command
 
 if TYPE_CHECKING:
-    from study.tui.engine.desk import Desk
+    from study.tui.engine.engine_commands import EngineCommands
 
 NEEDED_FOR_A_SESSION = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.sessions.trial_recordings")
 """Imported while the participant's code is typed, so that a session starts quickly."""
@@ -42,7 +42,7 @@ class Engine:
     def __init__(self, connection: Connection) -> None:
         self._busy = False
         self._link = ScreenLink(connection, self._interrupt, _end_by_force)
-        self._desk: Desk | None = None
+        self._commands: EngineCommands | None = None
         for name in ("SIGINT", "SIGTERM"):
             signal.signal(getattr(signal, name), self._on_signal)
 
@@ -65,15 +65,15 @@ class Engine:
         return self._link.next_command()
 
     def _warm_up(self) -> None:
-        for name in ("study.tui.engine.desk", *NEEDED_FOR_A_SESSION, *NEEDED_AT_THE_END):
+        for name in ("study.tui.engine.engine_commands", *NEEDED_FOR_A_SESSION, *NEEDED_AT_THE_END):
             if not self._link.command_waits:
                 import_module(name)
 
     def _perform(self, command: Command) -> None:
-        desk = self._desk_at_work()
+        commands = self._load_commands()
         try:
             self._busy = True
-            desk.perform(command)
+            commands.perform(command)
         except KeyboardInterrupt:
             self._busy = False
             self._fail(INTERRUPTED, ExitCode.INTERRUPTED)
@@ -87,15 +87,15 @@ class Engine:
         finally:
             self._busy = False
 
-    def _desk_at_work(self) -> "Desk":
-        if self._desk is None:
-            from study.tui.engine.desk import Desk
+    def _load_commands(self) -> "EngineCommands":
+        if self._commands is None:
+            from study.tui.engine.engine_commands import EngineCommands
 
-            self._desk = Desk(self._link)
-        return self._desk
+            self._commands = EngineCommands(self._link)
+        return self._commands
 
     def _fail(self, error: StudyError, exit_code: ExitCode) -> None:
-        opened = self._desk.opened if self._desk is not None else None
+        opened = self._commands.opened if self._commands is not None else None
         # A participant who withdrew left nothing to go on with.
         path = str(opened.path) if opened is not None and not opened.withdrawn else ""
         text = ErrorText(error.title, error.happened, error.saved, error.do_now, int(exit_code))

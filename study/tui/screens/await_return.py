@@ -10,7 +10,7 @@ from textual.widgets import Footer
 from study.session.facts.void_reasons import void_for_participant
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 
 class AwaitReturnScreen(Screen[None]):
@@ -30,9 +30,9 @@ class AwaitReturnScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         with Card("The last trial does not count"):
-            yield Said(void_for_participant(self._reason))
-            yield Said("All answers before it are saved, and it will come again.", classes="gap")
-            yield Said("Take hold of the handle and press Enter when you are ready.", classes="gap strong")
+            yield LiteralText(void_for_participant(self._reason))
+            yield LiteralText("All answers before it are saved, and it will come again.", classes="gap")
+            yield LiteralText("Take hold of the handle and press Enter when you are ready.", classes="gap strong")
         yield Footer(show_command_palette=False)
 
     def action_go_on(self) -> None:

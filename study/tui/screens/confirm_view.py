@@ -14,7 +14,7 @@ from textual.widgets import Footer, Input
 from study.tui.screens.help import HelpScreen
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 SHOWN_HERE = "The participant's screen showed the experimenter's view: levels, and which answers were right or wrong."
 """Note in the log of a session whose own screen showed the view."""
@@ -48,13 +48,13 @@ class ConfirmView(ModalScreen[bool]):
 
     def compose(self) -> ComposeResult:
         with Card("For the experimenter"):
-            yield Said("This view shows the levels and which answers were right or wrong.")
-            yield Said(
+            yield LiteralText("This view shows the levels and which answers were right or wrong.")
+            yield LiteralText(
                 "Participants: press Esc. Experimenter: turn the screen away from the participant.", classes="gap"
             )
-            yield Said(f"To open it, type {self._session} and press Enter.", classes="gap strong")
+            yield LiteralText(f"To open it, type {self._session} and press Enter.", classes="gap strong")
             yield Input(compact=True)
-            yield Said(id="said")
+            yield LiteralText(id="said")
         yield Footer(show_command_palette=False)
 
     @on(Input.Submitted)
@@ -62,7 +62,7 @@ class ConfirmView(ModalScreen[bool]):
         if typed.value.strip() == self._session:
             take_off(self, True)
         else:
-            self.query_one("#said", Said).update(f"That is not {self._session}. Nothing is opened.")
+            self.query_one("#said", LiteralText).update(f"That is not {self._session}. Nothing is opened.")
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(self.HELP))

@@ -12,7 +12,7 @@ from study.tui.screens.help import HelpScreen
 from study.tui.take_off import take_off
 from study.tui.trial_words import WITHDRAW
 from study.tui.widgets.card import Card
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 
 class ConfirmWithdrawal(ModalScreen[bool]):
@@ -38,10 +38,12 @@ class ConfirmWithdrawal(ModalScreen[bool]):
 
     def compose(self) -> ComposeResult:
         with Card("Take the consent back"):
-            yield Said("Everything recorded of this participant will be erased, and cannot be brought back.")
-            yield Said(f"To erase it, type {WITHDRAW} and press Enter. Esc keeps everything.", classes="gap strong")
+            yield LiteralText("Everything recorded of this participant will be erased, and cannot be brought back.")
+            yield LiteralText(
+                f"To erase it, type {WITHDRAW} and press Enter. Esc keeps everything.", classes="gap strong"
+            )
             yield Input(compact=True)
-            yield Said(id="said")
+            yield LiteralText(id="said")
         yield Footer(show_command_palette=False)
 
     @on(Input.Submitted)
@@ -49,7 +51,7 @@ class ConfirmWithdrawal(ModalScreen[bool]):
         if typed.value.strip().casefold() == WITHDRAW:
             take_off(self, True)
         else:
-            self.query_one("#said", Said).update(f"That is not the word {WITHDRAW}. Nothing is erased.")
+            self.query_one("#said", LiteralText).update(f"That is not the word {WITHDRAW}. Nothing is erased.")
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(self.HELP))

@@ -14,7 +14,7 @@ from study.session.views.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.take_off import take_off
 from study.tui.widgets.direction_panel import DirectionPanel
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 
 class DemoScreen(Screen[DemoChoice]):
@@ -54,13 +54,13 @@ class DemoScreen(Screen[DemoChoice]):
         self._asked = False
 
     def compose(self) -> ComposeResult:
-        yield Said(id="title")
-        yield Said(id="steps")
+        yield LiteralText(id="title")
+        yield LiteralText(id="steps")
         with Horizontal(id="answers"):
             yield DirectionPanel(1, self._menu.picture)
             yield DirectionPanel(2, self._menu.picture)
-        yield Said(id="said")
-        yield Said("" if self._menu.handle_moves else "The device is a simulation: nothing moves.", id="note")
+        yield LiteralText(id="said")
+        yield LiteralText("" if self._menu.handle_moves else "The device is a simulation: nothing moves.", id="note")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -100,13 +100,13 @@ class DemoScreen(Screen[DemoChoice]):
 
     def _show(self, sentence: str) -> None:
         menu = self._menu
-        self.query_one("#title", Said).update(
+        self.query_one("#title", LiteralText).update(
             f"Demonstration: vibration {self._vibration} of {menu.vibrations}. Feel both directions."
         )
-        self.query_one("#steps", Said).update("  ".join(self._step(v + 1) for v in range(menu.vibrations)))
+        self.query_one("#steps", LiteralText).update("  ".join(self._step(v + 1) for v in range(menu.vibrations)))
         for panel in self.query(DirectionPanel):
             panel.mark = "felt" if (self._vibration, panel.number) in menu.felt else ""
-        self.query_one("#said", Said).update(sentence)
+        self.query_one("#said", LiteralText).update(sentence)
 
     def _step(self, vibration: int) -> str:
         ticks = "".join("✓" if (vibration, number) in self._menu.felt else "·" for number in (1, 2))

@@ -10,7 +10,7 @@ from textual.widgets import Footer
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Sheet
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 
 class DeviceCheckScreen(Screen[bool]):
@@ -43,18 +43,18 @@ class DeviceCheckScreen(Screen[bool]):
         report = self._report
         names = max((len(finding.name) for finding in report.findings), default=0)
         with Sheet():
-            yield Said(f"Device check: {report.device}", classes="title")
+            yield LiteralText(f"Device check: {report.device}", classes="title")
             if report.simulated:
-                yield Said("The device is a simulation: nothing moves.")
-            yield Said()
+                yield LiteralText("The device is a simulation: nothing moves.")
+            yield LiteralText()
             for finding in report.findings:
-                yield Said(_line(finding, names), classes="fine" if finding.fine else "look")
+                yield LiteralText(_line(finding, names), classes="fine" if finding.fine else "look")
                 if finding.advice and not finding.fine:
-                    yield Said(finding.advice, classes="advice")
+                    yield LiteralText(finding.advice, classes="advice")
             if report.conclusion:
-                yield Said(f"{report.conclusion} Press Enter to go on.", classes="gap strong")
+                yield LiteralText(f"{report.conclusion} Press Enter to go on.", classes="gap strong")
             else:
-                yield Said(
+                yield LiteralText(
                     "Something needs a look. Press c to check again, or g to go on all the same.", classes="gap strong"
                 )
         yield Footer(show_command_palette=False)

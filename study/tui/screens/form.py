@@ -27,7 +27,7 @@ from study.tui.take_off import take_off
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.form_question import FormQuestion
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 LONGEST_QUOTE = 48
 KEYS = (
@@ -87,16 +87,16 @@ class FormScreen(Screen[FormReply]):
 
     def compose(self) -> ComposeResult:
         form = self._entry.form
-        yield Said(id="top")
+        yield LiteralText(id="top")
         with Container(), Sheet(can_focus=False):
-            yield Said(form.introduction, id="introduction")
+            yield LiteralText(form.introduction, id="introduction")
             for number, field in enumerate(form.fields, start=1):
                 yield FormQuestion(number, field)
-            yield Said(_origin(form), id="origin")
+            yield LiteralText(_origin(form), id="origin")
             button = Button("Continue", variant="primary", compact=True)
             button.can_focus = False
             yield button
-        yield Said(id="said")
+        yield LiteralText(id="said")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -188,8 +188,8 @@ class FormScreen(Screen[FormReply]):
             button.scroll_visible(animate=False)
         open_ones = len(find_missing_fields(entry.form, reply_of(entry)))
         told = f"{open_ones} of {len(entry.given)} still open" if open_ones else "everything is answered"
-        self.query_one("#top", Said).update(f"{entry.form.title}: {told}")
-        self.query_one("#said", Said).update(_said(entry, all_answered=not open_ones))
+        self.query_one("#top", LiteralText).update(f"{entry.form.title}: {told}")
+        self.query_one("#said", LiteralText).update(_said(entry, all_answered=not open_ones))
         alive = [self.check_action("press", key[:2]) for key in KEYS]
         if alive != self._alive:
             self._alive = alive

@@ -12,7 +12,7 @@ from study.session.views.views import Goodbye
 from study.tui.take_off import take_off
 from study.tui.trial_words import refusal_words
 from study.tui.widgets.card import Card
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 
 class GoodbyeScreen(Screen[None]):
@@ -35,17 +35,17 @@ class GoodbyeScreen(Screen[None]):
         with Card("Thank you" if notice.outcome else "Finished" if notice.finished else "The end of this sitting"):
             if notice.outcome:
                 for sentence in refusal_words(notice.outcome):
-                    yield Said(sentence, classes="strong")
+                    yield LiteralText(sentence, classes="strong")
             elif notice.finished:
-                yield Said("Thank you! This was the last trial.", classes="strong")
+                yield LiteralText("Thank you! This was the last trial.", classes="strong")
             else:
-                yield Said(f"Thank you. The session stops here{_because(notice.reason)}.", classes="strong")
+                yield LiteralText(f"Thank you. The session stops here{_because(notice.reason)}.", classes="strong")
             if notice.answers:
-                yield Said(f"{answers_are(notice.answers)} on the disk.", classes="gap")
+                yield LiteralText(f"{answers_are(notice.answers)} on the disk.", classes="gap")
             if notice.answers and not notice.finished:
-                yield Said("It can be resumed at the trial where it stopped.", classes="gap")
+                yield LiteralText("It can be resumed at the trial where it stopped.", classes="gap")
             held = "" if notice.outcome else "You may let go of the handle. "
-            yield Said(f"{held}Press Enter to close this page.", classes="gap")
+            yield LiteralText(f"{held}Press Enter to close this page.", classes="gap")
         yield Footer(show_command_palette=False)
 
     def action_close_page(self) -> None:

@@ -11,7 +11,7 @@ from study.session.views.views import HandleView, Unanswered
 from study.tui.take_off import take_off
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.handle_target import HandleTarget
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 
 class HandleScreen(Screen[Unanswered | None]):
@@ -41,9 +41,9 @@ class HandleScreen(Screen[Unanswered | None]):
         self._view = view
 
     def compose(self) -> ComposeResult:
-        yield Said("Bring the handle into the ring. The trial then begins by itself.", id="title")
+        yield LiteralText("Bring the handle into the ring. The trial then begins by itself.", id="title")
         yield HandleTarget()
-        yield Said(id="sentence")
+        yield LiteralText(id="sentence")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -53,7 +53,7 @@ class HandleScreen(Screen[Unanswered | None]):
         self._view = view
         if self.query(HandleTarget):  # not yet, where it comes before the first frame
             self.query_one(HandleTarget).view = view
-            self.query_one("#sentence", Said).update(view.sentence)
+            self.query_one("#sentence", LiteralText).update(view.sentence)
 
     def action_pause(self) -> None:
         take_off(self, PAUSE)

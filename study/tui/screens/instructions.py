@@ -15,7 +15,7 @@ from study.tui.take_off import take_off
 from study.tui.trial_words import plan
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.direction_panel import DirectionPanel
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 
 class InstructionsScreen(Screen[None]):
@@ -42,26 +42,26 @@ class InstructionsScreen(Screen[None]):
     def compose(self) -> ComposeResult:
         welcome = self._welcome
         with Sheet():
-            yield Said(welcome.title, classes="title")
+            yield LiteralText(welcome.title, classes="title")
             if welcome.resumed_after:
-                yield Said(_welcome_back(welcome.resumed_after))
-            yield Said("Hold the handle with a constant, comfortable grip. It shakes along 1 or 2:")
+                yield LiteralText(_welcome_back(welcome.resumed_after))
+            yield LiteralText("Hold the handle with a constant, comfortable grip. It shakes along 1 or 2:")
             with Horizontal(id="pictures"):
                 yield DirectionPanel(1, welcome.picture)
                 yield DirectionPanel(2, welcome.picture)
-            yield Said(_how(self._keys))
-            yield Said(plan(welcome))
-            yield Said(
+            yield LiteralText(_how(self._keys))
+            yield LiteralText(plan(welcome))
+            yield LiteralText(
                 "You may stop at any time: let go of the handle, or press p for a pause, which takes the force off at "
                 "once. Ctrl+C takes it off and leaves."
             )
             if not welcome.felt:
-                yield Said(
+                yield LiteralText(
                     f"Practice: the device is a simulation ({welcome.device}), so nothing moves here. Your answers are "
                     "marked 'not felt' and never enter an analysis of people.",
                     classes="practice",
                 )
-            yield Said("Press Enter to begin.", classes="gap strong")
+            yield LiteralText("Press Enter to begin.", classes="gap strong")
         yield Footer(show_command_palette=False)
 
     def action_begin(self) -> None:

@@ -13,7 +13,7 @@ from study.tui.screens.help import HelpScreen
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.choice_row import ChoiceRow
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 MOST_CHARACTERS = 500
 WRITERS: tuple[Who, ...] = ("participant", "experimenter")
@@ -50,14 +50,14 @@ class NoteScreen(ModalScreen[NoteAsked | None]):
 
     def compose(self) -> ComposeResult:
         with Card("Something happened" if self._adverse else "A note"):
-            yield Said("What happened?" if self._adverse else "What is to be noted? No names, please.")
+            yield LiteralText("What happened?" if self._adverse else "What is to be noted? No names, please.")
             yield TextArea(soft_wrap=True, tab_behavior="focus")
-            yield Said("Who writes this?")
+            yield LiteralText("Who writes this?")
             yield ChoiceRow(WRITERS, WRITERS.index(self._who) if self._who in WRITERS else None, id="who")
-            yield Said("Did something happen to the participant, such as pain, numbness or a fright?")
+            yield LiteralText("Did something happen to the participant, such as pain, numbness or a fright?")
             yield ChoiceRow(("no", "yes"), int(self._adverse), id="adverse")
             yield Button("Write it into the log", variant="primary", compact=True)
-            yield Said(id="said")
+            yield LiteralText(id="said")
         yield Footer(show_command_palette=False)
 
     @on(ChoiceRow.Left)
@@ -84,4 +84,4 @@ class NoteScreen(ModalScreen[NoteAsked | None]):
         self.app.push_screen(HelpScreen(self.HELP))
 
     def _refuse(self, sentence: str) -> None:
-        self.query_one("#said", Said).update(sentence)
+        self.query_one("#said", LiteralText).update(sentence)

@@ -18,7 +18,7 @@ from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.note import NoteScreen
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 CHOICES = {
     AfterPause.GO_ON: "Go on with the study",
@@ -64,11 +64,11 @@ class PauseScreen(Screen[AfterPause]):
     def compose(self) -> ComposeResult:
         answers = self._notice.answers
         with Card("Pause"):
-            yield Said("Nothing is played. You may let go of the handle.", classes="strong")
-            yield Said(f"Reason: {self._notice.reason}.", classes="gap")
-            yield Said(f"{answers_are(answers)} on the disk.")
+            yield LiteralText("Nothing is played. You may let go of the handle.", classes="strong")
+            yield LiteralText(f"Reason: {self._notice.reason}.", classes="gap")
+            yield LiteralText(f"{answers_are(answers)} on the disk.")
             yield OptionList(*(Option(words, id=choice.value) for choice, words in CHOICES.items()), markup=False)
-            yield Said(id="said")
+            yield LiteralText(id="said")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -93,11 +93,11 @@ class PauseScreen(Screen[AfterPause]):
         if confirmed:
             take_off(self, AfterPause.WITHDRAW)
         else:
-            self.query_one("#said", Said).update("Nothing is erased.")
+            self.query_one("#said", LiteralText).update("Nothing is erased.")
 
     def _take_note(self, note: NoteAsked | None) -> None:
         if note is None:
-            self.query_one("#said", Said).update("Nothing was written.")
+            self.query_one("#said", LiteralText).update("Nothing was written.")
             return
         self.post_message(self.NoteWritten(note))
-        self.query_one("#said", Said).update("It goes into the log.")
+        self.query_one("#said", LiteralText).update("It goes into the log.")

@@ -12,7 +12,7 @@ from study.session.views.views import PlayingNotice, Unanswered
 from study.tui.take_off import take_off
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.direction_panel import DirectionPanel
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 
 class PlayingScreen(Screen[Unanswered | None]):
@@ -42,14 +42,14 @@ class PlayingScreen(Screen[Unanswered | None]):
 
     def compose(self) -> ComposeResult:
         notice = self._notice
-        yield Said(notice.title, id="title")
+        yield LiteralText(notice.title, id="title")
         with Horizontal(id="answers"):
             for number in (1, 2):
                 panel = DirectionPanel(number, notice.picture)
                 # Between two intervals there is nothing to feel, and no title.
                 panel.mark = "now" if notice.title and number == notice.number else ""
                 yield panel
-        yield Said("Only feel. No key is needed yet." if notice.title else "A moment.", id="said")
+        yield LiteralText("Only feel. No key is needed yet." if notice.title else "A moment.", id="said")
         yield Footer(show_command_palette=False)
 
     def action_pause(self) -> None:

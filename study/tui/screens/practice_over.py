@@ -10,7 +10,7 @@ from textual.widgets import Footer
 from study.session.views.views import PracticeResult
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 ENOUGH = "That is enough to go on."
 HARD = "Some vibrations are hard to tell for everyone. The study goes on all the same."
@@ -34,14 +34,14 @@ class PracticeOverScreen(Screen[None]):
     def compose(self) -> ComposeResult:
         result = self._result
         with Card("End of this practice"):
-            yield Said(f"{result.right} of the last {result.of} answers were right.", classes="strong")
+            yield LiteralText(f"{result.right} of the last {result.of} answers were right.", classes="strong")
             if result.passed:
-                yield Said("That is enough to go on.", classes="gap")
+                yield LiteralText("That is enough to go on.", classes="gap")
             else:
-                yield Said(
+                yield LiteralText(
                     "Some vibrations are hard to tell for everyone. The study goes on all the same.", classes="gap"
                 )
-            yield Said("Press Enter to go on.", classes="gap")
+            yield LiteralText("Press Enter to go on.", classes="gap")
         yield Footer(show_command_palette=False)
 
     def action_go_on(self) -> None:

@@ -13,7 +13,7 @@ from study.session.views.views import RestNotice
 from study.tui.take_off import take_off
 from study.tui.trial_words import progress_sentence, runs_left
 from study.tui.widgets.card import Card
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 TICK_S = 0.2
 RESTING = "There is no hurry."
@@ -34,7 +34,7 @@ class RestScreen(Screen[float]):
     DEFAULT_CSS = """
     RestScreen { align: center middle; }
     RestScreen Digits { width: 100%; text-align: center; text-style: bold; margin-top: 1; }
-    RestScreen Card Said { text-align: center; width: 100%; }
+    RestScreen Card LiteralText { text-align: center; width: 100%; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on", key_display="Enter")]
 
@@ -46,12 +46,12 @@ class RestScreen(Screen[float]):
     def compose(self) -> ComposeResult:
         notice = self._notice
         with Card("Rest"):
-            yield Said("Let go of the handle and relax your hand.", classes="strong")
+            yield LiteralText("Let go of the handle and relax your hand.", classes="strong")
             yield Digits()
-            yield Said(id="said", classes="gap strong")
-            yield Said(runs_left(notice.runs_left), classes="gap")
+            yield LiteralText(id="said", classes="gap strong")
+            yield LiteralText(runs_left(notice.runs_left), classes="gap")
             if notice.progress is not None:
-                yield Said(progress_sentence(notice.progress))
+                yield LiteralText(progress_sentence(notice.progress))
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -70,7 +70,7 @@ class RestScreen(Screen[float]):
     def _tick(self) -> None:
         left_s = max(0, math.ceil(self._notice.seconds - self._seconds_rested()))
         self.query_one(Digits).update(f"{left_s // 60}:{left_s % 60:02d}")
-        self.query_one("#said", Said).update(READY if self._over() else RESTING)
+        self.query_one("#said", LiteralText).update(READY if self._over() else RESTING)
         if self._over():
             self._ticking.stop()
             self.refresh_bindings()

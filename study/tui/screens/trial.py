@@ -19,7 +19,7 @@ from study.tui.keys.key_presses import KeyPresses, arrival_s
 from study.tui.trial_replies import LEAVING, NO_REPEATS, PAUSE, REPEAT, TIME_OVER, repeat_words
 from study.tui.trial_words import heading, run_name
 from study.tui.widgets.direction_panel import DirectionPanel, Mark
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 from study.tui.widgets.session_bar import SessionBar
 
 ASKED = {
@@ -91,12 +91,12 @@ class TrialScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         yield SessionBar()
-        yield Said(id="asked")
+        yield LiteralText(id="asked")
         with Horizontal(id="answers"):
             yield DirectionPanel(1)
             yield DirectionPanel(2)
-        yield Said(id="said")
-        yield Said(id="trouble")
+        yield LiteralText(id="said")
+        yield LiteralText(id="trouble")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -144,7 +144,7 @@ class TrialScreen(Screen[None]):
         self._trouble = sentence
         self._trouble_is_old = False
         if self._composed:
-            self.query_one("#trouble", Said).update(sentence)
+            self.query_one("#trouble", LiteralText).update(sentence)
 
     def on_key(self, event: Key) -> None:
         at_s = arrival_s(event)
@@ -217,14 +217,14 @@ class TrialScreen(Screen[None]):
         """Redraw everything: only the feedback of the last trial remains visible."""
         if not self._composed:
             return
-        self.query_one("#trouble", Said).update(self._trouble)
+        self.query_one("#trouble", LiteralText).update(self._trouble)
         question = self._question
         if question is None:
             self._say(WAIT)
             return
         bar = self.query_one(SessionBar)
         bar.heading, bar.progress = heading(question), question.progress
-        self.query_one("#asked", Said).update(ASKED[question.task])
+        self.query_one("#asked", LiteralText).update(ASKED[question.task])
         for panel in self.query(DirectionPanel):
             panel.picture = question.picture if question.task is Task.DIRECTION else None
             panel.mark = ""
@@ -244,4 +244,4 @@ class TrialScreen(Screen[None]):
 
     def _say(self, sentence: str) -> None:
         if self._composed:
-            self.query_one("#said", Said).update(sentence)
+            self.query_one("#said", LiteralText).update(sentence)

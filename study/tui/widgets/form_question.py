@@ -5,10 +5,10 @@ from textual.app import ComposeResult
 from textual.containers import Vertical
 from textual.widgets import Static
 
-from study.session.views.form_entry import Given
+from study.session.views.form_entry import FieldEntry
 from study.session.views.form_views import FormField
 from study.tui.widgets.choice_row import ChoiceRow
-from study.tui.widgets.said import Said
+from study.tui.widgets.literal_text import LiteralText
 
 
 class FormQuestion(Vertical):
@@ -26,7 +26,7 @@ class FormQuestion(Vertical):
         self._number = number
 
     def compose(self) -> ComposeResult:
-        yield Said(f"{self._number}. {self.field.label}")
+        yield LiteralText(f"{self._number}. {self.field.label}")
         if self.field.choices:
             row = ChoiceRow(self.field.choices)
             row.can_focus = False
@@ -38,7 +38,7 @@ class FormQuestion(Vertical):
     def stacked(self) -> bool:
         return bool(self.field.choices) and self.query_one(ChoiceRow).stacked
 
-    def show(self, given: Given, at: bool) -> None:
+    def show(self, given: FieldEntry, at: bool) -> None:
         """at: the cursor of the form is here."""
         if at and not self.has_class("-at"):
             # The question itself must be seen too, not only where it is answered.
@@ -51,7 +51,7 @@ class FormQuestion(Vertical):
         else:
             self.query_one(".written", Static).update(self._answer_text(given, at))
 
-    def _answer_text(self, given: Given, at: bool) -> Text:
+    def _answer_text(self, given: FieldEntry, at: bool) -> Text:
         if not given.answer:
             hint = "type your answer" if self.field.needed else "type your answer, or leave it empty"
             text = Text(hint, "dim")

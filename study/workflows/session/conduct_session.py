@@ -27,9 +27,9 @@ from study.workflows.session.open_session import (
 )
 from study.workflows.session.resume_session import resume_session
 from study.workflows.session.run_session import run_session
-from study.workflows.trial.attendant import Attendant
 from study.workflows.trial.display import Display, Hand
 from study.workflows.trial.requests_port import ManyRequests, QueuedRequests, Requests
+from study.workflows.trial.session_supervisor import SessionSupervisor
 from study.workflows.trial.sitting import Sitting, tell, tell_clock_steps
 
 
@@ -92,7 +92,7 @@ def _run(
     participant.on_opened(folder, device)
     place_m = device_settings(protocol).place_m
     inbox = RequestInbox(folder.path)
-    attendant = Attendant(
+    supervisor = SessionSupervisor(
         device,
         participant.clock,
         ManyRequests(participant.requests, inbox),
@@ -108,7 +108,7 @@ def _run(
         equalizer=equalized.equalizer,
         display=participant.display,
         hand=participant.hand,
-        attendant=attendant,
+        supervisor=supervisor,
         place_m=place_m,
     )
     tell_clock_steps(opened.state.sitting.clock_steps[known_steps:], sitting)

@@ -28,14 +28,14 @@ def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState
             case CheckDevice():
                 state = _check_device(state, sitting)
         state = write_notes(state, sitting)
-        if sitting.attendant.stop_asked is not None:
-            return state, f"the {sitting.attendant.stop_asked} stopped the session"
+        if sitting.supervisor.stop_asked is not None:
+            return state, f"the {sitting.supervisor.stop_asked} stopped the session"
     return state, ""
 
 
 def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
     """Ask for one form and log it."""
-    sitting.attendant.begin("form")
+    sitting.supervisor.begin("form")
     reply = sitting.display.fill_in(form)
     outcome = judge_form(state.protocol, form.kind, reply)
     if not outcome.passed and not is_confirmed(sitting.display.fill_in(confirmation_of(form, reply))):
@@ -52,7 +52,7 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
     state = record(state, event, sitting)
     if outcome.reminder:
         sitting.display.trouble(outcome.reminder)
-        sitting.attendant.note(NoteAsked("program", outcome.reminder))
+        sitting.supervisor.note(NoteAsked("program", outcome.reminder))
     return state
 
 
@@ -75,7 +75,7 @@ def does_not_take_part(state: SessionState) -> StudyError:
 
 def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     """Repeat the check as long as the experimenter wants. Continuing despite a finding is logged."""
-    sitting.attendant.begin("preparing")
+    sitting.supervisor.begin("preparing")
     device, clock = sitting.device, sitting.clock
     safety = state.protocol.safety
     report = check_device(device, clock, sitting.place_m, safety.total_cap_n, safety)

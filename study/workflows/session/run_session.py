@@ -77,7 +77,7 @@ def _sit(state: SessionState, sitting: Sitting) -> SessionEnd:
     if refused:
         return _end(AfterTrial(state, leave=refused), sitting)
     state = take_place(state, sitting)
-    sitting.attendant.begin("instructions")
+    sitting.supervisor.begin("instructions")
     sitting.display.welcome(_welcome(state, sitting))
     return _loop(state, sitting)
 
@@ -138,7 +138,7 @@ def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
             after = replace(after, state=broken.state, leave=broken.leave)
             if broken.withdrawn:
                 return replace(_end(after, sitting), withdrawn=True)
-        if stopped := sitting.attendant.stop_asked:
+        if stopped := sitting.supervisor.stop_asked:
             after = replace(after, leave=after.leave or f"the {stopped} stopped the session")
         if after.leave:
             return _end(after, sitting)
@@ -179,8 +179,8 @@ def _say_busy(state: SessionState, sitting: Sitting) -> SessionState:
 
 
 def _pause_wanted(after: AfterTrial, sitting: Sitting) -> str:
-    sitting.attendant.listen()
-    who = sitting.attendant.pause_asked
+    sitting.supervisor.listen()
+    who = sitting.supervisor.pause_asked
     return after.pause or (f"the {who} asked for a pause" if who else "")
 
 
@@ -203,10 +203,10 @@ def _practice_result(before: SessionState, correct: bool) -> PracticeResult:
 
 def _rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
     """A rest cut short by a pause or stop does not count and is due again."""
-    sitting.attendant.begin("rest")
+    sitting.supervisor.begin("rest")
     notice = RestNotice(seconds, len(state.runs) - state.run, progress(state))
-    rested_s = max(0.0, sitting.display.rest(notice, sitting.attendant.glance))
-    if rested_s < seconds and (sitting.attendant.stop_asked or sitting.attendant.pause_asked):
+    rested_s = max(0.0, sitting.display.rest(notice, sitting.supervisor.glance))
+    if rested_s < seconds and (sitting.supervisor.stop_asked or sitting.supervisor.pause_asked):
         return state
     event = RestTaken(utc=sitting.clock.utc(), run=state.run, trial=state.trial, rested_s=rested_s)
     return record(state, event, sitting)

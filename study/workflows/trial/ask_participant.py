@@ -33,7 +33,7 @@ class Asked:
 
 def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
     """Play the stimulus, ask, and return the reply."""
-    sitting.attendant.begin("trial")
+    sitting.supervisor.begin("trial")
     if present.phase is Phase.DETECTION:
         return _in_one_of_two_intervals(state, present, question, sitting)
     sitting.device.hold(_stimulus(state, present, sitting))
@@ -70,18 +70,18 @@ def _in_one_of_two_intervals(state: SessionState, present: Present, question: Qu
 def _reply_to(question: Question, sitting: Sitting) -> Reply:
     """The reply; a repeat request beyond the limit is ignored and the question asked again."""
     while True:
-        reply = sitting.attendant.resolve(sitting.display.ask(question, sitting.attendant.glance))
+        reply = sitting.supervisor.resolve(sitting.display.ask(question, sitting.supervisor.glance))
         repeat = isinstance(reply, Unanswered) and reply.asked and not (reply.pause or reply.leave)
-        if not repeat or question.repeats_left != 0 or not sitting.attendant.glance():
+        if not repeat or question.repeats_left != 0 or not sitting.supervisor.glance():
             return reply
 
 
 def _wait(title: str, number: int, seconds: float, sitting: Sitting) -> Unanswered | None:
     """Wait during an interval; a button pressed meanwhile is ignored."""
-    reply = sitting.display.show_playing(PlayingNotice(title, number, seconds, picture=None), sitting.attendant.glance)
-    if reply is None and sitting.attendant.glance():
+    reply = sitting.display.show_playing(PlayingNotice(title, number, seconds, picture=None), sitting.supervisor.glance)
+    if reply is None and sitting.supervisor.glance():
         return None
-    resolved = sitting.attendant.resolve(reply or Unanswered("the stimulus ended early", leave=False))
+    resolved = sitting.supervisor.resolve(reply or Unanswered("the stimulus ended early", leave=False))
     return (
         Unanswered("answered before both intervals", leave=False, cause=VoidCause.EARLY)
         if isinstance(resolved, Answered)

@@ -17,8 +17,8 @@ def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
     felt_so_far: tuple[tuple[int, int], ...] = ()
     vibration = 1
     while True:
-        sitting.attendant.begin("demo")
-        choice = sitting.display.choose_demo(_menu(state, felt_so_far, vibration), sitting.attendant.glance)
+        sitting.supervisor.begin("demo")
+        choice = sitting.display.choose_demo(_menu(state, felt_so_far, vibration), sitting.supervisor.glance)
         ended = _check_end_request(state, sitting)
         if ended is not None:
             return ended
@@ -47,7 +47,7 @@ def _menu(state: SessionState, felt_so_far: tuple[tuple[int, int], ...], vibrati
 
 def _check_end_request(state: SessionState, sitting: Sitting) -> AfterTrial | None:
     """A stop or pause requested while nothing was played."""
-    reply = sitting.attendant.resolve(Unanswered("", leave=False, asked=True))
+    reply = sitting.supervisor.resolve(Unanswered("", leave=False, asked=True))
     return cut_short(state, reply) if isinstance(reply, Unanswered) and (reply.leave or reply.pause) else None
 
 
@@ -77,11 +77,11 @@ def _play(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial
     )
     picture = picture_of(protocol.directions, labels_are_swapped(protocol, state.opened))
     notice = PlayingNotice(f"Direction {choice.number}", choice.number, protocol.demo.seconds, picture)
-    reply = sitting.display.show_playing(notice, sitting.attendant.glance)
+    reply = sitting.display.show_playing(notice, sitting.supervisor.glance)
     fault = sitting.device.release().health.fault
     if leave := reason_to_leave(fault):
         return AfterTrial(state, leave=leave, fault=fault)
-    resolved = sitting.attendant.resolve(reply or Unanswered("", leave=False, asked=True))
+    resolved = sitting.supervisor.resolve(reply or Unanswered("", leave=False, asked=True))
     if isinstance(resolved, Unanswered):
         after = cut_short(state, resolved)
         return after if fault is Fault.NONE or after.leave else AfterTrial(state, void=fault.value, fault=fault)

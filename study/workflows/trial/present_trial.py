@@ -49,14 +49,14 @@ def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
     look = _make_look(gate, state.protocol.directions.plane, sitting)
     if gate.still_s <= 0 and look().ready:
         return None
-    sitting.attendant.begin("waiting for the handle")
-    reply = sitting.display.await_handle(look, sitting.attendant.glance)
-    sitting.attendant.handle_is(True)
+    sitting.supervisor.begin("waiting for the handle")
+    reply = sitting.display.await_handle(look, sitting.supervisor.glance)
+    sitting.supervisor.handle_is(True)
     if reply is None and not look().ready:
         reply = Unanswered("the wait for the handle ended early", leave=False)
     if reply is None:
         return None
-    resolved = sitting.attendant.resolve(reply)
+    resolved = sitting.supervisor.resolve(reply)
     return resolved if isinstance(resolved, Unanswered) else None
 
 
@@ -65,11 +65,11 @@ def _make_look(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[
     inside_since_s: list[float] = []
 
     def look() -> HandleView:
-        offset = sitting.attendant.offset_m(sitting.device.look())
+        offset = sitting.supervisor.offset_m(sitting.device.look())
         now_s = sitting.clock.now_s()
         if offset is None:
             inside_since_s.clear()
-            sitting.attendant.handle_is(False)
+            sitting.supervisor.handle_is(False)
             return HandleView(False, "The device does not say where its handle is.", (0.0, 0.0), gate.radius_mm)
         distance_mm = 1000.0 * math.hypot(*offset)
         inside = distance_mm <= gate.radius_mm
@@ -77,7 +77,7 @@ def _make_look(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[
             inside_since_s.clear()
         elif not inside_since_s:
             inside_since_s.append(now_s)
-        sitting.attendant.handle_is(inside)
+        sitting.supervisor.handle_is(inside)
         ready = inside and now_s - inside_since_s[0] >= gate.still_s
         first, second = AXES[plane]
         return HandleView(
@@ -150,7 +150,7 @@ def _void(state: SessionState, present: Present, asked: Asked, reply: Unanswered
 
 
 def _cause_of(reply: Unanswered, sitting: Sitting) -> VoidCause:
-    who = sitting.attendant.stop_asked or sitting.attendant.pause_asked
+    who = sitting.supervisor.stop_asked or sitting.supervisor.pause_asked
     if who is not None and who != "participant" and (reply.leave or reply.pause):
         return VoidCause.EXPERIMENTER
     if reply.leave:

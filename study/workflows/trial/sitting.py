@@ -13,8 +13,8 @@ from study.session.state.state import SessionState
 from study.session.watching.requests import NoteAsked
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog
-from study.workflows.trial.attendant import Attendant
 from study.workflows.trial.display import Display, Hand
+from study.workflows.trial.session_supervisor import SessionSupervisor
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Sitting:
     equalizer: Equalizer
     display: Display
     hand: Hand
-    attendant: Attendant
+    supervisor: SessionSupervisor
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Centre of the spring, where the handle belongs."""
 
@@ -49,13 +49,13 @@ def tell_clock_steps(steps: tuple[ClockStep, ...], sitting: Sitting) -> None:
 def tell(sentence: str, sitting: Sitting) -> None:
     """Tell the experimenter: on the screen now, and in the log with the next notes."""
     sitting.display.trouble(sentence)
-    sitting.attendant.note(NoteAsked("program", sentence))
+    sitting.supervisor.note(NoteAsked("program", sentence))
 
 
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
     """Log the notes taken meanwhile. Takes pending requests first."""
-    sitting.attendant.listen()
-    for note in sitting.attendant.take_notes():
+    sitting.supervisor.listen()
+    for note in sitting.supervisor.take_notes():
         event = NoteTaken(utc=sitting.clock.utc(), who=note.who, text=note.text, adverse=note.adverse)
         state = record(state, event, sitting)
     return state

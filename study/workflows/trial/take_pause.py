@@ -9,7 +9,7 @@ from study.workflows.trial.sitting import Sitting, record, write_notes
 
 
 @dataclass(frozen=True, slots=True)
-class AfterTheBreak:
+class PauseOutcome:
     state: SessionState
     leave: str
     """Why the sitting ends here; empty where it goes on."""
@@ -19,24 +19,24 @@ class AfterTheBreak:
 LEAVE = {AfterPause.LEAVE: "the participant left", AfterPause.WITHDRAW: "the participant withdrew"}
 
 
-def take_pause(state: SessionState, reason: str, sitting: Sitting) -> AfterTheBreak:
-    attendant = sitting.attendant
-    who = attendant.pause_asked or "participant"
-    attendant.begin("pause")
+def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutcome:
+    supervisor = sitting.supervisor
+    who = supervisor.pause_asked or "participant"
+    supervisor.begin("pause")
     started_s = sitting.clock.now_s()
 
     def glance() -> bool:
         """A note is on the disk soon after it was typed, however long the pause."""
         nonlocal state
         state = write_notes(state, sitting)
-        return attendant.glance()
+        return supervisor.glance()
 
     decision = sitting.display.pause(PauseNotice(reason, state.answers), glance)
     state = write_notes(state, sitting)
     # A pause that was asked for during the pause is over: cleared only after the last look.
-    attendant.pause_asked = None
+    supervisor.pause_asked = None
     paused_s = sitting.clock.now_s() - started_s
     state = record(state, PauseTaken(utc=sitting.clock.utc(), who=who, paused_s=paused_s), sitting)
-    if attendant.stop_asked is not None:
-        return AfterTheBreak(state, f"the {attendant.stop_asked} stopped the session", withdrawn=False)
-    return AfterTheBreak(state, LEAVE.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)
+    if supervisor.stop_asked is not None:
+        return PauseOutcome(state, f"the {supervisor.stop_asked} stopped the session", withdrawn=False)
+    return PauseOutcome(state, LEAVE.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)

@@ -14,7 +14,7 @@ from study.session.watching.watch_alarms import SILENT_AFTER_S
 from study.session.watching.watch_view import WatchView
 from study.session.watching.watched import Watched, begin_watching
 from study.session.watching.watched import follow as after
-from study.session.watching.watching import Beside, watch_view
+from study.session.watching.watching import LiveInfo, watch_view
 from study.store.disk.regular_file import TABLE_BYTES, open_regular
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import read_live
@@ -58,7 +58,7 @@ class Follower:
         if self._watched is None:
             return None
         live = read_live(self._folder.path)
-        beside = Beside(live, self._is_written(live, now_utc), self._problem)
+        beside = LiveInfo(live, self._is_written(live, now_utc), self._problem)
         self._view = watch_view(self._watched, beside, now_utc, self._view)
         return self._view
 

@@ -13,7 +13,7 @@ from study.evaluation.bank.ask_engine import is_answered
 from study.evaluation.bank.laws.seal_laws import fresh_file, fresh_motions, seal_laws
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.seal_cases import BankPlan, read_case_names
-from study.evaluation.bank.sealed_bank import Progress, Wishes, answer_bank, engines, resumable, reveal_bank
+from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank, engines, resumable, reveal_bank
 from study.store.disk.provenance import sha256_of
 
 LAWS = "laws"
@@ -30,14 +30,14 @@ class LawProof:
     engines: tuple[str, ...]
 
 
-def prove_laws(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> LawProof:
+def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> LawProof:
     """Run or continue a bank of laws in the folder `path`. Resumable. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief, LAWS)
     with resumable(path):
-        seal = seal_laws(folder, plan, wishes.workers, lambda done: on_progress("sealing", done, plan.cases))
+        seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
         names = read_case_names(folder, range(plan.cases))
         there = [name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING).exists()]
-        answer_bank(folder, names, there, wishes, on_progress)
+        answer_bank(folder, names, there, options, on_progress)
     outcomes = reveal_laws(folder, plan.cases)
     return LawProof(folder, plan, seal, outcomes, law_score(outcomes), engines(folder, names))
 

@@ -7,10 +7,10 @@ above `width` is reduced by `width`. The lag has one pole. Saturation is a hard 
 from study.evaluation.challenge.actuator_kernel import DEAD, DELAY_S, GAIN, LAG_S, LIMIT, RATE
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.drive_plan import LEVELS_N
-from study.evaluation.challenge.hidden import Circumstances, HiddenEffect, Values, with_amplifier
+from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values, with_amplifier
 
 
-def _draw_saturation(at: Circumstances) -> dict[str, float]:
+def _draw_saturation(at: EffectContext) -> dict[str, float]:
     return {"limit": LEVELS_N[-1] * (1.0 - at.log_between(0.02, 0.7))}
 
 
@@ -18,7 +18,7 @@ def _build_saturation(device: Device, axis: int, values: Values) -> Device:
     return with_amplifier(device, axis, {LIMIT: values["limit"]})
 
 
-def _draw_deadband(at: Circumstances) -> dict[str, float]:
+def _draw_deadband(at: EffectContext) -> dict[str, float]:
     return {"width": at.log_between(0.003, 0.2)}
 
 
@@ -26,7 +26,7 @@ def _build_deadband(device: Device, axis: int, values: Values) -> Device:
     return with_amplifier(device, axis, {DEAD: values["width"]})
 
 
-def _draw_slew(at: Circumstances) -> dict[str, float]:
+def _draw_slew(at: EffectContext) -> dict[str, float]:
     return {"rate": at.log_between(4000.0, 150.0)}
 
 
@@ -34,7 +34,7 @@ def _build_slew(device: Device, axis: int, values: Values) -> Device:
     return with_amplifier(device, None, {RATE: values["rate"]})
 
 
-def _draw_lag(at: Circumstances) -> dict[str, float]:
+def _draw_lag(at: EffectContext) -> dict[str, float]:
     return {"time_constant": at.log_between(6e-5, 3e-3)}
 
 
@@ -42,7 +42,7 @@ def _build_lag(device: Device, axis: int, values: Values) -> Device:
     return with_amplifier(device, None, {LAG_S: values["time_constant"]})
 
 
-def _draw_delay(at: Circumstances) -> dict[str, float]:
+def _draw_delay(at: EffectContext) -> dict[str, float]:
     return {"delay": at.log_between(2e-5, 4e-3)}
 
 
@@ -50,7 +50,7 @@ def _build_delay(device: Device, axis: int, values: Values) -> Device:
     return with_amplifier(device, None, {DELAY_S: values["delay"]})
 
 
-def _draw_gain(at: Circumstances) -> dict[str, float]:
+def _draw_gain(at: EffectContext) -> dict[str, float]:
     return {"gain": 1.0 + at.sign() * at.log_between(0.005, 0.3)}
 
 

@@ -14,12 +14,12 @@ import numpy as np
 from study.evaluation.challenge.actuator_kernel import FADE, FADE_S, HELD
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import DAMPING_SQUARE
-from study.evaluation.challenge.hidden import Circumstances, HiddenEffect, Values, with_amplifier, with_forces
+from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values, with_amplifier, with_forces
 
 CREEP_TIMES_S = (0.02, 0.2, 2.0)
 
 
-def _draw_creep(at: Circumstances) -> dict[str, float]:
+def _draw_creep(at: EffectContext) -> dict[str, float]:
     return {"stiffness": at.log_between(0.05, 1.0) * at.bench.stiffness[at.axis, at.axis]}
 
 
@@ -29,7 +29,7 @@ def _build_creep(device: Device, axis: int, values: Values) -> Device:
     return replace(device, creep_stiffness=stiffness, creep_time_s=np.array(CREEP_TIMES_S))
 
 
-def _draw_damping(at: Circumstances) -> dict[str, float]:
+def _draw_damping(at: EffectContext) -> dict[str, float]:
     return {"damping_per_m2": at.log_between(0.5, 12.0) / at.travel_m[at.axis] ** 2}
 
 
@@ -37,7 +37,7 @@ def _build_damping(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {DAMPING_SQUARE: values["damping_per_m2"]})
 
 
-def _draw_swing(at: Circumstances) -> dict[str, float]:
+def _draw_swing(at: EffectContext) -> dict[str, float]:
     return {"rate_hz": at.draw_log_uniform(0.7, 9.0), "depth": at.log_between(0.05, 0.7)}
 
 
@@ -48,7 +48,7 @@ def _build_swing(device: Device, axis: int, values: Values) -> Device:
     return replace(device, varying=varying)
 
 
-def _draw_bending(at: Circumstances) -> dict[str, float]:
+def _draw_bending(at: EffectContext) -> dict[str, float]:
     return {"bend": at.log_between(0.3, 1.5) / at.peak_mps2.max(), "play": at.log_between(0.03, 0.8)}
 
 
@@ -56,7 +56,7 @@ def _build_bending(device: Device, axis: int, values: Values) -> Device:
     return replace(device, sensor=replace(device.sensor, bend=values["bend"], play=values["play"]))
 
 
-def _draw_crossed(at: Circumstances) -> dict[str, float]:
+def _draw_crossed(at: EffectContext) -> dict[str, float]:
     return {"coupling": at.sign() * at.log_between(0.02, 0.3) * at.bench.stiffness[0, 0] / at.travel_m.max()}
 
 
@@ -64,7 +64,7 @@ def _build_crossed(device: Device, axis: int, values: Values) -> Device:
     return replace(device, coupling=values["coupling"])
 
 
-def _draw_skipped(at: Circumstances) -> dict[str, float]:
+def _draw_skipped(at: EffectContext) -> dict[str, float]:
     return {"every": float(round(at.log_between(2000.0, 8.0)))}
 
 
@@ -72,7 +72,7 @@ def _build_skipped(device: Device, axis: int, values: Values) -> Device:
     return replace(device, skipped=int(values["every"]))
 
 
-def _draw_tired(at: Circumstances) -> dict[str, float]:
+def _draw_tired(at: EffectContext) -> dict[str, float]:
     return {"loss_per_n2": at.log_between(0.02, 0.3), "seconds": at.draw_log_uniform(2.0, 8.0)}
 
 
@@ -80,7 +80,7 @@ def _build_tired(device: Device, axis: int, values: Values) -> Device:
     return with_amplifier(device, axis, {FADE: values["loss_per_n2"], FADE_S: values["seconds"]})
 
 
-def _draw_iron(at: Circumstances) -> dict[str, float]:
+def _draw_iron(at: EffectContext) -> dict[str, float]:
     return {"half_width": at.log_between(0.01, 0.3)}
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.friction_kernel import BEND, NEGATIVE, POSITIVE, SLOPE, SPEED, STATIC_RATIO, STIFFNESS
-from study.evaluation.challenge.hidden import Circumstances, HiddenEffect, Values, with_cells
+from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values, with_cells
 
 STIFF_N_PER_M = 3e6
 
@@ -18,7 +18,7 @@ def _with_bristle(device: Device, axis: int, cells: dict[int, float]) -> Device:
     return replace(device, friction=with_cells(device.friction, axis, {STIFFNESS: STIFF_N_PER_M} | cells))
 
 
-def _draw_coulomb(at: Circumstances) -> dict[str, float]:
+def _draw_coulomb(at: EffectContext) -> dict[str, float]:
     return {"level": at.log_between(0.003, 0.25)}
 
 
@@ -26,7 +26,7 @@ def _build_coulomb(device: Device, axis: int, values: Values) -> Device:
     return _with_bristle(device, axis, {POSITIVE: values["level"], NEGATIVE: values["level"]})
 
 
-def _draw_asymmetric(at: Circumstances) -> dict[str, float]:
+def _draw_asymmetric(at: EffectContext) -> dict[str, float]:
     mean, unlike = at.log_between(0.01, 0.25), at.sign() * at.random.uniform(0.2, 0.6)
     return {"level_positive": mean * (1 + unlike), "level_negative": mean * (1 - unlike)}
 
@@ -35,7 +35,7 @@ def _build_asymmetric(device: Device, axis: int, values: Values) -> Device:
     return _with_bristle(device, axis, {POSITIVE: values["level_positive"], NEGATIVE: values["level_negative"]})
 
 
-def _draw_stribeck(at: Circumstances) -> dict[str, float]:
+def _draw_stribeck(at: EffectContext) -> dict[str, float]:
     coulomb = at.log_between(0.01, 0.2)
     return {
         "coulomb": coulomb,
@@ -50,7 +50,7 @@ def _build_stribeck(device: Device, axis: int, values: Values) -> Device:
     return _with_bristle(device, axis, {POSITIVE: level, NEGATIVE: level, STATIC_RATIO: ratio, SPEED: values["speed"]})
 
 
-def _draw_presliding(at: Circumstances) -> dict[str, float]:
+def _draw_presliding(at: EffectContext) -> dict[str, float]:
     level = at.log_between(0.01, 0.25)
     return {"level": level, "stiffness": level / at.draw_log_uniform(5e-5, 5e-4)}
 
@@ -60,7 +60,7 @@ def _build_presliding(device: Device, axis: int, values: Values) -> Device:
     return _with_bristle(device, axis, {POSITIVE: level, NEGATIVE: level, STIFFNESS: values["stiffness"]})
 
 
-def _draw_along(at: Circumstances) -> dict[str, float]:
+def _draw_along(at: EffectContext) -> dict[str, float]:
     slope = at.sign() * at.random.uniform(0.3, 0.7) / at.travel_m[at.axis]
     bend = at.random.uniform(-0.25, 0.6) / at.travel_m[at.axis] ** 2
     return {"level": at.log_between(0.01, 0.25), "slope_per_m": float(slope), "bend_per_m2": float(bend)}

@@ -10,11 +10,11 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.hidden import Circumstances, HiddenEffect, Values
+from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values
 from study.evaluation.challenge.mechanism_kernel import DAMPING_DEPTH, RATE, STIFFNESS_DEPTH, TURN
 
 
-def _draw_hand(at: Circumstances) -> dict[str, float]:
+def _draw_hand(at: EffectContext) -> dict[str, float]:
     tight = at.log_between(0.01, 1.0)
     drawn = {
         "mass": tight * at.draw_log_uniform(0.04, 0.09),
@@ -38,7 +38,7 @@ def _build_hand(device: Device, axis: int, values: Values) -> Device:
     return replace(device, bench=bench)
 
 
-def _draw_grip(at: Circumstances) -> dict[str, float]:
+def _draw_grip(at: EffectContext) -> dict[str, float]:
     return {
         "rate_hz": at.draw_log_uniform(0.03, 0.5),
         "depth": at.log_between(0.02, 0.8),

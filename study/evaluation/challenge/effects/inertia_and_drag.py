@@ -14,7 +14,7 @@ import numpy as np
 
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import DRAG
-from study.evaluation.challenge.hidden import Circumstances, HiddenEffect, Values, with_forces
+from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values, with_forces
 
 
 def _at_handle(device: Device, axis: int, mass_kg: float, damping: float) -> Device:
@@ -24,7 +24,7 @@ def _at_handle(device: Device, axis: int, mass_kg: float, damping: float) -> Dev
     return replace(device, bench=replace(device.bench, mass=mass, damping=damper))
 
 
-def _draw_viscous(at: Circumstances) -> dict[str, float]:
+def _draw_viscous(at: EffectContext) -> dict[str, float]:
     return {"damping": at.log_between(0.2, 6.0)}
 
 
@@ -32,7 +32,7 @@ def _build_viscous(device: Device, axis: int, values: Values) -> Device:
     return _at_handle(device, axis, 0.0, values["damping"])
 
 
-def _draw_added(at: Circumstances) -> dict[str, float]:
+def _draw_added(at: EffectContext) -> dict[str, float]:
     return {"mass": at.log_between(0.003, 0.08)}
 
 
@@ -40,7 +40,7 @@ def _build_added(device: Device, axis: int, values: Values) -> Device:
     return _at_handle(device, axis, values["mass"], 0.0)
 
 
-def _draw_quadratic(at: Circumstances) -> dict[str, float]:
+def _draw_quadratic(at: EffectContext) -> dict[str, float]:
     return {"coefficient": at.log_between(1.0, 60.0)}
 
 
@@ -48,7 +48,7 @@ def _build_quadratic(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {DRAG: values["coefficient"]})
 
 
-def _draw_pose(at: Circumstances) -> dict[str, float]:
+def _draw_pose(at: EffectContext) -> dict[str, float]:
     whole = float(at.random.integers(2))
     return {"per_m": at.sign() * at.log_between(0.01, 0.5) / at.travel_m[at.axis], "whole_handle": whole}
 
@@ -61,7 +61,7 @@ def _build_pose(device: Device, axis: int, values: Values) -> Device:
     return replace(device, axis_mass_per_m=device.axis_mass_per_m + along * device.bench.mass[axis, axis])
 
 
-def _draw_mode(at: Circumstances) -> dict[str, float]:
+def _draw_mode(at: EffectContext) -> dict[str, float]:
     tilts = at.random.uniform(-0.25, 0.25, 2)
     return {
         "frequency": at.draw_log_uniform(18.0, 190.0),
@@ -83,7 +83,7 @@ def _build_mode(device: Device, axis: int, values: Values) -> Device:
     return replace(device, bench=replace(device.bench, oscillators=oscillators))
 
 
-def _draw_backlash(at: Circumstances) -> dict[str, float]:
+def _draw_backlash(at: EffectContext) -> dict[str, float]:
     mass = at.bench.mass[at.axis, at.axis] * at.random.uniform(0.2, 0.4)
     spring = mass * (2 * np.pi * at.draw_log_uniform(220.0, 400.0)) ** 2
     return {

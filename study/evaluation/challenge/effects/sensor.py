@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.hidden import Circumstances, HiddenEffect, Values
+from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values
 from study.evaluation.challenge.sensor import Sensor
 
 
@@ -27,7 +27,7 @@ def _in_channel(table: FloatArray, axis: int, value: float) -> FloatArray:
     return changed
 
 
-def _draw_lag(at: Circumstances) -> dict[str, float]:
+def _draw_lag(at: EffectContext) -> dict[str, float]:
     return {"bandwidth": at.log_between(420.0, 30.0)}
 
 
@@ -35,7 +35,7 @@ def _build_lag(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, bandwidth_hz=values["bandwidth"]))
 
 
-def _draw_clipping(at: Circumstances) -> dict[str, float]:
+def _draw_clipping(at: EffectContext) -> dict[str, float]:
     return {"limit": at.peak_mps2[at.axis] * (1.0 - at.log_between(0.02, 0.7))}
 
 
@@ -43,7 +43,7 @@ def _build_clipping(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, limit=_in_channel(device.sensor.limit, axis, values["limit"])))
 
 
-def _draw_misalignment(at: Circumstances) -> dict[str, float]:
+def _draw_misalignment(at: EffectContext) -> dict[str, float]:
     degrees = at.log_between(0.1, 15.0)
     about = degrees * at.direction()
     return {"degrees": degrees} | dict(zip(("about_x", "about_y", "about_z"), map(float, about), strict=True))
@@ -56,7 +56,7 @@ def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
     )
 
 
-def _draw_gain(at: Circumstances) -> dict[str, float]:
+def _draw_gain(at: EffectContext) -> dict[str, float]:
     return {"gain": 1.0 + at.sign() * at.log_between(0.005, 0.3)}
 
 
@@ -64,7 +64,7 @@ def _build_gain(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, gain=_in_channel(device.sensor.gain, axis, values["gain"])))
 
 
-def _draw_curve(at: Circumstances) -> dict[str, float]:
+def _draw_curve(at: EffectContext) -> dict[str, float]:
     return {"cubic": at.sign() * at.log_between(0.005, 0.25) / at.peak_mps2[at.axis] ** 2}
 
 
@@ -72,7 +72,7 @@ def _build_curve(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, cubic=_in_channel(device.sensor.cubic, axis, values["cubic"])))
 
 
-def _shares(at: Circumstances) -> dict[str, float]:
+def _shares(at: EffectContext) -> dict[str, float]:
     """Shares of the three channels; the largest among those that are read is 1."""
     drawn = at.direction()
     read = drawn[list(at.axes)]
@@ -84,7 +84,7 @@ def _in_shares(values: Values) -> FloatArray:
     return np.array([values["share_x"], values["share_y"], values["share_z"]])
 
 
-def _draw_drift(at: Circumstances) -> dict[str, float]:
+def _draw_drift(at: EffectContext) -> dict[str, float]:
     return {"total": at.sign() * at.log_between(0.01, 2.0)} | _shares(at)
 
 
@@ -92,7 +92,7 @@ def _build_drift(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, drift=values["total"] * _in_shares(values)))
 
 
-def _draw_steps(at: Circumstances) -> dict[str, float]:
+def _draw_steps(at: EffectContext) -> dict[str, float]:
     return {"step": at.log_between(0.02, 1.5)}
 
 
@@ -100,7 +100,7 @@ def _build_steps(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, step=values["step"]))
 
 
-def _draw_hum(at: Circumstances) -> dict[str, float]:
+def _draw_hum(at: EffectContext) -> dict[str, float]:
     mains_hz = float(at.random.choice((50.0, 60.0))) + at.random.uniform(-0.05, 0.05)
     turn = at.random.uniform(0.0, 2 * np.pi)
     return {"amplitude": at.log_between(0.01, 1.0), "frequency": mains_hz, "phase": turn} | _shares(at)
@@ -118,7 +118,7 @@ def _build_hum(device: Device, axis: int, values: Values) -> Device:
     )
 
 
-def _draw_clock(at: Circumstances) -> dict[str, float]:
+def _draw_clock(at: EffectContext) -> dict[str, float]:
     return {"ppm": at.sign() * at.log_between(0.5, 100.0)}
 
 
@@ -126,7 +126,7 @@ def _build_clock(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, ppm=values["ppm"]))
 
 
-def _draw_lost(at: Circumstances) -> dict[str, float]:
+def _draw_lost(at: EffectContext) -> dict[str, float]:
     return {"fraction": at.log_between(1e-4, 0.04)}
 
 
@@ -134,7 +134,7 @@ def _build_lost(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, lost=values["fraction"]))
 
 
-def _draw_crossed(at: Circumstances) -> dict[str, float]:
+def _draw_crossed(at: EffectContext) -> dict[str, float]:
     turn = at.random.uniform(0.0, 2 * np.pi)
     size = at.log_between(0.003, 0.15)
     return {"from_next": float(size * np.cos(turn)), "from_after_next": float(size * np.sin(turn))}
@@ -147,7 +147,7 @@ def _build_crossed(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, orientation=mixing))
 
 
-def _draw_offset(at: Circumstances) -> dict[str, float]:
+def _draw_offset(at: EffectContext) -> dict[str, float]:
     return {"offset": at.sign() * at.log_between(5e-4, 0.5)}
 
 
@@ -157,7 +157,7 @@ def _build_offset(device: Device, axis: int, values: Values) -> Device:
     )
 
 
-def _draw_logger(at: Circumstances) -> dict[str, float]:
+def _draw_logger(at: EffectContext) -> dict[str, float]:
     return {"offset": at.sign() * at.log_between(1e-5, 5e-3)}
 
 

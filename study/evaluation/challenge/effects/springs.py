@@ -18,10 +18,10 @@ from study.evaluation.challenge.handle_force_kernel import (
     SQUARE,
     STOP,
 )
-from study.evaluation.challenge.hidden import Circumstances, HiddenEffect, Values, with_forces
+from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values, with_forces
 
 
-def _draw_hardening(at: Circumstances) -> dict[str, float]:
+def _draw_hardening(at: EffectContext) -> dict[str, float]:
     return {"k3": at.log_between(0.005, 0.4) / at.travel_m[at.axis] ** 3}
 
 
@@ -29,7 +29,7 @@ def _build_hardening(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {CUBE: values["k3"]})
 
 
-def _draw_asymmetric(at: Circumstances) -> dict[str, float]:
+def _draw_asymmetric(at: EffectContext) -> dict[str, float]:
     # A fraction of the ground's stiffness at the end of the travel: with more, the soft side would be unstable.
     stiffness = at.bench.stiffness[at.axis, at.axis]
     return {"k2": float(at.sign() * at.log_between(0.005, 0.3) * stiffness / at.travel_m[at.axis])}
@@ -39,7 +39,7 @@ def _build_asymmetric(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {SQUARE: values["k2"]})
 
 
-def _draw_constant(at: Circumstances) -> dict[str, float]:
+def _draw_constant(at: EffectContext) -> dict[str, float]:
     return {"force": at.sign() * at.log_between(0.001, 0.3)}
 
 
@@ -47,7 +47,7 @@ def _build_constant(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {CONSTANT: values["force"]})
 
 
-def _draw_cogging(at: Circumstances) -> dict[str, float]:
+def _draw_cogging(at: EffectContext) -> dict[str, float]:
     return {
         "amplitude": at.log_between(0.004, 0.15),
         "pitch": at.draw_log_uniform(4e-4, 4e-3),
@@ -60,7 +60,7 @@ def _build_cogging(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, cells)
 
 
-def _draw_stop(at: Circumstances) -> dict[str, float]:
+def _draw_stop(at: EffectContext) -> dict[str, float]:
     reached = 1.0 - 0.6 * at.log_between(0.003, 1.0)
     return {
         "position": at.sign() * reached * at.travel_m[at.axis],

@@ -21,7 +21,7 @@ from study.evaluation.challenge.draw_case import (
     visibility,
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
-from study.evaluation.challenge.hidden import Circumstances, Values
+from study.evaluation.challenge.hidden import EffectContext, Values
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.second_engine.mujoco_bench import MujocoBench, bare, linear, simulate_motion, with_delay
@@ -45,7 +45,7 @@ def draw_mujoco_case(
     peak = np.minimum(np.abs(still[0]).max(axis=0), RANGE_MPS2)
     for effect, strong in zip((EFFECTS[each] for each in effects), strength, strict=True):
         axis = rig.axes[int(random.integers(len(rig.axes)))]
-        at = Circumstances(random, strong, bench, axis, np.abs(still[1]).max(axis=0), peak, rig.axes)
+        at = EffectContext(random, strong, bench, axis, np.abs(still[1]).max(axis=0), peak, rig.axes)
         values = effect.draw(at)
         if effect.name in IN_THE_SENSOR:
             sensing = effect.build(sensing, axis, values)

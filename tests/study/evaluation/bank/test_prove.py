@@ -15,7 +15,7 @@ from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.bank.proof_summary import proof_lines, summary
 from study.evaluation.bank.prove import prove, reveal_cases
 from study.evaluation.bank.seal_cases import BankPlan, drawable_cases
-from study.evaluation.bank.sealed_bank import Wishes
+from study.evaluation.bank.sealed_bank import BankOptions
 from study.evaluation.bank.write_proof import commit, write_proof, write_table
 from study.evaluation.challenge.draw_bank import draw
 from study.store.disk.file_errors import UnusableFileError
@@ -29,7 +29,7 @@ PLAN = BankPlan(SEED, 2, brief=True)
 def proof(tmp_path_factory):
     seen = []
     path = tmp_path_factory.mktemp("bank") / "proof"
-    return prove(path, PLAN, Wishes(), lambda what, done, of: seen.append((what, done, of))), seen
+    return prove(path, PLAN, BankOptions(), lambda what, done, of: seen.append((what, done, of))), seen
 
 
 def test_a_bank_is_sealed_answered_and_revealed(proof):
@@ -91,7 +91,7 @@ def test_the_process_that_answers_reaches_no_label(proof, does, refused):
 def test_the_same_command_goes_on_without_doing_anything_twice(proof):
     folder, seen = proof[0].folder, []
     before = {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")}
-    again = prove(folder.path, PLAN, Wishes(), lambda what, done, of: seen.append((what, done, of)))
+    again = prove(folder.path, PLAN, BankOptions(), lambda what, done, of: seen.append((what, done, of)))
     assert {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")} == before
     assert again.seal == proof[0].seal
     assert [outcome.number for outcome in again.outcomes] == [outcome.number for outcome in proof[0].outcomes]
@@ -129,14 +129,14 @@ def test_a_label_that_was_changed_afterwards_breaks_its_seal(copied):
         reveal_cases(folder, 100)
     sealed = folder.seals.read_text()
     with pytest.raises(StudyError, match="A seal is broken"):
-        prove(folder.path, PLAN, Wishes(), lambda *_: None)
+        prove(folder.path, PLAN, BankOptions(), lambda *_: None)
     assert folder.seals.read_text() == sealed
 
 
 def test_seals_that_are_none_break_the_proof(copied):
     copied.seals.write_text("garbage\n")
     with pytest.raises(StudyError, match="A seal is broken"):
-        prove(copied.path, PLAN, Wishes(), lambda *_: None)
+        prove(copied.path, PLAN, BankOptions(), lambda *_: None)
 
 
 @pytest.mark.parametrize("without", ["recording_sha256", "knows_the_challenge", "model_sha256"])
@@ -153,7 +153,7 @@ def test_a_torn_file_is_named(copied, torn):
     path = next(copied.open.glob(f"*/{ANSWER}")) if torn == ANSWER else next(copied.sealed.glob("*.json"))
     path.write_text(path.read_text()[:40])
     with pytest.raises(StudyError, match=path.name if torn == ANSWER else "A seal is broken"):
-        prove(copied.path, PLAN, Wishes(), lambda *_: None)
+        prove(copied.path, PLAN, BankOptions(), lambda *_: None)
 
 
 def test_an_error_that_is_not_known_is_read(copied):
@@ -168,7 +168,7 @@ def test_an_answer_that_was_removed_is_given_again(copied):
     path = next(copied.open.glob(f"*/{ANSWER}"))
     before = json.loads(path.read_text())
     path.unlink()
-    again = prove(copied.path, PLAN, Wishes(workers=1), lambda *_: None)
+    again = prove(copied.path, PLAN, BankOptions(workers=1), lambda *_: None)
     assert len(again.outcomes) == len(drawable_cases(PLAN))
     assert json.loads(path.read_text())["diagnosis"] == before["diagnosis"]
 
@@ -187,7 +187,7 @@ def test_ctrl_c_keeps_what_is_sealed(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(LeftError, match="Interrupted"):
-        prove(tmp_path / "bank", BankPlan(SEED, 1, brief=True), Wishes(workers=1), interrupt)
+        prove(tmp_path / "bank", BankPlan(SEED, 1, brief=True), BankOptions(workers=1), interrupt)
     assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(drawable_cases(BankPlan(SEED, 1, brief=True)))
 
 

@@ -6,7 +6,7 @@ import pytest
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from study.evaluation.challenge.device import Device, record
 from study.evaluation.challenge.draw_case import DECOYS, EFFECTS
-from study.evaluation.challenge.hidden import Circumstances
+from study.evaluation.challenge.hidden import EffectContext
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
 NEUTRAL = {
@@ -47,7 +47,7 @@ ALL = {**EFFECTS, **DECOYS}
 
 
 def drawn(bench, name, strength, seed=3):
-    at = Circumstances(np.random.default_rng(seed), strength, bench, 0, np.full(3, TRAVEL_M), np.full(3, 12.0))
+    at = EffectContext(np.random.default_rng(seed), strength, bench, 0, np.full(3, TRAVEL_M), np.full(3, 12.0))
     return ALL[name].draw(at)
 
 

@@ -8,7 +8,7 @@ import pytest
 from analysis.evaluation.reproduction.document import ReproductionError, reproduction_from_json
 from study.errors import LeftError, StudyError
 from study.evaluation.reproduction.reproduce_paper import identify_or_load, reproduce_paper
-from study.evaluation.reproduction.reproduce_recordings import Wanted, record_or_load
+from study.evaluation.reproduction.reproduce_recordings import RecordingRequest, record_or_load
 from study.evaluation.reproduction.reproduction_plan import ReproducedProtocols, ReproductionPlan, Steps
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats.identified_model_file import read_identified_model
@@ -116,7 +116,7 @@ def test_friction_is_named_and_its_twin_stands_beside_it(written):
 def test_the_next_run_takes_what_is_there(written, plan):
     files = [folder / "centre.h5" for folder in (plan.recordings, plan.models)]
     kept = [path.stat().st_mtime_ns for path in files]
-    found = record_or_load(plan, Wanted("centre", plan.protocols.band), lambda share: None)
+    found = record_or_load(plan, RecordingRequest("centre", plan.protocols.band), lambda share: None)
     assert identify_or_load(plan, found, lambda share: None).model.order == 8
     assert [path.stat().st_mtime_ns for path in files] == kept
 
@@ -126,15 +126,15 @@ def test_a_part_of_a_recording_is_made_again(written, plan):
     whole = read_recording(path)
     path.unlink()
     write_recording(path, replace(whole, meta={**whole.meta, "interrupted": True}))
-    found = record_or_load(plan, Wanted("ellipsoid", "ellipsoid"), lambda share: None)
+    found = record_or_load(plan, RecordingRequest("ellipsoid", "ellipsoid"), lambda share: None)
     assert not found.recording.meta["interrupted"]
 
 
 @pytest.mark.parametrize(
     ("wanted", "why"),
     [
-        (Wanted("ellipsoid", "sweep"), "it follows another protocol"),
-        (Wanted("ellipsoid", "ellipsoid", (0.0, 0.0, 0.01)), "it was made at another place"),
+        (RecordingRequest("ellipsoid", "sweep"), "it follows another protocol"),
+        (RecordingRequest("ellipsoid", "ellipsoid", (0.0, 0.0, 0.01)), "it was made at another place"),
     ],
 )
 def test_another_recording_of_that_name_is_refused(written, plan, wanted, why):
@@ -147,7 +147,7 @@ def test_a_recording_that_cannot_be_read_is_left_alone(plan, tmp_path):
     other.recordings.mkdir()
     (other.recordings / "centre.h5").write_text("no recording")
     with pytest.raises(StudyError, match="it cannot be read"):
-        record_or_load(other, Wanted("centre", plan.protocols.band), lambda share: None)
+        record_or_load(other, RecordingRequest("centre", plan.protocols.band), lambda share: None)
     assert (other.recordings / "centre.h5").read_text() == "no recording"
 
 

@@ -13,7 +13,7 @@ from study.session.facts.events import (
 from study.session.facts.void_reasons import SCREEN_LATE
 from study.session.state.due_trial import Present
 from study.session.state.machine import next_action
-from study.session.watching.watching import Beside, watch_view
+from study.session.watching.watching import LiveInfo, watch_view
 from tests.watched_story import DEVICE, at, kinds
 
 
@@ -149,7 +149,7 @@ def test_a_killed_program_is_an_alarm(story):
 
 
 def test_a_log_that_cannot_be_followed_is_an_alarm(story):
-    view = watch_view(story.watched, Beside(problem="it contradicts the rules."), at(1))
+    view = watch_view(story.watched, LiveInfo(problem="it contradicts the rules."), at(1))
     assert [a.sentence for a in view.alarms] == ["The log cannot be followed: it contradicts the rules."]
 
 
@@ -158,7 +158,7 @@ def test_elapsed_time_and_dose_follow_the_monotonic_clock_of_the_session_not_a_c
     story.watched = replace(story.watched, state=replace(story.watched.state, sitting=_stamped_sitting(story, 100.0)))
     before = story.view(live=story.live(monotonic_s=104.0))
     set_forward = replace(story.live(monotonic_s=104.0), utc=at(story.seconds + 36000.0))
-    after = watch_view(story.watched, Beside(set_forward, None), at(story.seconds + 36000.0))
+    after = watch_view(story.watched, LiveInfo(set_forward, None), at(story.seconds + 36000.0))
     assert after.exposure == before.exposure
     assert after.exposure.dose_a8_mps2 > 0
 
@@ -172,7 +172,7 @@ def test_a_clock_set_back_below_the_sittings_begin_silences_no_alarm(story):
     """The live state and what was noted are of this sitting, whatever their times say."""
     story.open_trial()
     back = story.live(monotonic_s=50.0, fault="the device stopped answering")
-    view = watch_view(story.watched, Beside(replace(back, utc=at(-3600.0)), None), at(-3599.0))
+    view = watch_view(story.watched, LiveInfo(replace(back, utc=at(-3600.0)), None), at(-3599.0))
     assert [alarm.kind for alarm in view.alarms] == ["device"]
     noted = story.tell(NoteTaken(at(-3597.0), "participant", "numb", adverse=True)).view()
     assert "adverse" in [alarm.kind for alarm in noted.alarms]
@@ -198,8 +198,8 @@ def test_how_long_a_trial_waits_follows_no_clock_that_was_set(story):
     waits = story.live(monotonic_s=104.0)
     for hours in (-5.0, 0.0, 5.0):
         now = at(story.seconds + 3600.0 * hours)
-        view = watch_view(story.watched, Beside(replace(waits, utc=now), None), now)
+        view = watch_view(story.watched, LiveInfo(replace(waits, utc=now), None), now)
         assert (view.open_trial.presented_s, view.activity_s) == (4.0, 4.0)
         assert "unanswered" not in [alarm.kind for alarm in view.alarms]
-    late = watch_view(story.watched, Beside(replace(waits, monotonic_s=161.0), None), at(story.seconds))
+    late = watch_view(story.watched, LiveInfo(replace(waits, monotonic_s=161.0), None), at(story.seconds))
     assert "unanswered" in [alarm.kind for alarm in late.alarms]

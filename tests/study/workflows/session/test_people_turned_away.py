@@ -18,7 +18,7 @@ from study.session.views.archive_views import TURNED_AWAY
 from study.session.views.form_views import FormKind, FormReply
 from study.session.views.views import Unanswered
 from study.session.watching.watched import begin_watching, follow
-from study.session.watching.watching import Beside, watch_view
+from study.session.watching.watching import LiveInfo, watch_view
 from study.store.sessions.event_log import read_log
 from study.store.sessions.log_seal import seal_paths
 from study.tui.standing_words import describe
@@ -166,7 +166,7 @@ def test_a_watcher_sees_the_outcome_without_an_alarm(visit, form, outcome):
     watched = begin_watching(opened, end.state.protocol)
     for event in rest:
         watched = follow(watched, event)
-    view = watch_view(watched, Beside(writer=False), UTC)
+    view = watch_view(watched, LiveInfo(writer=False), UTC)
     assert (view.standing, view.alarms) == (outcome, ())
     assert TURNED_AWAY[outcome] in view.reason
 

@@ -11,7 +11,7 @@ from study.evaluation.bank.laws.write_laws import law_lines, write_laws
 from study.evaluation.bank.proof_folder import SETTINGS, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.seal_cases import BankPlan
-from study.evaluation.bank.sealed_bank import Wishes
+from study.evaluation.bank.sealed_bank import BankOptions
 
 SEED = 30_313
 """Its first device has a law."""
@@ -57,7 +57,7 @@ def test_a_folder_of_effects_is_no_folder_of_laws(sealed):
 
 @pytest.mark.slow
 def test_no_law_is_named_that_is_not_there(tmp_path):
-    proof = prove_laws(tmp_path / "bank", BankPlan(SEED, 20, brief=True), Wishes(), lambda what, done, of: None)
+    proof = prove_laws(tmp_path / "bank", BankPlan(SEED, 20, brief=True), BankOptions(), lambda what, done, of: None)
     write_laws(proof)
     assert json.loads((proof.folder.path / "proof.json").read_text())["of"] == "laws"
     assert next(law_lines(proof)).endswith("misses in 20 cases")

@@ -9,7 +9,7 @@ from study.evaluation.challenge.bench import draw_bench
 from study.evaluation.challenge.device import Device, motion
 from study.evaluation.challenge.draw_case import EFFECTS
 from study.evaluation.challenge.drive_plan import multisine
-from study.evaluation.challenge.hidden import Circumstances
+from study.evaluation.challenge.hidden import EffectContext
 from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.second_engine import second_engine
 from study.evaluation.challenge.sensor import NOISE_MPS2
@@ -48,7 +48,7 @@ def test_both_engines_know_the_same_physics(name, bench, command):
 
     free, first = simulate_motion(bench, command), Device(linear(bench))
     travel, peak = np.abs(free[1]).max(axis=0), np.abs(free[0]).max(axis=0)
-    values = EFFECTS[name].draw(Circumstances(np.random.default_rng(5), 0.8, linear(bench), 0, travel, peak, (0,)))
+    values = EFFECTS[name].draw(EffectContext(np.random.default_rng(5), 0.8, linear(bench), 0, travel, peak, (0,)))
     with_it = BUILDERS[name](bench, 0, values)
     if name == "transport_delay":
         values = {"delay": with_it.delay_s}

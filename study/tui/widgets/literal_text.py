@@ -3,6 +3,6 @@
 from textual.widgets import Static
 
 
-class Said(Static):
+class LiteralText(Static):
     def __init__(self, text: str = "", *, id: str | None = None, classes: str | None = None) -> None:
         super().__init__(text, id=id, classes=classes, markup=False)

@@ -16,7 +16,7 @@ LIVE_EVERY_S = 0.25
 PLAYING = ("trial", "demo")
 
 
-class Attendant:
+class SessionSupervisor:
     """One per sitting. `glance` is the sign of life of every wait; `resolve` tells afterwards what ended it."""
 
     def __init__(

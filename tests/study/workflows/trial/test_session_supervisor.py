@@ -9,8 +9,8 @@ from study.devices.device import Fault
 from study.devices.safe import SafeDevice
 from study.session.views.views import Answered, Unanswered
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
-from study.workflows.trial.attendant import Attendant
 from study.workflows.trial.requests_port import ManyRequests, QueuedRequests
+from study.workflows.trial.session_supervisor import SessionSupervisor
 
 CUT = Unanswered("the stimulus ended early", leave=False)
 
@@ -37,83 +37,83 @@ def requests():
 
 
 @pytest.fixture
-def attendant(device, clock, requests):
-    return Attendant(device, clock, requests, tell=lambda live: None, buttons=(3, 5))
+def supervisor(device, clock, requests):
+    return SessionSupervisor(device, clock, requests, tell=lambda live: None, buttons=(3, 5))
 
 
-def test_a_button_answers_with_its_number_and_its_time(attendant, pressed, clock):
-    attendant.begin("trial")
-    assert attendant.glance()
+def test_a_button_answers_with_its_number_and_its_time(supervisor, pressed, clock):
+    supervisor.begin("trial")
+    assert supervisor.glance()
     clock.sleep(0.7)
     pressed.add(5)
-    assert not attendant.glance()
-    assert attendant.resolve(CUT) == Answered(2, clock.now_s())
+    assert not supervisor.glance()
+    assert supervisor.resolve(CUT) == Answered(2, clock.now_s())
 
 
-def test_a_button_still_down_from_the_last_trial_answers_nothing(attendant, pressed):
+def test_a_button_still_down_from_the_last_trial_answers_nothing(supervisor, pressed):
     pressed.add(3)
-    attendant.begin("trial")
-    assert attendant.glance() and attendant.glance()
+    supervisor.begin("trial")
+    assert supervisor.glance() and supervisor.glance()
     pressed.clear()
-    assert attendant.glance()
+    assert supervisor.glance()
     pressed.add(3)
-    assert not attendant.glance()
-    assert attendant.resolve(CUT).answer == 1
+    assert not supervisor.glance()
+    assert supervisor.resolve(CUT).answer == 1
 
 
-def test_both_buttons_at_once_and_other_buttons_answer_nothing(attendant, pressed):
-    attendant.begin("trial")
-    attendant.glance()
+def test_both_buttons_at_once_and_other_buttons_answer_nothing(supervisor, pressed):
+    supervisor.begin("trial")
+    supervisor.glance()
     pressed.update({3, 5})
-    assert attendant.glance()
+    assert supervisor.glance()
     pressed.clear()
     pressed.add(7)
-    assert attendant.glance()
+    assert supervisor.glance()
 
 
-def test_buttons_mean_nothing_outside_a_trial(attendant, pressed):
-    attendant.begin("rest")
-    attendant.glance()
+def test_buttons_mean_nothing_outside_a_trial(supervisor, pressed):
+    supervisor.begin("rest")
+    supervisor.glance()
     pressed.add(3)
-    assert attendant.glance()
+    assert supervisor.glance()
 
 
-def test_a_stop_takes_the_force_away_and_wins_over_an_answer(attendant, device, requests, rigs):
+def test_a_stop_takes_the_force_away_and_wins_over_an_answer(supervisor, device, requests, rigs):
     device.hold(rigs.sine(1.0))
-    attendant.begin("trial")
+    supervisor.begin("trial")
     requests.send(StopAsked("experimenter"))
-    assert not attendant.glance()
+    assert not supervisor.glance()
     assert device.fault() is Fault.STOPPED
-    reply = attendant.resolve(Answered(1, 0.0))
+    reply = supervisor.resolve(Answered(1, 0.0))
     assert reply == Unanswered("the experimenter stopped the session", leave=True)
     device.release()
 
 
-def test_an_answer_that_comes_with_a_pause_counts_and_the_pause_is_kept(attendant, requests):
-    attendant.begin("trial")
+def test_an_answer_that_comes_with_a_pause_counts_and_the_pause_is_kept(supervisor, requests):
+    supervisor.begin("trial")
     requests.send(PauseAsked("experimenter"))
-    assert not attendant.glance()
-    assert attendant.resolve(Answered(2, 1.0)) == Answered(2, 1.0)
-    assert attendant.resolve(CUT).pause
-    assert attendant.pause_asked == "experimenter"
+    assert not supervisor.glance()
+    assert supervisor.resolve(Answered(2, 1.0)) == Answered(2, 1.0)
+    assert supervisor.resolve(CUT).pause
+    assert supervisor.pause_asked == "experimenter"
 
 
-def test_notes_wait_until_somebody_takes_them(attendant, requests):
+def test_notes_wait_until_somebody_takes_them(supervisor, requests):
     requests.send(NoteAsked("experimenter", "a door slammed"))
-    attendant.begin("trial")
-    assert attendant.glance()
-    assert [note.text for note in attendant.take_notes()] == ["a door slammed"]
-    assert attendant.take_notes() == ()
+    supervisor.begin("trial")
+    assert supervisor.glance()
+    assert [note.text for note in supervisor.take_notes()] == ["a door slammed"]
+    assert supervisor.take_notes() == ()
 
 
-def test_a_fault_ends_a_trial_and_not_the_rest_after_it(attendant, device, rigs, clock):
+def test_a_fault_ends_a_trial_and_not_the_rest_after_it(supervisor, device, rigs, clock):
     device.hold(rigs.sine(1.0))
-    attendant.begin("trial")
+    supervisor.begin("trial")
     clock.sleep(5.0)  # no sign of life: the watchdog
-    assert not attendant.glance()
+    assert not supervisor.glance()
     device.release()
-    attendant.begin("rest")
-    assert attendant.glance()
+    supervisor.begin("rest")
+    assert supervisor.glance()
 
 
 def test_several_sources_are_heard_in_turn(requests):
@@ -128,11 +128,11 @@ def test_several_sources_are_heard_in_turn(requests):
 def test_the_live_state_is_told_in_real_time_a_few_times_a_second(rigs):
     told, clock = [], RealClock()
     with contextlib.closing(SafeDevice(rigs.compiled_rig(), rigs.SETTINGS, clock)) as device:
-        attendant = Attendant(device, clock, QueuedRequests(), told.append, place_m=(0.003, 0.004, 0.0))
-        attendant.begin("trial")
+        supervisor = SessionSupervisor(device, clock, QueuedRequests(), told.append, place_m=(0.003, 0.004, 0.0))
+        supervisor.begin("trial")
         until_s = clock.now_s() + 0.7
         while clock.now_s() < until_s:
-            attendant.glance()
+            supervisor.glance()
             clock.sleep(0.02)
     assert 2 <= len(told) <= 4
     assert told[0].activity == "trial"
@@ -142,9 +142,9 @@ def test_the_live_state_is_told_in_real_time_a_few_times_a_second(rigs):
 
 def test_nobody_watches_in_virtual_time(device, clock, requests):
     told = []
-    attendant = Attendant(device, clock, requests, told.append)
-    attendant.begin("trial")
+    supervisor = SessionSupervisor(device, clock, requests, told.append)
+    supervisor.begin("trial")
     for _ in range(50):
         clock.sleep(0.1)
-        attendant.glance()
+        supervisor.glance()
     assert told == []

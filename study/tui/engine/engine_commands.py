@@ -56,7 +56,7 @@ from study.workflows.views.view_session import session_view
 OPENING = "Preparing the device: some ten seconds the first time."
 
 
-class Desk:
+class EngineCommands:
     """`opened`: the session that the current command opened and has not finished, which can be resumed."""
 
     def __init__(self, link: ScreenLink) -> None:
