@@ -15,7 +15,7 @@ from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME, write_diagnosis
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.crash_guard import crash_guard
-from study.workflows.forked_map import forked_map
+from study.workflows.forked_map import map_forked
 from study.workflows.picture_files import DrawnPicture, draw_picture, write_drawn
 
 
@@ -28,7 +28,7 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
     write_mechanical_model(folder / MODEL_NAME, improved)
     guard = crash_guard()
     parts = [replace(part, work=partial(_drawn, part.work)) for part in diagnosis_drawings(findings)]
-    drawn = [each for several in guard.parts(forked_map, parts) for each in several]
+    drawn = [each for several in guard.parts(map_forked, parts) for each in several]
     findings = replace(findings, remarks=(*guard.sentences, *findings.remarks))
     write_drawn(folder / "figures", drawn)
     page = render_diagnosis_report(findings, [each.picture for each in drawn], _shown(origin), local_now())
