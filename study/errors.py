@@ -1,4 +1,4 @@
-"""One kind of error for screen and command line: what happened, what was saved, what to do now."""
+"""Base error for screen and command line: what happened, what was saved, what to do now."""
 
 from enum import IntEnum
 from typing import Any
@@ -30,7 +30,7 @@ class StudyError(Exception):
         self.do_now = do_now
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Errors cross from worker processes; a subclass with a constructor of its own must survive that too."""
+        """Errors cross process boundaries; a subclass with its own constructor must survive pickling too."""
         return _restore_error, (type(self), self.__dict__)
 
     def __str__(self) -> str:

@@ -1,4 +1,5 @@
-"""Clocks of several loggers brought to the time of the first: by a stated offset, a trigger, or one motion in both."""
+"""Align the clocks of several loggers to the first: by a stated offset, a trigger, or cross-correlation of one
+motion in both."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,14 +18,14 @@ from study.importing.time_base import TimeBase
 
 @dataclass(frozen=True, slots=True)
 class Logger:
-    """A clock, and the arrays that were taken by it."""
+    """A clock, and the arrays recorded with it."""
 
     clock: ClockMap
     names: Namespace
     base: TimeBase
 
     def line(self, text: str) -> Value:
-        """(n,) of an expression. Raises ImportProblemError."""
+        """Values (n,) of an expression. Raises ImportProblemError."""
         values = self.names.value_of(text, self.base)
         if values.ndim != 1:
             raise ImportProblemError(f"clock '{self.clock.name}': {text} has the shape {values.shape}, not one row")
@@ -36,7 +37,7 @@ class Logger:
 
 
 def align_signals(loggers: tuple[Logger, ...], say: Callable[[str], None]) -> tuple[Logger, ...]:
-    """The same loggers with their offsets; `say` gets a sentence for each offset. Raises ImportProblemError."""
+    """The loggers with their offsets; `say` is called with a sentence for each offset. Raises ImportProblemError."""
     first, *others = loggers
     return (first, *(_with_offset(first, other, say) for other in others))
 
@@ -76,7 +77,7 @@ def _by_trigger(first: Logger, other: Logger) -> tuple[float, str]:
 
 
 def _find_crossing_s(logger: Logger, text: str, level: float) -> float:
-    """When it passes the level for the first time, along the straight line between samples."""
+    """Time (s) at which the signal first crosses the level, by linear interpolation."""
     values: Any = logger.line(text)
     times_s = logger.base.times_s(len(values))
     above = values >= level

@@ -1,4 +1,4 @@
-"""Files and a map to one recording in SI units, with everything said that was done on the way."""
+"""Build one recording in SI units from files and a map, with a report of every conversion."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ _NAMED = 3
 
 
 class ImportNotes:
-    """Sentences about an import, each told once: what holds for all parts is not repeated for each."""
+    """Sentences about an import, each reported once: what holds for all parts is not repeated for each."""
 
     def __init__(self) -> None:
         self._parts: dict[str, list[str]] = {}
@@ -39,7 +39,7 @@ class ImportNotes:
             parts.append(part)
 
     def sentences(self, every_part: Sequence[str]) -> tuple[str, ...]:
-        """every_part: labels of all parts, to tell what holds for all of them."""
+        """every_part: labels of all parts, to recognise what holds for all of them."""
         return tuple(
             sentence if len(parts) == len(every_part) else f"{_abbreviate_list(parts)}: {sentence}"
             for sentence, parts in self._parts.items()
@@ -55,7 +55,7 @@ def _abbreviate_list(parts: Sequence[str]) -> str:
 class Built:
     recording: Recording
     notes: tuple[str, ...]
-    """Sentences: what was resampled and how, which clock was moved, what is missing."""
+    """Sentences: how signals were resampled, which clock was shifted, what is missing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +67,8 @@ class _Part:
 def build_recording(
     wanted: ImportMap, files: Sequence[Path], on_progress: Callable[[float], None] = lambda share: None
 ) -> Built:
-    """on_progress: share done, 0 to 1. Raises CannotReadError, ImportRefusedError."""
+    """Read, align, resample and convert. on_progress: share done, 0 to 1. Raises CannotReadError,
+    ImportRefusedError."""
     what = files[0].name if len(files) == 1 else f"{files[0].name} with {len(files) - 1} more"
     said = ImportNotes()
     try:
@@ -128,7 +129,7 @@ class _ChannelUnit:
 
 
 def _units(wanted: ImportMap) -> dict[Key, _ChannelUnit]:
-    """Helpers need none. Raises ImportProblemError."""
+    """Units of all channels; helpers need none. Raises ImportProblemError."""
     every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
     return {(channel.role, channel.name): _unit(channel) for channel in every if channel.role != "helper"}
 
@@ -143,7 +144,7 @@ def _unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
 
 
 def _said_of_units(wanted: ImportMap) -> Iterator[str]:
-    """What the map leaves to be believed: units of what it computes, and channels that have none."""
+    """Remarks on units that cannot be verified: those of computed channels, and channels without one."""
     for computed in (entry for entry in wanted.computed if entry.role != "helper"):
         yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or UNSTATED}."
     every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)

@@ -1,5 +1,5 @@
-"""A map from a table's header, or from the names of a file's arrays of one length, where they name quantities and
-units: `time [s], force [N], displacement_mm`."""
+"""Make a map from a table's header, or from array names of equal length, if they state quantities and units: `time
+[s], force [N], displacement_mm`."""
 
 import re
 from collections import Counter
@@ -13,7 +13,7 @@ _TIME = re.compile(r"(t|time|zeit|temps)(_?(s|ms|us))?", re.IGNORECASE)
 
 
 def header_map(arrays: Arrays) -> ImportMap | None:
-    """None where the header does not say what every column is, or does not tell commands from responses."""
+    """The map; None if the header does not identify every column, or does not distinguish commands from responses."""
     if header_problems(arrays):
         return None
     times, rest = _columns(arrays)
@@ -32,7 +32,7 @@ def header_map(arrays: Arrays) -> ImportMap | None:
 
 
 def header_problems(arrays: Arrays) -> tuple[str, ...]:
-    """What the names leave open, a clause each that names the column; empty where `header_map` gives a map."""
+    """What the names leave open, one clause each with the column; empty if `header_map` gives a map."""
     if len({array.shape for array in arrays.by_name.values()}) != 1:
         return ("its arrays have several lengths",)
     if next(iter(arrays.by_name.values())).ndim != 1:
@@ -48,7 +48,7 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
 
 
 def _columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
-    """Stamps with their unit, and all others."""
+    """Time columns with their unit, and all others."""
     columns = [name_signal(header) for header in arrays.by_name]
     times = [column for column in columns if column.unit and _is_time(column) and column.quantity == "time"]
     return times, [column for column in columns if column not in times]

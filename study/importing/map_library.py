@@ -1,4 +1,4 @@
-"""Maps by name, by path, and those that fit a folder of recordings."""
+"""Find maps by name, by path, and for a folder of recordings."""
 
 import re
 import tomllib
@@ -24,14 +24,14 @@ from study.store.disk.toml_text import read_toml_text
 from study.store.formats.recording_layout import FORMAT
 
 NO_DATA = (".toml", ".md")
-"""Kinds of files that lie beside data."""
+"""File types beside data that are not data."""
 _NUMBER = re.compile(r"\d+")
 _SHOWN = 4
 
 
 @dataclass(frozen=True, slots=True)
 class MapFile:
-    """A map and where it came from."""
+    """A map and its origin."""
 
     name: str
     map: ImportMap
@@ -41,14 +41,14 @@ class MapFile:
 
 @dataclass(frozen=True, slots=True)
 class FoundMap:
-    """A map, and the files of a folder that make one recording by it."""
+    """A map, and the files of a folder that make one recording with it."""
 
     source: MapFile
     files: tuple[Path, ...]
 
     @property
     def name(self) -> str:
-        """Of the recording: that of the map, with the file's where each file is a recording of its own."""
+        """Name of the recording: that of the map, plus the file's if each file is a recording of its own."""
         return f"{self.source.name}_{self.files[0].stem}" if self.source.map.separate else self.source.name
 
 
@@ -77,8 +77,8 @@ def read_map(name: str) -> MapFile:
 
 
 def find_map(folder: Path) -> tuple[FoundMap, ...]:
-    """What the recordings in a folder can be imported with: maps found there, else ours that fit file names and
-    arrays. Raises CannotReadError, UnusableFileError (a map there that is not sound)."""
+    """Maps for the recordings in a folder: those found there, otherwise shipped ones that fit file names and arrays.
+    Raises CannotReadError, UnusableFileError (an invalid map)."""
     paths = sorted(path for path in folder.iterdir() if path.is_file())
     own = [path for path in paths if path.suffix == ".toml" and _is_map_file(path)]
     if own:
@@ -89,7 +89,7 @@ def find_map(folder: Path) -> tuple[FoundMap, ...]:
 
 
 def map_of_files(paths: Sequence[Path]) -> MapFile | None:
-    """The one map of ours that makes one recording of just these files; None where there is none, or several."""
+    """The only shipped map that makes one recording of exactly these files; None if there is none, or several."""
     found = [
         entry.source
         for name in list_shipped_maps()
@@ -100,8 +100,8 @@ def map_of_files(paths: Sequence[Path]) -> MapFile | None:
 
 
 def map_by_header(folder: Path) -> FoundMap:
-    """Of a folder that no map is for: the header of its files, where their names are alike but for numbers and say what
-    is what. Raises WrongUseError, MapNeededError, CannotReadError, ImportRefusedError."""
+    """A map from headers, for a folder without one; the file names must be alike except for numbers. Raises
+    WrongUseError, MapNeededError, CannotReadError, ImportRefusedError."""
     data = sorted((path for path in folder.iterdir() if path.is_file() and path.suffix not in NO_DATA), key=_in_order)
     none = f"No map is for the files of the folder {folder.name}: there is none in it, and none of ours fits"
     if not data:
@@ -128,7 +128,7 @@ def _unclear(happened: str, do_now: str) -> WrongUseError:
 
 
 def _in_order(path: Path) -> tuple[tuple[bool, int, str], ...]:
-    """rec_2 before rec_10."""
+    """Sort key with rec_2 before rec_10."""
     pieces = re.split(r"(\d+)", path.name)
     return tuple((piece.isdigit(), int(piece) if piece.isdigit() else 0, piece) for piece in pieces)
 
@@ -141,7 +141,7 @@ def _is_map_file(path: Path) -> bool:
 
 
 def _recordings(source: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
-    """Every pattern of a map must find something, or the recording is not here whole."""
+    """Recordings that the map makes; every pattern must match a file, or the recording is incomplete."""
     data = [path for path in paths if path.suffix not in NO_DATA]
     by_pattern = [[path for path in data if fnmatchcase(path.name, pattern)] for pattern in source.map.files]
     fitting = tuple(dict.fromkeys(path for found in by_pattern for path in found))

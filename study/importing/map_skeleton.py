@@ -1,4 +1,4 @@
-"""A map for a file of which nothing is known but its arrays: to be completed by the person who recorded it."""
+"""Make an incomplete map for a file of which only the arrays are known, to be completed by its owner."""
 
 import json
 import re
@@ -19,7 +19,7 @@ _TIME_UNITS = ("s", "ms", "us", "min")
 
 
 def map_skeleton(arrays: Arrays) -> str:
-    """TOML. Every line that cannot be filled in from the file is an empty text, which an import refuses by name."""
+    """TOML. What cannot be filled in is an empty text, which an import refuses by name."""
     return "\n".join(_lines(arrays)) + "\n"
 
 
@@ -58,7 +58,7 @@ def _lines(whole: Arrays) -> Iterator[str]:
 
 
 def _roles(arrays: Arrays, clocks: list[str]) -> dict[str, str]:
-    """By name, where names and units say them."""
+    """Roles by name, where names and units tell them."""
     channels = [name for name, array in arrays.by_name.items() if array.size >= _LEAST_SAMPLES and name not in clocks]
     return dict(zip(channels, propose_roles([name_signal(name) for name in channels]), strict=True))
 

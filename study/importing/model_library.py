@@ -1,4 +1,4 @@
-"""Simple models of the devices that our maps are for."""
+"""Simple models of the devices of the shipped maps."""
 
 from importlib.resources import files as resources
 from pathlib import Path
@@ -8,12 +8,13 @@ from study.importing.map_format.map_errors import suggestion
 
 
 def list_shipped_models() -> tuple[str, ...]:
+    """Names of the models that come with hapteq."""
     entries = resources("study.importing").joinpath("models").iterdir()
     return tuple(sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml")))
 
 
 def model_for(name: str, folder: Path) -> Path:
-    """A file beside a map, or one of ours by its name. Raises WrongUseError."""
+    """A file beside a map, or a shipped model by its name. Raises WrongUseError."""
     if (beside := folder / name).is_file():
         return beside
     if name in list_shipped_models():

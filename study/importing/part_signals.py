@@ -1,4 +1,4 @@
-"""One part of a recording: every channel of the map on one uniform grid."""
+"""Channels of one part of a recording, resampled to one uniform grid."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PartSignals:
-    """In the units of the map."""
+    """Signals in the units of the map."""
 
     grid: Grid
     columns: Mapping[Key, FloatArray]
-    """By role and name, each (grid.count,); computed ones too."""
+    """By role and name, each (grid.count,); computed ones included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +40,8 @@ class _GridClock:
 def part_signals(
     wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], say: Callable[[str], None], step: Callable[[], None]
 ) -> PartSignals:
-    """`say` gets a sentence for everything that is not as it was in the file; `step` is called after each channel.
-    Raises ImportProblemError."""
+    """`say` is called with a sentence for every deviation from the file; `step` after each channel. Raises
+    ImportProblemError."""
     by_clock = {logger.clock.name: logger for logger in loggers}
     first = loggers[0].clock.name
     sources: list[tuple[ChannelMap, Samples]] = []
@@ -85,7 +85,7 @@ def _values(channel: ChannelMap, logger: Logger, wanted: ImportMap) -> Value:
 
 
 def _count(logger: Logger, wanted: ImportMap) -> int:
-    """Samples of a clock: of its stamps, or of the first of its channels that is no constant."""
+    """Number of samples of a clock: of its stamps, or of its first non-constant channel."""
     if logger.base.stamps_s is not None:
         return len(logger.base.stamps_s)
     first = wanted.clock[0].name
@@ -98,7 +98,7 @@ def _count(logger: Logger, wanted: ImportMap) -> int:
 
 
 def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources: list[Samples]) -> Grid:
-    """What all have in common, at the stated rate or the fastest."""
+    """Common time range of all channels, at the stated rate or the highest."""
     uneven = [logger for logger in loggers if not logger.base.rate_hz]
     if uneven and not wanted.rate_hz:
         steps_ms = np.diff(uneven[0].base.times_s(0)) * 1e3
@@ -152,6 +152,7 @@ def _same_rate(samples: Samples, grid: Grid) -> bool:
 def _resample(
     channel: ChannelMap, method: Method, samples: Samples, grid: Grid, say: Callable[[str], None]
 ) -> FloatArray:
+    """Resample to the grid and report how."""
     try:
         column = resample(samples, grid, method)
     except ValueError as error:
@@ -166,6 +167,7 @@ def _resample(
 def _compute_channel(
     name: str, text: str, columns: Mapping[str, FloatArray], grid: Grid, file: Namespace
 ) -> FloatArray:
+    """Evaluate a computed channel on the grid."""
     own = {**file.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
         value = Namespace(own, file.definitions, file.where, file.budget).value_of(text, _GridClock(grid))

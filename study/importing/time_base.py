@@ -1,4 +1,4 @@
-"""A logger's time: from a rate, or from stamps, which are checked before anything is built on them."""
+"""Time base of a logger: from a rate, or from time stamps, which are checked first."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,14 @@ from study.importing.map_format.map_errors import ImportProblemError
 IntArray = npt.NDArray[np.int64]
 
 UNEVEN = 0.02
-"""Stamps are uniform where none is further from its place than this share of a step."""
+"""Stamps are uniform if each is within this fraction of a step of its place."""
 LEFT_OUT = 0.02
-"""A uniform logger leaves out rows at no more than this share of its steps: more, and its stamps were rounded."""
+"""A uniform logger skips at most this fraction of its rows; more indicates rounded stamps."""
 _PLAIN_DIGITS = (4, 5, 6)
 NUMBERED_HZ = 1.0
-"""Rate of samples whose time is not known."""
+"""Nominal rate of samples without known time."""
 MOST_SAMPLES = 10**8
-"""Of a recording: a day at 1 kHz. A wrong stamp would fill the memory with what is missing."""
+"""Longest recording: a day at 1 kHz. A wrong stamp would otherwise fill the memory with missing samples."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,14 +31,14 @@ class TimeBase:
 
     name: str
     rate_hz: float
-    """0 where stamps are not uniform."""
+    """0 if stamps are not uniform."""
     stamps_s: Value | None
-    """(n,) as the logger wrote them; None for a clock that is a rate only."""
+    """(n,) as logged; None for a clock with a rate only."""
     places: IntArray | None
-    """(n,): which samples of the uniform rate the stamps are; None where they are not uniform."""
+    """(n,): sample indices of the stamps at the uniform rate; None if not uniform."""
     gap_s: float
     offset_s: float = 0.0
-    """Added to give the reference's time."""
+    """Added to give the reference clock's time."""
 
     @property
     def fastest_hz(self) -> float:
@@ -54,7 +54,7 @@ class TimeBase:
         return self.stamps_s
 
     def samples(self, values: Value) -> Samples:
-        """In the reference's time; rows that a uniform logger has left out are missing samples."""
+        """In the reference clock's time; rows skipped by a uniform logger are missing samples."""
         times_s = self.times_s(len(values)) + self.offset_s
         if self.places is None or self.places[-1] == len(self.places) - 1:
             return Samples(times_s, values, self.rate_hz, self.gap_s)
@@ -64,7 +64,7 @@ class TimeBase:
 
 
 def time_base(clock: ClockMap, names: Namespace) -> TimeBase:
-    """Without its offset to other clocks. Raises ImportProblemError."""
+    """Without the offset to other clocks. Raises ImportProblemError."""
     if clock.time:
         return _from_stamps(clock, names)
     rate_hz = NUMBERED_HZ if clock.unknown else clock.rate_hz or names.number(clock.rate)
@@ -100,7 +100,7 @@ def _from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
 
 
 def _wrong_stamps(stamps_s: Value) -> str:
-    """Empty where they grow."""
+    """Problem with the stamps; empty if they increase."""
     if not np.isfinite(stamps_s).all():
         first = int(np.argmax(~np.isfinite(stamps_s)))
         return f"is no number at sample {first}; time is never missing"
@@ -115,7 +115,7 @@ def _wrong_stamps(stamps_s: Value) -> str:
 
 
 def _uniform(stamps_s: Value) -> tuple[float, IntArray | None]:
-    """Rate and places; 0 and None where stamps are uneven. A plain number (1000 for 1000.0003) where all fit that."""
+    """Rate and indices; 0 and None for uneven stamps. A round rate (1000 for 1000.0003) if all stamps fit it."""
     since_s = stamps_s - stamps_s[0]
     mean_hz = (len(stamps_s) - 1) / float(since_s[-1])
     usual_hz = 1 / float(np.median(np.diff(stamps_s)))

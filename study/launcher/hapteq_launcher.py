@@ -1,7 +1,7 @@
-"""Start hapteq, once it is sure that its four packages are its own.
+"""Start hapteq after checking that its four packages are its own.
 
-Their names are generic. A stranger's `analysis.py` or `study.py` on the import path would be taken for ours, and
-the program would die of a riddle. This module is installed under a name of its own, so that it can say so instead.
+Their names are generic. A foreign `analysis.py` or `study.py` on the import path would be imported instead, and the
+program would fail with a confusing error. This module has a unique name, so that it can report that.
 """
 
 import importlib.util
@@ -12,7 +12,7 @@ PACKAGES = ("study", "analysis", "equalizer", "protocols")
 
 
 def home() -> Path | None:
-    """The one folder on the import path that holds all four packages."""
+    """The one folder on the import path that contains all four packages."""
     for entry in sys.path:
         folder = Path(entry or ".").resolve()
         if all((folder / name / "__init__.py").is_file() for name in PACKAGES):
@@ -21,7 +21,7 @@ def home() -> Path | None:
 
 
 def strangers() -> list[Path]:
-    """What would be imported under one of our names without being ours."""
+    """Modules that would be imported under one of our names without being ours."""
     ours = home()
     found = []
     for name in PACKAGES:

@@ -110,10 +110,12 @@ def _tests(test: FoundMap, base: FoundMap) -> bool:
     return wanted == base.source.name and (not base.source.map.separate or alike)
 
 
-def _pair(one: FoundMap, found: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
-    for pair in one.source.map.diagnosis.pair:
-        if one.files[0].match(pair.after):
-            before = next((other for other in found if other.source is one.source and _is(other, pair.before)), None)
+def _pair(found_map: FoundMap, found: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
+    for pair in found_map.source.map.diagnosis.pair:
+        if found_map.files[0].match(pair.after):
+            before = next(
+                (other for other in found if other.source is found_map.source and _is(other, pair.before)), None
+            )
             return before, pair.changed if before is not None else ""
     return None, ""
 

@@ -1,4 +1,4 @@
-"""Several runs in one file: arrays whose names begin alike, as in `run1__u, run1__y, run2__u, run2__y`."""
+"""Detect several runs in one file by common name prefixes, as in `run1__u, run1__y, run2__u, run2__y`."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -9,19 +9,19 @@ import numpy.typing as npt
 
 _SEPARATORS = ("__", "/", ".", "_", " ")
 _LOOSE = ("_", " ", ".")
-"""Separators that names have for other reasons too: a prefix before one of them must hold a number."""
+"""Separators that are common in names: a prefix before one of them must contain a digit."""
 
 
 @dataclass(frozen=True, slots=True)
 class Groups:
     prefixes: tuple[str, ...]
-    """In the order of the file; empty where the file holds one run."""
+    """In the order of the file; empty if it holds one run."""
     names: Mapping[str, str]
-    """Of the first run's arrays: the name without its prefix, and the whole one. All others belong to no run."""
+    """Arrays of the first run: name without prefix, and full name. Other arrays belong to no run."""
 
 
 def groups_in(arrays: Mapping[str, npt.NDArray[Any]], least: int) -> Groups:
-    """Runs are told by the most arrays that they share; each must hold one of `least` samples or more."""
+    """Groups by the largest number of common arrays; each must contain one of `least` samples or more."""
     long_ones = [name for name, array in arrays.items() if array.size >= least]
     found = [_group_arrays(tuple(arrays), long_ones, separator) for separator in _SEPARATORS]
     return max(found, key=lambda groups: len(groups.prefixes) * len(groups.names))

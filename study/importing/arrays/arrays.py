@@ -1,4 +1,4 @@
-"""What a foreign file holds: arrays by name, whatever its kind."""
+"""Contents of a foreign file: arrays by name, for all formats."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _CHECK = "Check the file; nothing else can be read from it."
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrays:
-    """Of one file. Dimensions of one are gone: a column is (n,), a single number ()."""
+    """Arrays of one file, without dimensions of length one: a column is (n,), a single number ()."""
 
     path: Path
     by_name: Mapping[str, Array]
@@ -38,7 +38,7 @@ class Arrays:
 
 
 def read_arrays(path: Path, table: CsvMap) -> Arrays:
-    """Raises CannotReadError, ImportRefusedError."""
+    """Read a file. Raises CannotReadError, ImportRefusedError."""
     try:
         open_regular(path).close()
     except OSError as problem:

@@ -1,4 +1,4 @@
-"""Columns of a table as arrays: header, delimiter and comments are found, fields that are no numbers are named."""
+"""Columns of a table as arrays: header, delimiter and comments are detected, invalid fields are reported."""
 
 import csv
 import io
@@ -30,7 +30,7 @@ _AS_WORDS: dict[str, Any] = {"dtype": str}
 
 
 def read_csv_arrays(path: Path, settings: CsvMap) -> dict[str, npt.NDArray[Any]]:
-    """Empty fields are missing samples. Raises CannotReadError; ValueError with line and column of what is wrong."""
+    """Empty fields are missing samples. Raises CannotReadError; ValueError with line and column of a problem."""
     numbered, comment = _lines(read_text(path), settings)
     if not numbered:
         raise ValueError("it holds no lines")
@@ -55,8 +55,8 @@ def read_csv_arrays(path: Path, settings: CsvMap) -> dict[str, npt.NDArray[Any]]
 
 
 def _lines(text: str, settings: CsvMap) -> tuple[list[tuple[int, str]], str]:
-    """With their numbers in the file, without comments and empty lines; and the comment right above the first line,
-    which is the header in files of some programs."""
+    """Numbered lines without comments and empty lines; and the comment directly above the first line, which is the
+    header in files of some programs."""
     kept: list[tuple[int, str]] = []
     above = ""
     for number, line in enumerate(text.splitlines(), start=1):

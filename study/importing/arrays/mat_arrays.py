@@ -1,5 +1,5 @@
-"""Arrays out of MAT files of version 5 (Matlab's -v6 and -v7), read here and not by a library in C: its sizes and its
-nesting are compared with what the file holds before memory is taken. Format: MAT-File Level 5, MathWorks, 2010."""
+"""Read arrays from MAT files of version 5 (Matlab's -v6 and -v7) in Python instead of a C library: declared sizes
+and nesting are checked against the file before memory is allocated. Format: MAT-File Level 5, MathWorks, 2010."""
 
 import math
 import struct
@@ -28,7 +28,7 @@ _NO_NUMBERS = np.array(None, dtype=object)
 
 
 class _Bytes:
-    """What is left of one element, with the byte order of the file."""
+    """Unread part of one element, with the file's byte order."""
 
     def __init__(self, content: memoryview, order: str) -> None:
         self.content = content
@@ -40,7 +40,8 @@ class _Bytes:
         return len(self.content) - self.at
 
     def element(self) -> "tuple[int, _Bytes]":
-        """Its type and its content; `at` is then behind it. Raises ValueError where it is longer than what is left."""
+        """Type and content of the next element; `at` moves behind it. Raises ValueError if it is longer than what is
+        left."""
         if self.left < 8:
             raise ValueError("it is cut off")
         kind, size = struct.unpack_from(self.order + "II", self.content, self.at)
@@ -56,7 +57,7 @@ class _Bytes:
         return kind, _Bytes(self.content[begin : begin + size], self.order)
 
     def numbers(self) -> Array:
-        """Of the next element. Raises ValueError where it holds none."""
+        """Numbers of the next element. Raises ValueError if it holds none."""
         kind, found = self.element()
         if kind not in _TYPES:
             raise ValueError(f"an element of the type {kind} stands where numbers are needed")
@@ -64,7 +65,7 @@ class _Bytes:
 
 
 def read_mat5_arrays(path: Path) -> dict[str, Array]:
-    """Fields of structures are named with a dot, as in `data.u`. Raises ValueError, OSError."""
+    """Arrays by name; fields of structures are named with a dot, as in `data.u`. Raises ValueError, OSError."""
     content = read_regular(path, MOST_MAT_BYTES)
     if len(content) < _HEADER_BYTES or content[126:128] not in (b"IM", b"MI"):
         raise ValueError("it is no MAT file of version 5 to 7.3; save it in Matlab with -v7")
@@ -92,7 +93,7 @@ def _unpack(packed: _Bytes, limit: SizeLimit) -> _Bytes:
 
 
 def _matrix(element: _Bytes, depth: int) -> tuple[str, Any]:
-    """Name and value: an array, or a dict of them for a structure."""
+    """Name and value: an array, or a dict of arrays for a structure."""
     if depth > DEEPEST:
         raise ValueError(f"its structures are nested more than {DEEPEST} levels deep")
     if not element.left:

@@ -1,7 +1,7 @@
-"""Arrays out of NPZ, NPY and HDF5 files, under the names that they have there.
+"""Read arrays from NPZ, NPY and HDF5 files under their names.
 
-Sizes are compared with the file before memory is taken, and nothing in a file is run: arrays of Python objects, which
-would have to be unpickled, are left out.
+Declared sizes are checked before memory is allocated, and nothing in a file is executed: arrays of Python objects,
+which would have to be unpickled, are skipped.
 """
 
 import math
@@ -20,11 +20,11 @@ from study.store.disk.regular_file import open_regular
 Array = npt.NDArray[Any]
 _PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _NO_NUMBERS = np.array(None, dtype=object)
-"""In place of texts and objects: an import has no use for them but to say that they are there."""
+"""Stands for texts and objects, of which only the existence is reported."""
 
 
 def read_npz_arrays(path: Path) -> dict[str, Array]:
-    """A single `.npy` is `data`. Raises ValueError and what else damaged files raise."""
+    """Arrays by name; a single `.npy` is `data`. Raises ValueError and other exceptions for damaged files."""
     with open_regular(path) as file:
         limit = SizeLimit(path.stat().st_size)
         if file.peek(6)[:6] == b"\x93NUMPY":
@@ -50,7 +50,7 @@ def _members(archive: zipfile.ZipFile, limit: SizeLimit) -> dict[str, Array]:
 
 
 def _npy(file: Any, size: int, limit: SizeLimit, name: str) -> Array | None:
-    """size: of what it is in, unpacked. None for Python objects."""
+    """One array; None for Python objects. size: unpacked size of its container."""
     shape, fortran_order, dtype = _header(file)
     if dtype.hasobject:
         return None
@@ -74,8 +74,8 @@ def _header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
 
 
 def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
-    """Datasets are named by their path, as in `run1/force`. transposed: dimensions in Matlab's order are turned.
-    Raises UnusableFileError."""
+    """Datasets by their path, as in `run1/force`. transposed: reverse dimensions stored in Matlab's order. Raises
+    UnusableFileError."""
     found: dict[str, Array] = {}
     with open_any_hdf5(path, "HDF5 file") as file:
         for name, entry in datasets_in(file):

@@ -1,5 +1,5 @@
 """Expressions of a map: arithmetic over arrays, and nothing else.
 
-`budget` (what they may cost) and `functions` -> `expression` (parsed and computed) -> `namespace` (what names mean).
+`budget` (limit of the cost) and `functions` -> `expression` (parsed and evaluated) -> `namespace` (meaning of names).
 Begin at `expression.py`.
 """

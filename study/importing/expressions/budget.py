@@ -1,7 +1,7 @@
-"""What the expressions of a map may cost together: numbers held at once, numbers computed in all, and nesting.
+"""Limit of the cost of a map's expressions: numbers held at once, numbers computed in total, and nesting.
 
-A definition may use another twice, and that one a third twice: forty of these are a million million values, though
-the map is short. So cost is counted while values are computed, and not guessed from the text.
+A definition may use another twice, and that one a third twice: forty of these are 10^12 values, although the map is
+short. So cost is counted during evaluation, not estimated from the text.
 """
 
 from collections.abc import Iterator
@@ -10,18 +10,18 @@ from contextlib import contextmanager
 from study.importing.map_format.map_errors import ImportProblemError
 
 DEEPEST = 200
-"""Levels of one expression and of the definitions that it uses. Python itself allows some thousand calls."""
+"""Nesting of one expression and of the definitions that it uses; below Python's own recursion limit."""
 NUMBERS = 20_000_000
-"""Held at once (160 MB), and 20 times as many as the files hold, but never more than LARGEST."""
+"""Numbers held at once (160 MB), plus 20 times as many as the files hold, up to LARGEST."""
 LARGEST = 400_000_000
 WORK = 500_000_000
-"""Numbers computed in all (about 2 s), and 500 times as many as the files hold."""
+"""Numbers computed in total (about 2 s), plus 500 times as many as the files hold."""
 _STEP = 10_000
-"""What a single operation costs beside its numbers: the time of this many additions."""
+"""Fixed cost of a single operation, in additions."""
 
 
 class Budget:
-    """Of one import. Methods raise ImportProblemError; text: the expression, for messages."""
+    """Budget of one import. Methods raise ImportProblemError; text: the expression, for messages."""
 
     def __init__(self) -> None:
         self._most_numbers = NUMBERS
@@ -30,12 +30,12 @@ class Budget:
         self._depth = 0
 
     def allow_for(self, numbers: int) -> None:
-        """A file of so many numbers was read."""
+        """Add the allowance for a file of this many numbers."""
         self._most_numbers = min(LARGEST, self._most_numbers + 20 * numbers)
         self._work_left += 500 * numbers
 
     def spend(self, numbers: float, text: str, times: int = 1) -> None:
-        """Before an array of so many numbers is computed. times: what each costs, in additions."""
+        """Count the cost before an array of this many numbers is computed. times: cost of each, in additions."""
         if self._held + numbers > self._most_numbers:
             raise ImportProblemError(f"'{text}' would give more than {self._most_numbers} numbers")
         self._work_left -= _STEP + times * int(numbers)
@@ -46,7 +46,7 @@ class Budget:
 
     @contextmanager
     def hold_numbers(self, numbers: int) -> Iterator[None]:
-        """While another value is computed, this one stays."""
+        """Count a value that is kept while another one is computed."""
         self._held += numbers
         try:
             yield

@@ -1,6 +1,6 @@
-"""Expressions of a map: arithmetic over arrays, and nothing else. Read by Python's parser, never evaluated by it.
+"""Evaluate expressions of a map: arithmetic over arrays. Parsed by Python's parser, never evaluated by it.
 
-What is not in the lists below is refused by name: no attributes, no calls but ours, no comprehensions.
+Everything outside the lists below is refused by name: no attributes, no calls but ours, no comprehensions.
 """
 
 import ast
@@ -18,11 +18,11 @@ from study.importing.expressions.functions import FUNCTIONS, Clock, Value
 from study.importing.map_format.map_errors import ImportProblemError, suggestion
 
 Lookup = Callable[[str], Value]
-"""The value of a name. Raises ImportProblemError for one that is not there."""
+"""Value of a name. Raises ImportProblemError for an unknown one."""
 
 LONGEST = 2000
 _CALL_COSTS = 20
-"""Times what an addition costs: the slowest functions sort, or compute a sine."""
+"""Cost of a function call in additions: the slowest ones sort, or compute a sine."""
 
 _OPERATIONS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: np.add,
@@ -42,9 +42,9 @@ ALLOWED = "allowed are numbers, names, + - * / ** %, < <= > >=, [ ] and the func
 
 
 def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
-    """The value of an expression: an array of float64, or a number as an array of shape ().
+    """Value of an expression: an array of float64, or a number as an array of shape ().
 
-    Raises ImportProblemError with the part that is not understood, or that costs more than the budget leaves.
+    Raises ImportProblemError with the part that is not understood, or that exceeds the budget.
     """
     tree = parse_expression(text)
     try:
@@ -59,7 +59,7 @@ def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
 
 
 def names_in(text: str) -> set[str]:
-    """Of arrays, channels and definitions that an expression needs. Raises ImportProblemError."""
+    """Arrays, channels and definitions that an expression needs. Raises ImportProblemError."""
     tree = parse_expression(text)
     functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     plain = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
@@ -69,7 +69,7 @@ def names_in(text: str) -> set[str]:
 
 @lru_cache(maxsize=1024)
 def parse_expression(text: str) -> ast.expr:
-    """Raises ImportProblemError."""
+    """Syntax tree of an expression. Raises ImportProblemError."""
     if not text.strip():
         raise ImportProblemError("the expression is empty")
     if len(text) > LONGEST:
@@ -132,21 +132,21 @@ class _Evaluation:
         return np.negative(value)
 
     def _together(self, operation: Callable[[Any, Any], Any], left: ast.expr, right: ast.expr) -> Value:
-        one = self._numbers(left)
-        with self.budget.hold_numbers(np.size(one)):
-            two = self._numbers(right)
+        first = self._numbers(left)
+        with self.budget.hold_numbers(np.size(first)):
+            second = self._numbers(right)
         try:
-            self._spend_on((one, two), 1)
-            return np.asarray(operation(one, two), dtype=np.float64)
+            self._spend_on((first, second), 1)
+            return np.asarray(operation(first, second), dtype=np.float64)
         except ImportProblemError:
             raise
         except ValueError as error:
             raise ImportProblemError(
-                f"in '{self.text}' arrays of the shapes {np.shape(one)} and {np.shape(two)} do not go together"
+                f"in '{self.text}' arrays of the shapes {np.shape(first)} and {np.shape(second)} do not go together"
             ) from error
 
     def _spend_on(self, values: Sequence[Value], times: int) -> None:
-        """Of all values together, which are as large as the largest. Raises ValueError where they do not fit."""
+        """Count the cost of an elementwise operation on these values. Raises ValueError if their shapes do not fit."""
         size = math.prod(np.broadcast_shapes(*(np.shape(value) for value in values)))
         with self.budget.hold_numbers(sum(np.size(value) for value in values)):
             self.budget.spend(size, self.text, times)
@@ -210,7 +210,7 @@ class _Evaluation:
         return int(number)
 
     def _refusal(self, node: ast.expr) -> ImportProblemError:
-        # As it is written there: to put it together again would need as much room as it is deep.
+        # As written in the source: unparsing would need memory in proportion to its depth.
         part = ast.get_source_segment(self.text.strip(), node) or self.text
         return ImportProblemError(f"in '{self.text}' this is not understood: {part}; {ALLOWED}")
 

@@ -1,4 +1,4 @@
-"""The functions that expressions of a map may use."""
+"""Functions available in expressions of a map."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ Value = npt.NDArray[np.float64]
 
 
 class Clock(Protocol):
-    """The time of the samples that an expression works on."""
+    """Times of the samples that an expression works on."""
 
     def times_s(self, count: int) -> Value:
-        """(count,). Raises ValueError where this clock cannot say them."""
+        """(count,). Raises ValueError if this clock does not know them."""
         ...
 
 
@@ -25,7 +25,7 @@ class Function:
     fewest: int
     most: int
     call: Callable[..., Any]
-    """The clock, then the values."""
+    """Called with the clock, then the values."""
 
 
 def _plain(usage: str, meaning: str, function: Callable[..., Any], count: int = 1) -> Function:
@@ -90,4 +90,4 @@ FUNCTIONS: dict[str, Function] = {
     "flatten": _plain("flatten(x)", "the rows of a table one after another", np.ravel),
     "transpose": _plain("transpose(x)", "rows as columns", np.transpose),
 }
-"""`array("NAME")`, for names that are no words, is read by the expression itself."""
+"""`array("NAME")`, for names that are not identifiers, is handled by the expression itself."""

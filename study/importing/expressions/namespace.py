@@ -1,4 +1,4 @@
-"""What names mean in an expression: arrays of a file, and the map's own definitions over them."""
+"""Meaning of names in an expression: arrays of a file, and the map's own definitions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ _SHOWN = 24
 
 @dataclass(frozen=True, slots=True)
 class NoTime:
-    """Where no clock is known: expressions for the rate and for the time stamps themselves."""
+    """Clock of expressions for the rate and for the time stamps themselves, where no time is known."""
 
     def times_s(self, count: int) -> Value:
         raise ValueError("there is no clock in this place yet")
@@ -27,7 +27,7 @@ class NoTime:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Namespace:
-    """Names of one file, seen from one part of the map."""
+    """Names of one file, as seen from one part of the map."""
 
     arrays: Mapping[str, npt.NDArray[Any]]
     definitions: Mapping[str, str]
@@ -36,16 +36,16 @@ class Namespace:
     budget: Budget
     """What all expressions of the import may cost together."""
     _open: set[str] = field(default_factory=set)
-    """Definitions that are being evaluated: one that needs itself is refused."""
+    """Definitions being evaluated: a recursive one is refused."""
 
     def value_of(self, text: str, clock: Clock) -> Value:
-        """Of an array by its name, whatever characters that has, or of an expression. Raises ImportProblemError."""
+        """Value of an array by its name, with any characters, or of an expression. Raises ImportProblemError."""
         if text in self.arrays:
             return self._numbers(text)
         return evaluate(text, lambda name: self.lookup(name, clock), clock, self.budget)
 
     def number(self, text: str) -> float:
-        """Raises ImportProblemError where it is more than one number, or none."""
+        """A single number. Raises ImportProblemError otherwise."""
         value = self.value_of(text, NoTime())
         if np.size(value) != 1 or not np.isfinite(value).all():
             raise ImportProblemError(f"'{text}' has the shape {np.shape(value)}; it must be one number")
@@ -93,8 +93,8 @@ class Namespace:
 
 
 def of_file(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget: Budget) -> Namespace:
-    """Names that begin with the prefix are known without it too, and `fx [N]` as `fx`. Raises ImportProblemError where
-    none begins so."""
+    """Names that begin with the prefix are also known without it, and `fx [N]` as `fx`. Raises ImportProblemError if
+    none begins with it."""
     short = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
     plain = {unit_in(name)[0]: array for name, array in arrays.by_name.items()}
     if prefix and not short:

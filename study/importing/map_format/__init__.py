@@ -1,5 +1,5 @@
-"""What a map says, and whether it fits the given files.
+"""Format of an import map, and the assignment of files to it.
 
-`map_toml` (text) -> `import_map` (the value) -> `map_files`, `map_segments` (its parts); `signal_words` reads channel
-names, `map_errors` are what an import raises. Begin at `import_map.py`.
+`map_toml` (text) -> `import_map` (the value) -> `map_files`, `map_segments` (its parts); `signal_words` interprets
+channel names, `map_errors` are the errors of an import. Begin at `import_map.py`.
 """

@@ -1,4 +1,4 @@
-"""What an import stumbles over, as errors that a person can act on."""
+"""Errors of an import, with advice."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -13,11 +13,11 @@ NOTHING_WRITTEN = "Nothing was written."
 
 
 class ImportProblemError(ValueError):
-    """One thing that cannot be understood: a sentence fragment that names the key, channel, array or file."""
+    """One problem: a sentence fragment that names the key, channel, array or file."""
 
 
 class ImportRefusedError(StudyError):
-    """An import that was not made."""
+    """An import that failed."""
 
     def __init__(self, what: str, problem: str, do_now: str = "") -> None:
         super().__init__(
@@ -29,7 +29,7 @@ class ImportRefusedError(StudyError):
 
 
 class MapNeededError(WrongUseError):
-    """Nothing says what the arrays are. `skeleton`: a map for this very file, to be completed."""
+    """Nothing says what the arrays are. `skeleton`: a map for this file, to be completed."""
 
     def __init__(self, file: str, why: str, skeleton: str) -> None:
         super().__init__(

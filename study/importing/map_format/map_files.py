@@ -1,4 +1,4 @@
-"""Which of the given files is which part of the recording, or which logger."""
+"""Assign the given files to parts of the recording, or to loggers."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ class PartFiles:
 
     @property
     def file(self) -> Path:
-        """Of the first clock."""
+        """File of the first clock."""
         return next(iter(self.by_clock.values()))
 
     @property
@@ -25,7 +25,7 @@ class PartFiles:
 
 
 def part_files(wanted: ImportMap, files: Sequence[Path]) -> tuple[PartFiles, ...]:
-    """In the order of the recording. Raises ImportProblemError for a file that is left over or missing."""
+    """Parts in the order of the recording. Raises ImportProblemError for a superfluous or missing file."""
     ordered = _order_files(wanted, files)
     if wanted.separate and len(ordered) > 1:
         names = ", ".join(path.name for path in ordered)
@@ -39,7 +39,7 @@ def part_files(wanted: ImportMap, files: Sequence[Path]) -> tuple[PartFiles, ...
 
 
 def _order_files(wanted: ImportMap, files: Sequence[Path]) -> list[Path]:
-    """By the map's patterns, then as given."""
+    """Sorted by the map's patterns, then as given."""
     found = []
     for path in files:
         fits = [number for number, pattern in enumerate(wanted.files) if fnmatchcase(path.name, pattern)]

@@ -1,4 +1,4 @@
-"""What the samples of a part are: the map's segments on its grid."""
+"""Segments of a part: the map's segments on its sample grid."""
 
 from collections.abc import Iterator
 from fnmatch import fnmatchcase
@@ -15,8 +15,8 @@ from study.importing.map_format.map_errors import ImportProblemError
 def segments_of(
     wanted: tuple[SegmentMap, ...], part: tuple[str, str], command: FloatArray, rate_hz: float
 ) -> Iterator[Segment]:
-    """part: name of its file, and its prefix. command: (n, m) in the map's unit. Amplitudes are in that unit too.
-    Raises ImportProblemError."""
+    """part: name of its file, and its prefix. command: (n, m) in the map's unit, which amplitudes also have. Raises
+    ImportProblemError."""
     file, prefix = part
     for number, entry in enumerate(wanted, start=1):
         if fnmatchcase(file, entry.file) and (entry.prefix == "*" or fnmatchcase(prefix, entry.prefix)):
@@ -57,7 +57,7 @@ def _spans(entry: SegmentMap, start: int, stop: int) -> Iterator[tuple[int, int]
 
 
 def _with_roles(entry: SegmentMap, spans: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], list[str]]:
-    """One span is cut into its shares; of several, each goes to the share in which its middle lies."""
+    """Assign roles: one span is cut into its shares; of several, each gets the share in which its middle lies."""
     if not entry.split:
         return spans, [entry.role] * len(spans)
     ends = np.cumsum(list(entry.split.values()))

@@ -1,4 +1,4 @@
-"""The text of a map to an ImportMap, or to everything that is wrong with it."""
+"""Parse the text of a map into an ImportMap, or into a list of all its problems."""
 
 import json
 import tomllib
@@ -38,7 +38,7 @@ def parse_map(text: str, source: Path) -> ImportMap:
 
 
 def is_map(values: dict[str, Any]) -> bool:
-    """Whether TOML values are meant as a map: only maps have channels."""
+    """Whether TOML values are a map: only maps have channels."""
     return isinstance(values.get("channel"), list)
 
 
@@ -77,7 +77,7 @@ def _describe_allowed(place: Place) -> str:
 
 
 def describe_allowed_in_map(node: Node, key: str) -> str:
-    """In words, what the value of a key may be."""
+    """Allowed values of a key, in words."""
     whole = resolve_reference(MAP_SCHEMA, node)
     if whole.get("type") == "object" and "properties" not in whole:
         return "a table"
@@ -127,7 +127,7 @@ def _roles(found: ImportMap) -> Iterator[str]:
 
 
 def _holds(found: ImportMap) -> Iterator[str]:
-    """It matters how a command moves between samples, so the two places that say it must agree."""
+    """The interpolation of a command between samples is stated in two places, which must agree."""
     for channel in found.channel:
         says = {"held": "zero-order"}.get(channel.resample, channel.resample)
         if channel.role == "command" and says and (says == "zero-order") != (found.hold == "zero-order"):

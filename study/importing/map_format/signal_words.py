@@ -1,5 +1,5 @@
-"""What a channel's name says of it: quantity and unit, as in `fx [N]`, `displacement_mm`, `motor speed (rpm)`; and what
-the channels of a file are to each other."""
+"""Interpret channel names: quantity and unit, as in `fx [N]`, `displacement_mm`, `motor speed (rpm)`; and the roles
+of a file's channels."""
 
 import re
 from collections.abc import Sequence
@@ -33,24 +33,24 @@ _SAID: dict[str, SignalRole] = {
     **dict.fromkeys(("supply", "battery", "bus", "ambient", "setting"), "condition"),
 }  # fmt: skip
 _SHORT: dict[str, SignalRole] = {"u": "command", "y": "response"}
-"""Input and output of a textbook, where both are there and no `x` beside them: then `y` would be an axis."""
+"""Textbook names of input and output, if both exist and no `x`: then `y` would be an axis."""
 _DRIVES, _FEEDS = ("force", "torque"), ("current", "voltage")
 _MOTIONS, _PLACES = ("acceleration", "velocity"), ("position", "angle")
 
 
 @dataclass(frozen=True, slots=True)
 class ParsedName:
-    """A header or an array's name, understood as far as it goes."""
+    """A header or array name, interpreted as far as possible."""
 
     header: str
     name: str
     unit: str
-    """As in the file; empty where none is stated, or none that is known here."""
+    """As in the file; empty if none is stated or known."""
     quantity: str
-    """Empty where neither the unit nor a word says it."""
+    """Empty if neither the unit nor a word tells it."""
     doubt: str
-    """What is not sure: a unit is unknown, or was read out of a name that no word supports (`phase_A`), or word and
-    unit disagree. Empty where nothing is."""
+    """What is uncertain: an unknown unit, a unit from a name without a supporting word (`phase_A`), or a
+    contradiction. Empty if nothing is."""
 
     @property
     def sure(self) -> bool:
@@ -58,8 +58,8 @@ class ParsedName:
 
 
 def plain_names(columns: Sequence[ParsedName]) -> list[str]:
-    """Names without the unit at their end (`displacement_in` is `displacement`, for samples go to SI), where that is
-    sure and no two columns would be called alike."""
+    """Names without the unit suffix (`displacement_in` becomes `displacement`, since samples are converted to SI),
+    where that is certain and keeps names distinct."""
     plain = [_without_unit(column) for column in columns]
     return [name if plain.count(name) == 1 else column.name for name, column in zip(plain, columns, strict=True)]
 
@@ -70,7 +70,7 @@ def _without_unit(column: ParsedName) -> str:
 
 
 def unit_in(header: str) -> tuple[str, str]:
-    """Name and unit in brackets; the unit is empty where the header says none."""
+    """Name and bracketed unit; the unit is empty if there is none."""
     match = _BRACKETED.fullmatch(header)
     if not match or not match["name"].strip():
         return header, ""
@@ -78,6 +78,7 @@ def unit_in(header: str) -> tuple[str, str]:
 
 
 def name_signal(header: str) -> ParsedName:
+    """Interpret one header."""
     name, unit = unit_in(header)
     words = [_QUANTITY[part.lower()] for part in _WORD.findall(name) if part.lower() in _QUANTITY]
     word = words[-1] if words else ""  # the last says it: a load angle is an angle
@@ -98,14 +99,14 @@ def name_signal(header: str) -> ParsedName:
 
 
 def roles_of(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
-    """By quantity: forces are commands, where there are none voltages or currents; accelerations and velocities are
-    responses, places responses where there are no others; what is known and none of these is a condition. None where
-    something is left open, or a name says else (`open_roles` says what)."""
+    """Roles by quantity: forces are commands, or voltages or currents if there are none; accelerations and
+    velocities are responses, or positions if there are no others; other known quantities are conditions. None if
+    something is open or contradicted by a name (`open_roles` says what)."""
     return None if open_roles(columns) else [role for column in columns if (role := _role(column, columns))]
 
 
 def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
-    """What names and quantities leave open, a clause each; empty where they tell all roles."""
+    """What names and quantities leave open, one clause each; empty if they determine all roles."""
     roles = [_role(column, columns) for column in columns]
     found = []
     for column, role in zip(columns, roles, strict=True):
@@ -126,8 +127,8 @@ def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
 
 
 def propose_roles(columns: Sequence[ParsedName]) -> list[SignalRole | Literal[""]]:
-    """By names, then by quantity; empty where that leaves it open. A reference is a helper, and so are currents and
-    voltages beside a force."""
+    """Roles by names, then by quantity; empty if open. A reference is a helper, and so are currents and voltages
+    beside a force."""
     return [_said_role(column, columns) or _role(column, columns) for column in columns]
 
 
@@ -161,8 +162,8 @@ def _by_quantity(columns: Sequence[ParsedName]) -> dict[str, SignalRole]:
 
 
 def _unit_at_end(name: str) -> tuple[str, str]:
-    """`displacement_mm`, `omega_rad_s`, `a_mps2`: the name before, and the longest end that is a unit; all of the name,
-    and nothing, where none is."""
+    """Name and unit suffix as in `displacement_mm`, `omega_rad_s`, `a_mps2` (longest suffix that is a unit); the
+    whole name and empty if there is none."""
     parts = name.split("_")
     for first in range(1, len(parts)):
         text = "_".join(parts[first:])

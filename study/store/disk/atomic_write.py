@@ -1,4 +1,4 @@
-"""Whole files or none: what is written appears under its name complete and on the disk, or not at all."""
+"""Atomic writes: a file appears under its name complete and synced, or not at all."""
 
 import os
 import secrets
@@ -30,7 +30,7 @@ def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> 
 
 
 def sync_folder(folder: Path) -> None:
-    """Put the folder's own list of names on the disk, where the system can."""
+    """Sync the directory entry to the disk, where the system can."""
     if not hasattr(os, "O_DIRECTORY"):
         return
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)

@@ -1,6 +1,6 @@
-"""Tables whose columns are the fields of a frozen dataclass, in declared order.
+"""CSV tables whose columns are the fields of a frozen dataclass, in declared order.
 
-True and false as `true` and `false`, nothing as an empty field, numbers with all their digits.
+Booleans are `true` and `false`, None is an empty field, floats have all digits.
 """
 
 import csv
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Row = TypeVar("Row", bound="DataclassInstance")
 
 _SHOWN = 8
-"""No more problems than this are listed one by one."""
+"""Largest number of problems that are listed individually."""
 
 
 class CsvError(ValueError):
@@ -29,17 +29,19 @@ class CsvError(ValueError):
 
 
 def columns(row_type: type[Any]) -> tuple[str, ...]:
+    """Column names of a row type."""
     return tuple(field.name for field in fields(row_type))
 
 
 def rows_to_csv(rows: Iterable[Row], row_type: type[Row]) -> str:
+    """CSV text with a header."""
     names = columns(row_type)
     lines = [_line(names), *(_line([_field_text(getattr(row, name)) for name in names]) for row in rows)]
     return "\n".join(lines) + "\n"
 
 
 def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
-    """Columns beyond the known ones are left out; those with a default may be missing at the end. Raises CsvError."""
+    """Parse rows. Unknown columns are ignored; trailing columns with a default may be missing. Raises CsvError."""
     try:
         lines = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) or [[]]
     except csv.Error as error:
@@ -69,7 +71,7 @@ def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
 
 
 def as_written_in(text: str, rows: Iterable[Row], row_type: type[Row]) -> tuple[Row, ...]:
-    """Rows as a table of an earlier version holds them: columns that it was written without are at their defaults."""
+    """Rows restricted to the columns of an earlier version's table: columns it lacks have their defaults."""
     header = next(csv.reader(io.StringIO(text.partition("\n")[0])), [])
     absent = columns(row_type)[len(_present(tuple(header), row_type)) :]
     defaults = {field.name: field.default for field in fields(row_type) if field.name in absent}
@@ -77,8 +79,7 @@ def as_written_in(text: str, rows: Iterable[Row], row_type: type[Row]) -> tuple[
 
 
 def _present(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:
-    """The columns to be read: those at the end that have a default may be missing, as in tables of before they
-    were."""
+    """The columns to read: trailing ones with a default may be missing, as in tables of earlier versions."""
     names = columns(row_type)
     needed = sum(field.default is MISSING for field in fields(row_type))
     while len(names) > needed and header[: len(names)] != names:
@@ -87,7 +88,7 @@ def _present(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:
 
 
 def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
-    """Empty where the header begins with the expected columns."""
+    """Problem with the header; empty if it begins with the expected columns."""
     if header[: len(expected)] == expected:
         return ""
     for position, name in enumerate(expected, start=1):
@@ -105,7 +106,7 @@ def _line(fields_of_row: Sequence[str]) -> str:
 
 
 def in_words(hint: Any) -> str:
-    """What a column of this type holds, for people."""
+    """Content of a column of this type, for people."""
     if get_origin(hint) in (Union, UnionType):
         (inner,) = (option for option in get_args(hint) if option is not NoneType)
         return f"{in_words(inner)}, or empty"
@@ -115,6 +116,7 @@ def in_words(hint: Any) -> str:
 
 
 def _field_text(value: Any) -> str:
+    """A value as the text of a field."""
     match value:
         case None:
             return ""

@@ -1,8 +1,7 @@
-"""How large a file may say its contents are: checked before any memory is taken for them.
+"""Limit of the declared size of a file's contents, checked before memory is allocated.
 
-Compression is real, and so is a lie of some bytes that stands for gigabytes. What a file holds may be PLAIN_BYTES
-large in any case, beyond that FACTOR times its bytes on disk, and never more than MOST_BYTES: an hour of nine channels
-at 10 kHz is 2.6 GB.
+A small file can declare gigabytes. Contents may have PLAIN_BYTES in any case, beyond that FACTOR times the bytes on
+disk, and never more than MOST_BYTES: an hour of nine channels at 10 kHz is 2.6 GB.
 """
 
 PLAIN_BYTES = 2**27
@@ -11,18 +10,18 @@ MOST_BYTES = 2**32
 
 
 class DeclaredSizeError(ValueError):
-    """More is declared than is read. A sentence fragment for `UnusableFileError` and `ImportRefusedError`."""
+    """More is declared than allowed. A sentence fragment for `UnusableFileError` and `ImportRefusedError`."""
 
 
 class SizeLimit:
-    """Of one file. file_bytes: on disk."""
+    """Budget of one file. file_bytes: on disk."""
 
     def __init__(self, file_bytes: int) -> None:
         self.most_bytes = min(MOST_BYTES, max(PLAIN_BYTES, FACTOR * file_bytes))
         self._declared = 0
 
     def take(self, what: str, size: int) -> None:
-        """What it declares is this much more. Raises DeclaredSizeError."""
+        """Count a declared size. Raises DeclaredSizeError beyond the limit."""
         self._declared += size
         if self._declared > self.most_bytes:
             raise DeclaredSizeError(

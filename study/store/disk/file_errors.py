@@ -1,4 +1,4 @@
-"""Files that cannot be read, used or written, each as an error that a person can act on."""
+"""Errors of files that cannot be read, used or written, with advice."""
 
 import csv
 import errno
@@ -20,14 +20,14 @@ DAMAGED = (
     AssertionError, SystemError, SyntaxError, csv.Error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
     struct.error,
 )  # fmt: skip
-"""What the libraries that read files raise for those that are damaged or not what their name says."""
+"""Exceptions of reading libraries for damaged or misnamed files."""
 
 _LONGEST_PROBLEM = 600
 _MOST_PROBLEMS = 40
 
 
 class UnusableFileError(StudyError):
-    """A file that was read and is not what it should be.
+    """A file was read and is invalid.
 
     `problems`: one each, without a full stop; `sentences`: the same, ready to be shown.
     """
@@ -44,7 +44,7 @@ class UnusableFileError(StudyError):
 
 
 class CannotReadError(StudyError):
-    """A file that is not there or cannot be opened."""
+    """A file is missing or cannot be opened."""
 
     def __init__(self, path: Path, problem: OSError | UnicodeDecodeError) -> None:
         super().__init__(
@@ -55,7 +55,7 @@ class CannotReadError(StudyError):
 
 
 class CannotWriteError(StudyError):
-    """A file that could not be written. What stood there before is untouched."""
+    """A file could not be written. An existing file is untouched."""
 
     def __init__(self, path: Path, problem: OSError) -> None:
         why, do_now = _why_not_written(path, problem)
@@ -83,7 +83,7 @@ _PROSE = {"it", "its", "this", "the", "there", "line", "segment", "segments", "e
 
 
 def _shown(problems: tuple[str, ...]) -> tuple[str, ...]:
-    """A damaged file may have a name of a million letters, and a million problems."""
+    """Shortened: a damaged file may contain a name of a million letters, and a million problems."""
     rest = len(problems) - _MOST_PROBLEMS
     more = (f"and {rest} problems more",) if rest > 0 else ()
     cut = (text if len(text) <= _LONGEST_PROBLEM else f"{text[:_LONGEST_PROBLEM]}…" for text in problems)
@@ -91,7 +91,7 @@ def _shown(problems: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _sentence(problem: str) -> str:
-    """A problem that begins with a key or a name of the file keeps it as it is written there."""
+    """The problem as a sentence; a key or name at its beginning keeps its case."""
     capital = problem[:1].upper() if problem.partition(" ")[0] in _PROSE else problem[:1]
     return capital + problem[1:].rstrip(".") + "."
 

@@ -1,4 +1,4 @@
-"""Attributes of HDF5 files as Python values, however the writing program chose to store them."""
+"""Attributes of HDF5 files as Python values, independent of how they were stored."""
 
 import math
 from typing import Any
@@ -11,11 +11,11 @@ _LONGEST_SHOWN = 100
 
 
 class AttributeProblemError(ValueError):
-    """An attribute is missing or is something else. A sentence fragment for `UnusableFileError`."""
+    """An attribute is missing or has another type. A sentence fragment for `UnusableFileError`."""
 
 
 def text_attribute(owner: Any, name: str, default: str | None = None) -> str:
-    """Raises AttributeProblemError where there is none and no default."""
+    """Text. Raises AttributeProblemError if there is none and no default."""
     texts = texts_attribute(owner, name, None if default is None else (default,))
     if len(texts) != 1:
         raise AttributeProblemError(f"{_describe_attribute(owner, name)} holds {len(texts)} texts; it must be one")
@@ -23,7 +23,7 @@ def text_attribute(owner: Any, name: str, default: str | None = None) -> str:
 
 
 def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
-    """One text or a list of texts, as a tuple."""
+    """One text or a list of texts, as a tuple. Raises AttributeProblemError."""
     if name not in owner.attrs:
         if default is None:
             raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
@@ -33,7 +33,7 @@ def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = Non
     if not all(isinstance(value, str | bytes) for value in values):
         raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shown(found)}; it must be text")
     try:
-        # h5py gives bytes that are no UTF-8 as half characters, which nothing can write again.
+        # h5py returns bytes that are not UTF-8 as surrogates, which cannot be encoded again.
         texts = tuple(value if isinstance(value, bytes) else value.encode() for value in (*values, name))
         return tuple(text.decode() for text in texts[:-1])
     except UnicodeError:
@@ -41,7 +41,7 @@ def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = Non
 
 
 def numbers_attribute(owner: Any, name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
-    """`count` numbers; a single one may be a scalar or a list of one."""
+    """`count` numbers; a single one may be a scalar or a list of one. Raises AttributeProblemError."""
     if name not in owner.attrs:
         if default is None:
             raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
@@ -55,7 +55,7 @@ def numbers_attribute(owner: Any, name: str, count: int, default: tuple[float, .
 
 
 def text_or_list(texts: tuple[str, ...]) -> str | tuple[str, ...]:
-    """One text for all, or one per channel."""
+    """One text if all are equal, otherwise one per channel."""
     return texts[0] if len(texts) == 1 else texts
 
 
@@ -67,7 +67,7 @@ def write_texts(owner: Any, name: str, texts: str | tuple[str, ...]) -> None:
 
 
 def _value(owner: Any, name: str) -> Any:
-    """What stands there. Raises AttributeProblemError, before any memory is taken, where it is too much."""
+    """The raw value. Raises AttributeProblemError, before memory is allocated, if it is too large."""
     shape = owner.attrs.get_id(name).shape
     if shape is None or math.prod(shape) > _MOST_ENTRIES:
         raise AttributeProblemError(

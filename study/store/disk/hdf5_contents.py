@@ -1,4 +1,4 @@
-"""What an HDF5 file consists of, looked at before any of it is read: nothing outside the file, nothing oversized."""
+"""Check the structure of an HDF5 file before reading: nothing outside the file, nothing oversized."""
 
 import math
 import zlib
@@ -12,22 +12,22 @@ from study.store.disk.declared_size import PLAIN_BYTES, DeclaredSizeError, SizeL
 MOST_OBJECTS = 100_000
 _COMPRESSIONS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_LZF)
 _OBJECT_BYTES = 1024
-"""What a text of any length, a reference or a row of a table takes as an object of Python, with room to spare."""
+"""Upper estimate of a Python object for a variable-length text, a reference or a table row."""
 _DEFLATE_FACTOR = 1032
-"""What zlib can gain at most: its densest code is 2 bits for 258 bytes."""
+"""Largest compression ratio of zlib: 2 bits for 258 bytes."""
 
 
 def check_contents(file: Any) -> None:
-    """Raises ValueError with a sentence fragment for data in other files and for sizes that are not read."""
+    """Raises ValueError with a sentence fragment for external data and for oversized datasets."""
     limit = SizeLimit(file.id.get_filesize())
     for name, dataset in datasets_in(file):
         _check_dataset(name, dataset, limit)
 
 
 def datasets_in(file: Any) -> Iterator[tuple[str, Any]]:
-    """Every dataset once, with its path. Raises ValueError for links to other files; links within it are left out.
+    """Every dataset once, with its path. Raises ValueError for links to other files; links within it are skipped.
 
-    Walked by ourselves: h5py's own visitors do not say external links, and fail badly on damaged ones.
+    h5py's own visitors do not report external links, and fail on damaged ones.
     """
     seen: set[int] = set()
     waiting = [("", file)]
@@ -71,7 +71,8 @@ def _check_dataset(name: str, dataset: Any, limit: SizeLimit) -> None:
 
 
 def _check_pieces(name: str, dataset: Any, chunk_bytes: int) -> None:
-    """HDF5 unpacks a compressed piece whole, whatever its size was said to be: those that could be large are tried."""
+    """HDF5 unpacks a compressed chunk completely, whatever its declared size: large ones are checked by
+    decompressing."""
 
     large: list[tuple[int, ...]] = []
 

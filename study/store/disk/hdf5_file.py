@@ -1,4 +1,4 @@
-"""Our HDF5 files: opened with the format checked, written as a whole."""
+"""Our HDF5 files: opened with their format checked, written atomically."""
 
 import io
 from collections.abc import Callable, Iterator
@@ -20,13 +20,13 @@ Value = TypeVar("Value")
 
 
 class Problems:
-    """Collects what is wrong, so that a file can be mended in one go."""
+    """Collects all problems of a file, so that they can be corrected together."""
 
     def __init__(self) -> None:
         self.found: list[str] = []
 
     def attempt(self, read: Callable[[], Value], otherwise: Value) -> Value:
-        """What `read` gives; a ValueError of it becomes one more problem, and the result `otherwise`."""
+        """The result of `read`; a ValueError is recorded as a problem and gives `otherwise`."""
         try:
             return read()
         except ValueError as error:
@@ -39,7 +39,7 @@ def is_hdf5(path: Path) -> bool:
 
 
 def format_of(path: Path) -> str:
-    """What an HDF5 file calls itself; empty where it says nothing. Raises UnusableFileError."""
+    """The format attribute of an HDF5 file; empty if there is none. Raises UnusableFileError."""
     with open_any_hdf5(path, "HDF5 file") as file:
         try:
             return text_attribute(file, "format", "")
@@ -49,7 +49,7 @@ def format_of(path: Path) -> str:
 
 @contextmanager
 def open_hdf5(path: Path, kind: str, format_name: str, version: int) -> Iterator[Any]:
-    """The open file, once it says the right format and version. Raises CannotReadError, UnusableFileError."""
+    """The open file after its format and version are checked. Raises CannotReadError, UnusableFileError."""
     with open_any_hdf5(path, kind) as file:
         try:
             found = text_attribute(file, "format")
@@ -77,7 +77,8 @@ def float_dataset(file: Any, name: str, shape: str) -> FloatArray:
 
 
 def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool) -> None:
-    """`fill` gets an open file in memory: HDF5 written straight to a full disk leaves a torn file behind."""
+    """`fill` gets an open file in memory, which is then written atomically: HDF5 on a full disk would leave a
+    damaged file."""
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:
         fill(file)
@@ -86,7 +87,7 @@ def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool) -> N
 
 @contextmanager
 def open_any_hdf5(path: Path, kind: str) -> Iterator[Any]:
-    """The open file, whatever its format, once its contents are checked. Raises CannotReadError, UnusableFileError."""
+    """The open file of any format after its contents are checked. Raises CannotReadError, UnusableFileError."""
     try:
         open_regular(path).close()
     except OSError as problem:
@@ -99,7 +100,7 @@ def open_any_hdf5(path: Path, kind: str) -> Iterator[Any]:
                 raise UnusableFileError(path, kind, (str(problem),)) from problem
             yield file
     except DAMAGED as problem:
-        # All of these come out of h5py for damaged files; what is ours to say was said as an UnusableFileError.
+        # h5py raises all of these for damaged files; our own problems are already UnusableFileErrors.
         raise UnusableFileError(
             path, kind, (f"it is not HDF5 that can be read, or it is cut off ({problem})",)
         ) from problem

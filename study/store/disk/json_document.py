@@ -1,4 +1,4 @@
-"""JSON documents of ours: each says its format and version, and is written whole."""
+"""Our JSON documents: with format and version, written atomically."""
 
 import json
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ def write_json(
     *,
     overwrite: bool = False,
 ) -> None:
-    """`payload`: plain values; a NaN in it is a ValueError, because JSON has none (write null).
+    """`payload`: plain values; a NaN raises ValueError, because JSON has none (write null).
 
     Raises AlreadyThereError, CannotWriteError.
     """
@@ -35,7 +35,7 @@ def write_json(
 
 
 def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
-    """What the document holds beside format and version, provenance included.
+    """Content besides format and version, provenance included.
 
     Raises CannotReadError, UnusableFileError.
     """

@@ -1,4 +1,4 @@
-"""What a file of ours holds, entry by entry: the tables of docs/formats.md are made from these."""
+"""Entries of our file formats; the tables of docs/formats.md are made from these."""
 
 from dataclasses import dataclass
 

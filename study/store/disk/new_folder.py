@@ -1,4 +1,4 @@
-"""A folder of results that appears whole or not at all."""
+"""A result folder that appears complete or not at all."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ from study.store.disk.privacy import make_folder
 
 
 def require_new_folder(out: Path) -> None:
-    """It is not there yet, or is empty, and there is a folder to make it in. Raises StudyError."""
+    """Raise StudyError unless `out` is new or empty and its parent exists."""
     try:
         empty, there, inside = out.is_dir() and not any(out.iterdir()), out.exists(), out.absolute().parent.is_dir()
     except OSError as problem:
@@ -43,8 +43,7 @@ def require_new_folder(out: Path) -> None:
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """What is written into the folder that is given stands under `out` in the end; where anything ends it early,
-    nothing does. Raises StudyError."""
+    """A temporary folder that is renamed to `out` at the end; on an exception nothing remains. Raises StudyError."""
     require_new_folder(out)
     part = out.absolute().with_name(f".{out.absolute().name}.{secrets.token_hex(4)}.part")
     try:

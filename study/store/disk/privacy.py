@@ -1,7 +1,7 @@
-"""Who can read participants' data: the account that recorded them, and no other on the computer.
+"""Access rights: participants' data are readable only by the account that recorded them.
 
-Folders of a study are made with mode 700 and their files with 600, whatever the umask says. Elsewhere, files take the
-rights of the folder that they are written into.
+Folders of a study have mode 700 and their files 600, regardless of the umask. Elsewhere, files get the rights of their
+folder.
 """
 
 import contextlib
@@ -14,11 +14,11 @@ from study.store.disk.real_folder import RealFolder, is_real_folder, open_folder
 
 PRIVATE_FOLDER, PRIVATE_FILE = 0o700, 0o600
 OTHERS = 0o077
-"""What group and others may do."""
+"""Permission bits of group and others."""
 
 
 def open_to_others(folder: Path) -> bool:
-    """Whether group or others have any right to the folder. Raises nothing; False where rights have other names."""
+    """Whether group or others have any right to the folder. Never raises; False on systems without such rights."""
     try:
         return os.name == "posix" and bool(folder.stat().st_mode & OTHERS)
     except OSError:
@@ -26,19 +26,19 @@ def open_to_others(folder: Path) -> bool:
 
 
 def file_mode(folder: Path) -> int:
-    """For a new file in `folder`, before the umask."""
+    """Mode for a new file in `folder`, before the umask."""
     return 0o666 if open_to_others(folder) else PRIVATE_FILE
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """In the place of what was there, without waiting for the disk. A link in its place is refused. Raises OSError."""
+    """Replace a file without syncing. A link in its place is refused. Raises OSError."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
     with os.fdopen(os.open(path, flags, PRIVATE_FILE), "wb") as file:
         file.write(content)
 
 
 def make_folder(folder: Path, *, private: bool = False) -> None:
-    """With those above it, where they are not there yet. In a private folder every new one is. Raises OSError."""
+    """Create the folder and its parents. private: with mode 700. Raises OSError."""
     if folder.is_dir():
         return
     parent = folder.absolute().parent
@@ -50,14 +50,14 @@ def make_folder(folder: Path, *, private: bool = False) -> None:
 
 
 def close_to_others(folder: Path, *, inside: bool = False) -> None:
-    """Take the rights of group and others away; inside: also from everything in it. No link is followed, and what
-    belongs to another account stays as it is. Raises nothing."""
+    """Remove the rights of group and others; inside: also from all contents. Links are not followed, and files of
+    another account are unchanged. Never raises."""
     with contextlib.suppress(OSError), open_folder(folder.absolute()) as place:
         _close(place, inside)
 
 
 def close_data_folder(data: Path) -> None:
-    """The data folder and the folders in it, where `why_open` knows no reason against it."""
+    """Remove others' rights from the data folder and its folders, unless `why_open` gives a reason."""
     if not open_to_others(data) or why_open(data):
         return
     close_to_others(data.resolve())
@@ -66,7 +66,7 @@ def close_data_folder(data: Path) -> None:
 
 
 def why_open(data: Path) -> str:
-    """Why a data folder that others can read is not closed to them by itself; empty where nothing speaks against it."""
+    """Why a data folder readable by others is not closed automatically; empty if nothing speaks against it."""
     if not open_to_others(data):
         return ""
     found, place = data.stat(), data.resolve()
@@ -80,7 +80,7 @@ def why_open(data: Path) -> str:
 
 
 def privacy_warning(folder: Path, why: str = "") -> str:
-    """Sentences where others have rights to the folder; else empty. why: it stays so."""
+    """Warning if others have rights to the folder, else empty. why: reason that it stays so."""
     if not open_to_others(folder):
         return ""
     mode = stat.S_IMODE(folder.stat().st_mode)
@@ -89,7 +89,7 @@ def privacy_warning(folder: Path, why: str = "") -> str:
 
 
 def data_folder_warning(data: Path) -> str:
-    """Sentences where others have rights to a data folder and a session does not take them away; else empty."""
+    """Warning if others have rights to a data folder that a session will not remove; else empty."""
     why = why_open(data)
     return privacy_warning(data, why) if why else ""
 

@@ -1,5 +1,5 @@
-"""Where a result comes from: versions, protocol, seeds, parents. Without machine paths and without a date, so that
-the same work gives the same file."""
+"""Provenance of a result: versions, protocol, seeds, input files. Without machine paths and dates, so that the same
+work gives the same file."""
 
 import hashlib
 import platform
@@ -19,7 +19,7 @@ PACKAGES = ("hapteq", "numpy", "scipy", "numba", "h5py", "pandas", "statsmodels"
 
 @dataclass(frozen=True, slots=True)
 class Parent:
-    """A file that went into a result."""
+    """An input file of a result."""
 
     file: str
     sha256: str
@@ -29,15 +29,15 @@ class Parent:
 class Provenance:
     versions: Mapping[str, str]
     command: tuple[str, ...]
-    """As typed, paths cut down to file names."""
+    """As typed, with paths reduced to file names."""
     protocol_hash: str | None = None
     seeds: Mapping[str, int] | None = None
     settings: Mapping[str, float | None] | None = None
-    """Options that the result hangs on, as they held, typed or not."""
+    """Effective options on which the result depends."""
     parents: tuple[Parent, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON, TOML and HDF5; what is not known is left out."""
+        """Plain values for JSON, TOML and HDF5; unknown ones are left out."""
         plain = asdict(self)
         plain["command"] = list(self.command)
         plain["parents"] = list(plain["parents"])
@@ -51,7 +51,7 @@ def gather_provenance(
     settings: Mapping[str, float | None] | None = None,
     parents: Sequence[Path] = (),
 ) -> Provenance:
-    """Of the running program. Raises CannotReadError where a parent is not there."""
+    """Provenance of the running program. Raises CannotReadError for a missing parent."""
     return Provenance(
         versions=versions(),
         command=command_line(sys.argv),
@@ -63,18 +63,17 @@ def gather_provenance(
 
 
 def versions() -> dict[str, str]:
-    """Of Python and of everything that computes."""
+    """Versions of Python and of all packages that compute."""
     return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
 
 
 def command_line(arguments: Sequence[str]) -> tuple[str, ...]:
-    """File names only: paths tell about a machine and its owner, and mean nothing elsewhere."""
+    """Arguments with file names only: paths reveal a machine and its owner."""
     return tuple(_without_folders(argument) for argument in arguments)
 
 
 def as_text(name: str) -> str:
-    """A file name may hold bytes that are not UTF-8, which Python carries as half characters: no text file takes
-    these."""
+    """A file name as valid text: bytes that are not UTF-8 (surrogates in Python) are replaced."""
     return name.encode(errors="replace").decode()
 
 

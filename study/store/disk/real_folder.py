@@ -1,4 +1,4 @@
-"""A folder held open, to erase what is in it: no link is ever followed, whatever is put there meanwhile."""
+"""A folder held open by descriptor for erasing its contents: links are never followed, even if placed meanwhile."""
 
 import os
 import shutil
@@ -10,12 +10,12 @@ from pathlib import Path
 
 
 def is_real_folder(path: Path) -> bool:
-    """A folder, and no link to one."""
+    """Whether it is a folder and not a link."""
     return _kind(path) == stat.S_IFDIR
 
 
 def is_real_file(path: Path) -> bool:
-    """A regular file: no link, no pipe, no device."""
+    """Whether it is a regular file: no link, pipe or device."""
     return _kind(path) == stat.S_IFREG
 
 
@@ -23,13 +23,13 @@ def is_real_file(path: Path) -> bool:
 class RealFolder:
     path: Path
     descriptor: int | None
-    """None on systems that cannot name a file relative to a descriptor (Windows)."""
+    """None on systems without paths relative to a descriptor (Windows)."""
 
     def names(self) -> list[str]:
         return sorted(os.listdir(self.path if self.descriptor is None else self.descriptor))  # noqa: PTH208
 
     def erase(self, name: str) -> None:
-        """A file, a link itself, or a folder with everything in it; nothing where it is gone already."""
+        """Erase a file, a link itself, or a folder with its contents; nothing if it is gone."""
         with suppress(FileNotFoundError):
             if stat.S_ISDIR(os.stat(self._at(name), dir_fd=self.descriptor, follow_symlinks=False).st_mode):
                 shutil.rmtree(self._at(name), dir_fd=self.descriptor)
@@ -37,7 +37,7 @@ class RealFolder:
                 os.unlink(self._at(name), dir_fd=self.descriptor)
 
     def erase_if_empty(self, name: str) -> None:
-        """A folder inside this one."""
+        """Erase a folder inside this one if it is empty."""
         with suppress(FileNotFoundError, NotADirectoryError):
             with open_folder(self, name) as inner:
                 empty = not inner.names()
@@ -45,7 +45,7 @@ class RealFolder:
                 os.rmdir(self._at(name), dir_fd=self.descriptor)
 
     def sync(self) -> None:
-        """The list of names is on the disk."""
+        """Sync the directory entries to the disk."""
         if self.descriptor is not None:
             os.fsync(self.descriptor)
 
@@ -55,9 +55,9 @@ class RealFolder:
 
 @contextmanager
 def open_folder(where: Path | RealFolder, *names: str) -> Iterator[RealFolder]:
-    """The folder `where`, or the one that `names` lead to from it, level by level.
+    """The folder `where`, or the one reached from it by `names`, level by level.
 
-    Raises NotADirectoryError where a level is a link or no folder, FileNotFoundError where there is none.
+    Raises NotADirectoryError where a level is a link or no folder, FileNotFoundError where it is missing.
     """
     folder = _open(where, None) if isinstance(where, Path) else where
     opened = [] if folder is where else [folder]

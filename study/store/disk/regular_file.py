@@ -1,4 +1,4 @@
-"""Regular files only, opened without waiting: a pipe, a device or a folder in a file's place is an error at once."""
+"""Open regular files only, without blocking: a pipe, a device or a folder is an error at once."""
 
 import errno
 import io
@@ -7,7 +7,7 @@ import stat
 from pathlib import Path
 
 TABLE_BYTES = 2**28
-"""Largest text that is read: tables and logs. An hour at 1 kHz with four columns of 17 digits."""
+"""Largest text that is read (tables, logs): an hour at 1 kHz with four columns of 17 digits."""
 DOCUMENT_BYTES = 2**24
 """Largest JSON and TOML document that is read; the largest that hapteq writes are below 1 MB."""
 
@@ -21,8 +21,8 @@ _KINDS = (
 
 
 class RefusedFileError(OSError):
-    """Something that is not read although the system would: no regular file, or too large. An OSError, so that
-    it is told wherever a file that cannot be opened is told. `words`: a sentence without capital and full stop."""
+    """A file that the system could read but we do not: not regular, or too large. An OSError, so that it is handled
+    like any file that cannot be opened. `words`: a sentence without capital and full stop."""
 
     def __init__(self, number: int, words: str) -> None:
         super().__init__(number, words)
@@ -43,12 +43,12 @@ def open_regular(path: Path) -> io.BufferedReader:
 
 
 def read_regular(path: Path, most_bytes: int = TABLE_BYTES) -> bytes:
-    """The whole content. Raises OSError; RefusedFileError, before anything is read, for a larger file."""
+    """The whole content. Raises OSError; RefusedFileError for a larger file, before reading."""
     with open_regular(path) as file:
         size = os.fstat(file.fileno()).st_size
         blocks: list[bytes] = []
         found = 0
-        # Not the size alone: a file of the system may say 0 bytes and go on without end.
+        # Not by the stated size alone: a system file may state 0 bytes and be endless.
         while size <= most_bytes and found <= most_bytes and (block := file.read(_BLOCK_BYTES)):
             blocks.append(block)
             found += len(block)

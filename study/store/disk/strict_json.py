@@ -1,4 +1,4 @@
-"""JSON as the standard has it, of ordinary size: what Python reads beyond that fails later, in another place."""
+"""Strict JSON of ordinary size: what Python accepts beyond the standard would fail later elsewhere."""
 
 import json
 import math
@@ -10,8 +10,7 @@ _LONGEST_NUMBER = 40
 
 
 def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
-    """with_nan: numbers that are not known are NaN there. Raises ValueError with a sentence fragment, and nothing
-    else."""
+    """Parse JSON. with_nan: NaN is accepted for unknown numbers. Raises only ValueError, with a sentence fragment."""
     try:
         found = json.loads(text, parse_constant=None if with_nan else _refuse, parse_float=_finite, parse_int=_whole)
     except RecursionError:

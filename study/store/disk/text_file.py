@@ -1,4 +1,4 @@
-"""Text files as UTF-8, with errors that a person can act on."""
+"""UTF-8 text files with actionable errors."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from study.store.disk.regular_file import TABLE_BYTES, read_regular
 
 
 def read_text(path: Path, most_bytes: int = TABLE_BYTES) -> str:
-    """The text without a byte order mark. Raises CannotReadError, also for a file that is larger."""
+    """The text without a byte order mark. Raises CannotReadError, also for a larger file."""
     try:
         return read_regular(path, most_bytes).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as problem:
@@ -16,6 +16,6 @@ def read_text(path: Path, most_bytes: int = TABLE_BYTES) -> str:
 
 
 def write_text(path: Path, text: str, *, overwrite: bool = False) -> None:
-    """Line ends are written as they are, so that a file is the same on every system. Half characters (of a file name
-    that is not UTF-8, say) become question marks."""
+    """Write atomically. Line ends are written unchanged, so that a file is the same on every system. Surrogates
+    (from a file name that is not UTF-8) become question marks."""
     write_atomically(path, text.encode("utf-8", errors="replace"), overwrite=overwrite)

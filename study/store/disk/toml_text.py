@@ -1,4 +1,4 @@
-"""The text of TOML files, small enough to be parsed in ordinary time."""
+"""Text of TOML files, limited so that parsing takes ordinary time."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text
 
 TOML_BYTES = 2**22
-"""A mechanical model of 100 coordinates is a twentieth of it."""
+"""Largest file; a mechanical model of 100 coordinates is a twentieth of it."""
 DEEPEST_KEY = 32
 _PART = r"(?:[\w-]++|\"(?:[^\"\\\n]|\\.)*+\"?|'[^'\n]*+'?)"
 _PIECE = re.compile(
@@ -17,8 +17,8 @@ _PIECE = re.compile(
     rf"|(?P<key>{_PART}(?:[ \t]*+\.[ \t]*+{_PART})*+)",
     re.DOTALL,
 )
-"""Comments and texts of several lines, which are passed over, and what may be a key. Each begins where the one before
-ended, so that the search takes no longer than the text is long."""
+"""Comments and multi-line texts, which are skipped, and possible keys. Each match begins where the previous one
+ended, so that the search is linear."""
 
 
 def read_toml_text(path: Path, kind: str) -> str:
@@ -30,7 +30,8 @@ def read_toml_text(path: Path, kind: str) -> str:
 
 
 def too_long_key(text: str) -> str:
-    """Empty where there is none. The parser takes n^2 steps for a key of n parts."""
+    """Problem with a dotted key of too many parts, for which the parser takes quadratic time; empty if there is
+    none."""
     for piece in _PIECE.finditer(text):
         key = piece["key"]
         if key and len(key) > 2 * DEEPEST_KEY and len(re.findall(_PART, key)) > DEEPEST_KEY:

@@ -1,1 +1,1 @@
-"""One file per format of ours: what it holds, its reading and its writing. Begin at `recording_file.py`."""
+"""Our file formats, one module each: layout, reading and writing. Begin at `recording_file.py`."""

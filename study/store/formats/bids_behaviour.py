@@ -16,13 +16,13 @@ from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 VERSION = "1.10.0"
 FIXED = ("subject", "session")
-"""In a file's name, and so no columns."""
+"""Part of the file name, and therefore no columns."""
 
 
 def write_bids(
     folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
 ) -> tuple[Path, ...]:
-    """folder: there, and empty. Raises CannotWriteError."""
+    """Write the dataset. folder: existing and empty. Raises CannotWriteError."""
     task = _label(name)
     written = [
         _json(folder / "dataset_description.json", {
@@ -47,7 +47,7 @@ def write_bids(
 
 
 def _tsv(trials: Sequence[Trial]) -> str:
-    """None of the values holds a comma or a quote, so fields of CSV are those of TSV."""
+    """TSV text; no value contains a comma or quote, so CSV fields can be used."""
     lines = [line.split(",") for line in rows_to_csv(trials, Trial).splitlines()]
     kept = [number for number, column in enumerate(columns(Trial)) if column not in FIXED]
     return "".join("\t".join(line[number] or "n/a" for number in kept) + "\n" for line in lines)

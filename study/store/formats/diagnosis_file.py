@@ -16,11 +16,11 @@ from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import Provenance
 
 DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME = "diagnosis.json", "improved.toml", "report.html"
-"""In the folder of a diagnosis."""
+"""Files in the folder of a diagnosis."""
 
 
 def read_diagnosis(path: Path) -> Diagnosis:
-    """Raises CannotReadError, UnusableFileError."""
+    """Read the document. Raises CannotReadError, UnusableFileError."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:
@@ -32,5 +32,5 @@ def read_diagnosis(path: Path) -> Diagnosis:
 def write_diagnosis(
     path: Path, diagnosis: Diagnosis, provenance: Provenance | None = None, *, overwrite: bool = False
 ) -> None:
-    """Raises AlreadyThereError, CannotWriteError."""
+    """Write the document. Raises AlreadyThereError, CannotWriteError."""
     write_json(path, FORMAT, VERSION, diagnosis_to_json(diagnosis), provenance, overwrite=overwrite)

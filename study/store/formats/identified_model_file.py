@@ -54,7 +54,7 @@ LAYOUT = (
 
 
 def read_identified_model(path: Path) -> IdentifiedModel:
-    """Raises CannotReadError, or UnusableFileError with everything that is wrong."""
+    """Read a model. Raises CannotReadError, or UnusableFileError with all problems."""
     problems = Problems()
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         parts = _parts(file, problems)
@@ -67,13 +67,13 @@ def read_identified_model(path: Path) -> IdentifiedModel:
 
 
 def is_identified_model(path: Path) -> bool:
-    """By what the file says of itself. Raises StudyError for one that says nothing, or something else."""
+    """By the format attribute. Raises StudyError for a file without, or with an unknown one."""
     with open_hdf5(path, KIND, FORMAT, VERSION):
         return True
 
 
 def write_identified_model(path: Path, model: IdentifiedModel, *, overwrite: bool = False) -> None:
-    """Raises AlreadyThereError, CannotWriteError."""
+    """Write a model. Raises AlreadyThereError, CannotWriteError."""
 
     def fill(file: Any) -> None:
         file.attrs.update({"format": FORMAT, "version": VERSION, "sample_rate_hz": model.sample_rate_hz})
@@ -103,7 +103,7 @@ def _write_quality(file: Any, quality: ModelQuality) -> None:
 
 
 def _quality(file: Any) -> ModelQuality | None:
-    """None for a file of an earlier version. Raises ValueError."""
+    """Quality figures; None for a file of an earlier version. Raises ValueError."""
     if "expected_error" not in file.attrs:
         return None
     found = {name: numbers_attribute(file, name, 1)[0] for name in QUALITY if name in file.attrs}
@@ -120,7 +120,7 @@ def _quality(file: Any) -> ModelQuality | None:
 
 
 def _parts(file: Any, problems: Problems) -> dict[str, Any]:
-    """The model's fields, by name."""
+    """Fields of the model, by name."""
 
     def matrix(name: str) -> FloatArray:
         return problems.attempt(lambda: float_dataset(file, name, "(rows, columns)"), np.empty((0, 0)))

@@ -41,7 +41,7 @@ LAYOUT = (
 
 
 def read_mechanical_model(path: Path) -> MechanicalModel:
-    """Raises CannotReadError, UnusableFileError."""
+    """Read a model. Raises CannotReadError, UnusableFileError."""
     try:
         return parse_mechanical_model(read_toml_text(path, KIND))
     except MechanicalModelError as error:
@@ -49,5 +49,5 @@ def read_mechanical_model(path: Path) -> MechanicalModel:
 
 
 def write_mechanical_model(path: Path, model: MechanicalModel, *, overwrite: bool = False) -> None:
-    """Raises AlreadyThereError, CannotWriteError."""
+    """Write a model. Raises AlreadyThereError, CannotWriteError."""
     write_text(path, mechanical_model_toml(model), overwrite=overwrite)

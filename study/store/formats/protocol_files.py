@@ -1,4 +1,5 @@
-"""Protocols from the disk: the shipped ones by name, others by path; and locks that fix them before data come in."""
+"""Read protocols from the disk, shipped ones by name, others by path, and the locks that fix them before data are
+collected."""
 
 import os
 from dataclasses import dataclass
@@ -25,15 +26,15 @@ P = TypeVar("P", bound=Protocol, covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class ProtocolFile(Generic[P]):
-    """A protocol and where it came from."""
+    """A protocol and its origin."""
 
     protocol: P
     text: str
-    """As it stands in the file, comments and all."""
+    """The file's text, comments included."""
     path: Path | None
     """None for a shipped protocol."""
     lock: ProtocolLock | None
-    """The lock that it was checked against, if one was found."""
+    """The lock that it was checked against, if there is one."""
 
     @property
     def locked(self) -> bool:
@@ -41,7 +42,7 @@ class ProtocolFile(Generic[P]):
 
 
 class ProtocolRefusedError(StudyError):
-    """A protocol file with problems."""
+    """An invalid protocol file."""
 
     def __init__(self, name: str, error: ProtocolError) -> None:
         super().__init__(
@@ -54,7 +55,7 @@ class ProtocolRefusedError(StudyError):
 
 
 class LockedProtocolChangedError(StudyError):
-    """A protocol that is not, or no longer, the one that was locked."""
+    """A protocol differs from the locked one."""
 
     def __init__(self, lock_path: Path, error: LockError) -> None:
         super().__init__(
@@ -75,7 +76,7 @@ def list_shipped_protocols() -> tuple[str, ...]:
 def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]:
     """A shipped protocol by its name, or any by its path.
 
-    A lock beside the file or in `data` must be that of this very protocol. Raises WrongUseError (no such protocol),
+    A lock beside the file or in `data` must match this protocol. Raises WrongUseError (no such protocol),
     CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock).
     """
     path = None if name in list_shipped_protocols() else _path_of(name)
@@ -109,10 +110,10 @@ def read_recording_protocol(name: str, data: Path | None = None) -> ProtocolFile
 
 
 def lock_protocol(file: ProtocolFile[Protocol], folder: Path, locked_utc: str, hapteq: str) -> Path:
-    """Write NAME.lock.json into `folder`, beside the data or beside the protocol. hapteq: its version.
+    """Write NAME.lock.json into `folder`, beside the data or the protocol. hapteq: its version.
 
-    Locking the same protocol again changes nothing. Raises LockedProtocolChangedError where another version is
-    locked there, CannotWriteError, UnusableFileError (the lock that is there).
+    Locking the same protocol again changes nothing. Raises LockedProtocolChangedError if another version is locked
+    there, CannotWriteError, UnusableFileError (an existing lock).
     """
     path = lock_path(file.protocol, folder)
     if _lock_at(path, file.protocol) is None:
@@ -121,6 +122,7 @@ def lock_protocol(file: ProtocolFile[Protocol], folder: Path, locked_utc: str, h
 
 
 def lock_path(protocol: Protocol, folder: Path) -> Path:
+    """Path of the lock of this protocol in the folder."""
     return folder / f"{protocol.name}.lock.json"
 
 

@@ -1,7 +1,7 @@
 """Trials as a Psych-DS dataset: one CSV per session below `data/`, described by `dataset_description.json`.
 
-Psych-DS 1 (https://psych-ds.github.io): file names of `keyword-value` pairs that end in `_data.csv`, and JSON-LD of
-schema.org that names every column. The protocol lies in `materials/`, so that the dataset can be analysed again.
+Psych-DS 1 (https://psych-ds.github.io): file names of `keyword-value` pairs that end in `_data.csv`, and schema.org
+JSON-LD that names every column. The protocol is stored in `materials/`, so that the dataset can be analysed again.
 """
 
 import json
@@ -23,7 +23,7 @@ DESCRIPTION_NAME = "dataset_description.json"
 PROTOCOL_NAME = "materials/protocol.toml"
 KIND = "Psych-DS dataset"
 OURS = "hapteq"
-"""The key of what only this program needs: protocol, seeds, devices."""
+"""Key of the description with what only this program needs: protocol, seeds, devices."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ def is_psych_ds(folder: Path) -> bool:
 def write_psych_ds(
     folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
 ) -> tuple[Path, ...]:
-    """folder: there, and empty. facts: JSON values. Raises CannotWriteError."""
+    """Write the dataset. folder: existing and empty. facts: JSON values. Raises CannotWriteError."""
     (folder / "data").mkdir()
     (folder / "materials").mkdir()
     written = []
@@ -68,7 +68,7 @@ def write_psych_ds(
 
 
 def read_psych_ds(folder: Path) -> ExportedTrials:
-    """As `write_psych_ds` wrote it. Raises CannotReadError, UnusableFileError."""
+    """Read a dataset of `write_psych_ds`. Raises CannotReadError, UnusableFileError."""
     path = folder / DESCRIPTION_NAME
     try:
         description = load_json(read_text(path))
@@ -101,5 +101,5 @@ def _variable(column: str) -> dict[str, str]:
 
 
 def _value(text: str) -> str:
-    """Letters and digits alone, as names of files want them."""
+    """The letters and digits only, as file names require."""
     return re.sub(r"[^A-Za-z0-9]", "", text)

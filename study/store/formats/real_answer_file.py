@@ -17,12 +17,12 @@ from study.store.disk.provenance import Provenance
 
 
 def read_real_answer(path: Path) -> RealAnswer:
-    """Raises CannotReadError, UnusableFileError."""
+    """Read the document. Raises CannotReadError, UnusableFileError."""
     return read_answer_and_origin(path)[0]
 
 
 def read_answer_and_origin(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
-    """With its provenance as it stands there; empty where it has none. Raises CannotReadError, UnusableFileError."""
+    """The answer and its provenance; empty if it has none. Raises CannotReadError, UnusableFileError."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     origin = document.pop("provenance", None)
     try:
@@ -32,5 +32,5 @@ def read_answer_and_origin(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
 
 
 def write_real_answer(path: Path, answer: RealAnswer, provenance: Provenance | None = None) -> None:
-    """Raises AlreadyThereError, CannotWriteError."""
+    """Write the document. Raises AlreadyThereError, CannotWriteError."""
     write_json(path, FORMAT, VERSION, real_answer_to_json(answer), provenance)

@@ -1,4 +1,4 @@
-"""Recordings as HDF5: read into SI units with every check, written whole. The format is in `recording_layout`."""
+"""Recordings as HDF5: read into SI units with all checks, written atomically. The format is in `recording_layout`."""
 
 import json
 from dataclasses import astuple
@@ -35,7 +35,7 @@ _PACK_ABOVE_BYTES = 2**18
 
 
 def read_recording(path: Path) -> Recording:
-    """In SI units, checked. Raises CannotReadError, or UnusableFileError with everything that is wrong."""
+    """Read a recording in SI units. Raises CannotReadError, or UnusableFileError with all problems."""
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         problems = Problems()
         rate_hz = problems.attempt(lambda: _rate(file), 1.0)
@@ -67,8 +67,8 @@ def write_recording(
     precision: Literal["float32", "float64"] = "float64",
     overwrite: bool = False,
 ) -> None:
-    """`precision` is that of command, response and excitation; position and time always keep float64, because
-    micrometres in a large workspace need it. Raises StudyError; ValueError for an inconsistent recording."""
+    """Write a recording. `precision` applies to command, response and excitation; position and time are always
+    float64, for micrometres in a large workspace. Raises StudyError; ValueError for an inconsistent recording."""
     if wrong := recording_problems(recording):
         raise ValueError(f"this recording cannot be written: {'; '.join(wrong)}")
 
@@ -119,7 +119,7 @@ def _signal(file: Any, name: str, rate_hz: float) -> Signal:
 
 
 def _one_each(channels: tuple[str, ...], columns: int) -> tuple[str, ...]:
-    """One text for several columns lists their names, or is a name that all of them share and that is numbered."""
+    """Channel names: one text for several columns either lists them, or is a common name that is numbered."""
     if len(channels) != 1 or columns < 2:
         return channels
     names = tuple(channels[0].replace(",", " ").split())
@@ -159,7 +159,7 @@ def _segment(row: Any, scale: float) -> Segment:
 
 
 def _amplitude_scale(file: Any) -> float:
-    """Amplitudes are in the command's unit; where its channels differ in unit, they are left as they are."""
+    """Factor to SI: amplitudes have the command's unit; unchanged if its channels differ in unit."""
     try:
         factors = {parse_unit(text).factor for text in texts_attribute(file.get("command", file), "unit")}
     except ValueError:
@@ -182,7 +182,7 @@ def _write_signal(file: Any, name: str, signal: Signal, precision: str) -> None:
     samples = signal.samples.astype(precision)
     # A session keeps thousands of short recordings: they are written faster as they are.
     packed = {"compression": "gzip", "shuffle": True} if samples.nbytes > _PACK_ABOVE_BYTES else {}
-    # With a checksum: a sample that a disk changed is found when it is read.
+    # With a checksum, which detects samples that the disk has changed.
     dataset = file.create_dataset(name, data=samples, fletcher32=True, **packed)
     write_texts(dataset, "quantity", signal.quantity)
     write_texts(dataset, "unit", signal.unit)

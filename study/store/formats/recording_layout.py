@@ -1,4 +1,4 @@
-"""What a recording's file holds: the format `hapteq-recording`, version 1."""
+"""Layout of a recording's file: the format `hapteq-recording`, version 1."""
 
 from equalizer.signals.recording import SEGMENT_KINDS, Hold
 from equalizer.signals.units import UNSTATED

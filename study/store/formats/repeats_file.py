@@ -1,6 +1,6 @@
 """`*.repeats.json` beside a table of forces: the format `hapteq-repeats`, version 1.
 
-How the forces were found and what they belong to, so that a later run can go on from them.
+How the forces were found and for what, so that a later run can continue from them.
 """
 
 from dataclasses import asdict, dataclass
@@ -49,11 +49,12 @@ REPEATS: TypeAdapter[Repeats] = TypeAdapter(Repeats)
 
 
 def repeats_path(forces: Path) -> Path:
+    """Path of the document beside a table of forces."""
     return forces.with_suffix(SUFFIX)
 
 
 def read_repeats(path: Path) -> Repeats:
-    """Raises CannotReadError, UnusableFileError."""
+    """Read the document. Raises CannotReadError, UnusableFileError."""
     document = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:
@@ -69,5 +70,5 @@ def read_repeats(path: Path) -> Repeats:
 def write_repeats(
     path: Path, repeats: Repeats, provenance: Provenance | None = None, *, overwrite: bool = False
 ) -> None:
-    """Raises AlreadyThereError, CannotWriteError."""
+    """Write the document. Raises AlreadyThereError, CannotWriteError."""
     write_json(path, FORMAT, VERSION, asdict(repeats), provenance, overwrite=overwrite)

@@ -19,7 +19,7 @@ REPRODUCTION_NAME = "reproduction.json"
 
 
 def read_reproduction(path: Path) -> Reproduction:
-    """Raises CannotReadError, UnusableFileError."""
+    """Read the document. Raises CannotReadError, UnusableFileError."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:
@@ -29,5 +29,5 @@ def read_reproduction(path: Path) -> Reproduction:
 
 
 def write_reproduction(path: Path, reproduction: Reproduction, provenance: Provenance | None = None) -> None:
-    """What is there already is replaced. Raises CannotWriteError."""
+    """Write the document, replacing an existing one. Raises CannotWriteError."""
     write_json(path, FORMAT, VERSION, reproduction_to_json(reproduction), provenance, overwrite=True)

@@ -11,13 +11,13 @@ from study.store.disk.text_file import read_text, write_text
 
 THRESHOLDS_NAME = "thresholds.csv"
 DETECTION_NAME = "detection.csv"
-"""Written only where there are detection runs."""
+"""Written only for detection runs."""
 THRESHOLDS_HEADER = columns(Threshold)
 KIND = "table of thresholds"
 
 
 def write_thresholds(path: Path, thresholds: Iterable[Threshold], *, overwrite: bool = True) -> None:
-    """Replaces an older table by default: it can be computed again at will.
+    """Write the table; replaces an older one by default, since it can be recomputed.
 
     Raises AlreadyThereError, CannotWriteError.
     """
@@ -25,7 +25,7 @@ def write_thresholds(path: Path, thresholds: Iterable[Threshold], *, overwrite: 
 
 
 def read_thresholds(path: Path) -> tuple[Threshold, ...]:
-    """Raises CannotReadError, UnusableFileError."""
+    """Read the table. Raises CannotReadError, UnusableFileError."""
     try:
         return rows_from_csv(read_text(path), Threshold)
     except CsvError as error:

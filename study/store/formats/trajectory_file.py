@@ -1,4 +1,4 @@
-"""Wanted accelerations and the forces that give them, as CSV."""
+"""Wanted accelerations and the corresponding forces, as CSV."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from study.store.disk.text_file import read_text, write_text
 
 
 def read_trajectory(path: Path) -> Trajectory:
-    """Either kind, told apart by its header. Raises CannotReadError, UnusableFileError."""
+    """Either kind, distinguished by its header. Raises CannotReadError, UnusableFileError."""
     try:
         return parse_trajectory(read_text(path))
     except TableError as error:
@@ -16,5 +16,5 @@ def read_trajectory(path: Path) -> Trajectory:
 
 
 def write_trajectory(path: Path, trajectory: Trajectory, *, overwrite: bool = False) -> None:
-    """Raises AlreadyThereError, CannotWriteError; TableError for missing samples."""
+    """Write either kind. Raises AlreadyThereError, CannotWriteError; TableError for missing samples."""
     write_text(path, trajectory_csv(trajectory), overwrite=overwrite)

@@ -1,4 +1,4 @@
-"""What the columns of a table of trials mean, and their units: for exported data."""
+"""Meaning and unit of the columns of a table of trials, for exported data."""
 
 TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "subject": ("Code of the participant", ""),

@@ -1,4 +1,4 @@
-"""`trials.csv`: one row per presentation, rewritten at will from the log."""
+"""`trials.csv`: one row per presentation, derived from the log."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,12 +14,12 @@ KIND = "table of trials"
 
 
 def write_trials(path: Path, trials: Iterable[Trial]) -> None:
-    """Replaces an older table: the log is the truth. Raises CannotWriteError."""
+    """Write the table, replacing an older one. Raises CannotWriteError."""
     write_text(path, rows_to_csv(trials, Trial), overwrite=True)
 
 
 def read_trials(path: Path) -> tuple[Trial, ...]:
-    """Raises CannotReadError, UnusableFileError."""
+    """Read the table. Raises CannotReadError, UnusableFileError."""
     try:
         trials = rows_from_csv(read_text(path), Trial)
     except CsvError as error:

@@ -20,7 +20,7 @@ NAME = "trials.mat"
 def write_trials_mat(
     folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
 ) -> tuple[Path, ...]:
-    """Numbers and truth as columns (NaN where a value is missing), text as cells. Raises CannotWriteError."""
+    """Write numbers and booleans as columns (NaN for missing values), text as cells. Raises CannotWriteError."""
     from scipy.io import savemat
 
     written = io.BytesIO()

@@ -1,4 +1,4 @@
-"""Where sessions lie: one folder each in the data folder, named after participant code and number."""
+"""Session folders: one each in the data folder, named by participant code and number."""
 
 import contextlib
 import re
@@ -41,7 +41,7 @@ class SessionFolder:
 
     @property
     def withdrawal(self) -> Path:
-        """There as long as the erasing of this participant's sessions is not finished."""
+        """Exists while the erasing of this participant's sessions is unfinished."""
         return withdrawal_file(self.path.parent, self.subject)
 
     @property
@@ -50,11 +50,12 @@ class SessionFolder:
 
 
 def withdrawal_file(data: Path, subject: str) -> Path:
+    """Path of the withdrawal record of a participant."""
     return data / f"{subject}.withdrawal.json"
 
 
 class SessionWithdrawnError(StudyError):
-    """No data any more, whether or not all of it is erased already."""
+    """The session was withdrawn and is no data any more, even if not all of it is erased yet."""
 
     def __init__(self, folder: SessionFolder) -> None:
         super().__init__(
@@ -65,7 +66,8 @@ class SessionWithdrawnError(StudyError):
 
 
 def check_subject(code: str) -> str:
-    """A participant appears by a code only: letters and digits, nothing that could be a name with an address."""
+    """The participant code, if valid: letters and digits, nothing that could be a name with an address. Raises
+    WrongUseError."""
     if not is_code(code):
         raise WrongUseError(
             "This is no participant code",
@@ -76,7 +78,7 @@ def check_subject(code: str) -> str:
 
 
 def new_session_folder(data: Path, subject: str) -> SessionFolder:
-    """Make the participant's next folder. Never touches an existing one, also when two programs race."""
+    """Create the participant's next folder. Never touches an existing one, also when two programs race."""
     check_subject(subject)
     try:
         made = not data.exists()
@@ -106,19 +108,20 @@ def new_session_folder(data: Path, subject: str) -> SessionFolder:
 
 
 def session_folders(data: Path) -> tuple[SessionFolder, ...]:
-    """All session folders below `data`, withdrawn ones included, in the order of their names."""
+    """All session folders below `data`, withdrawn ones included, in alphabetical order."""
     if not data.is_dir():
         return ()
     return tuple(SessionFolder(p) for p in sorted(data.iterdir()) if p.is_dir() and FOLDER.fullmatch(p.name))
 
 
 def folder_number(name: str) -> int:
+    """Number of a session in its folder's name."""
     match = FOLDER.fullmatch(name)
     return int(match["number"]) if match else 0
 
 
 def find_session(session: str, data: Path) -> SessionFolder:
-    """A session by its folder or, within `data`, by its name."""
+    """A session by its folder or, within `data`, by its name. Raises StudyError."""
     for path in (Path(session), data / session):
         folder = SessionFolder(path.resolve())
         if folder.withdrawn:

@@ -1,4 +1,4 @@
-"""The log of a session: append one line, fsync, and only then act. Never rewritten, never opened over another."""
+"""The log of a session: append one line, fsync, and only then act. Never rewritten."""
 
 import contextlib
 import json
@@ -19,10 +19,10 @@ NO_LINES = Chain()
 
 
 class EventLog:
-    """An open log. One writer at a time: hold the session's lock while one of these is open."""
+    """An open log. One writer: hold the session's lock while it is open."""
 
     def __init__(self, path: Path, descriptor: int, chain: Chain | None = NO_LINES) -> None:
-        """chain: of the lines that are there; None reads them before the first line is added."""
+        """chain: of the existing lines; None reads them before the first line is added."""
         self._path = path
         self._descriptor = descriptor
         self._chain = chain
@@ -37,7 +37,7 @@ class EventLog:
 
     @classmethod
     def reopen(cls, path: Path) -> "EventLog":
-        """Raises StudyError where it cannot be written to."""
+        """Open an existing log for appending. Raises StudyError if it cannot be written to."""
         try:
             open_regular(path).close()  # a pipe would wait for its other end
             descriptor = os.open(path, os.O_WRONLY | os.O_APPEND)
@@ -52,7 +52,7 @@ class EventLog:
         return cls(path, descriptor, chain=None)
 
     def append(self, event: Event) -> None:
-        """On return the line is on the disk. Raises StudyError, leaving the log as it was, where it is not."""
+        """Append one line; on return it is on the disk. Raises StudyError, leaving the log unchanged, if that fails."""
         before = os.fstat(self._descriptor).st_size
         if self._chain is None:
             self._chain = read_log(self._path).chain
@@ -77,15 +77,16 @@ class EventLog:
 class LogContents:
     events: tuple[Event, ...]
     torn: str
-    """A last line that a crash left incomplete; empty where there is none."""
+    """An incomplete last line, left by a crash; empty if there is none."""
     torn_bytes: int
     chain: Chain
     whole: bytes = field(repr=False)
-    """All whole lines, as they lie on the disk."""
+    """All complete lines, as on the disk."""
 
 
 def read_log(path: Path) -> LogContents:
-    """All whole events. Only the last line may be torn; a broken line before it is an error, not a loss."""
+    """All complete events. Only the last line may be incomplete; a broken earlier line is an error. Raises
+    StudyError."""
     try:
         data = read_regular(path)
     except OSError as problem:
@@ -104,7 +105,7 @@ def read_log(path: Path) -> LogContents:
 
 
 def read_opening(path: Path) -> Event | None:
-    """The first line alone, whatever comes after it; None where it is not whole. Raises StudyError, OSError."""
+    """The first line only; None if it is incomplete. Raises StudyError, OSError."""
     if not path.exists():
         return None
     with open_regular(path) as file:
@@ -113,7 +114,7 @@ def read_opening(path: Path) -> Event | None:
 
 
 def readable_events(path: Path) -> tuple[Event, ...]:
-    """The events before the first damage, for a look at a log that cannot be used. Raises nothing."""
+    """Events before the first damage, to inspect an unusable log. Never raises."""
     chain, events = Chain(), list[Event]()
     try:
         for line in read_regular(path).split(b"\n")[:-1]:
@@ -125,7 +126,7 @@ def readable_events(path: Path) -> tuple[Event, ...]:
 
 
 def mend(path: Path, contents: LogContents) -> None:
-    """Cut off a torn last line, so that the next fact starts on a line of its own."""
+    """Remove an incomplete last line, so that the next fact starts on its own line."""
     if not contents.torn_bytes:
         return
     descriptor = os.open(path, os.O_WRONLY)
@@ -158,7 +159,7 @@ def _lock_file(descriptor: int, path: Path) -> None:
 
 @contextlib.contextmanager
 def hold_log_lock(path: Path) -> Iterator[None]:
-    """Hold the lock of a log that is to be erased, where there is one. Raises StudyError while it is being written."""
+    """Hold the lock of a log that is to be erased. Raises StudyError while it is being written."""
     if not path.exists():
         yield
         return
@@ -170,7 +171,7 @@ def hold_log_lock(path: Path) -> Iterator[None]:
 
 
 def _next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
-    """The event of the line that follows, without its line end. Raises StudyError."""
+    """The event of the next line, given without its line end. Raises StudyError."""
     try:
         after, event = read_chained(chain, line)
         return after, parse_event(event)

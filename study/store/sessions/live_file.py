@@ -1,4 +1,4 @@
-"""`live.json`: how a running session is right now, for those who watch it. Replaced whole, several times a second."""
+"""`live.json`: live state of a running session for its viewers. Replaced atomically several times a second."""
 
 import json
 import math
@@ -22,7 +22,7 @@ _LARGEST_BYTES = 1 << 16
 
 
 def write_live(folder: Path, live: Live) -> None:
-    """At most some four times a second. Never raises: a session must not end because it cannot be watched.
+    """At most about four times a second. Never raises: a session must not end because it cannot be watched.
 
     One writer: the holder of the session's lock.
     """
@@ -36,13 +36,13 @@ def write_live(folder: Path, live: Live) -> None:
 
 
 def remove_live(folder: Path) -> None:
-    """What an earlier sitting left behind. Never raises."""
+    """Remove the file of an earlier sitting. Never raises."""
     with suppress(OSError):
         (folder / LIVE_NAME).unlink()
 
 
 def read_live(folder: Path) -> Live | None:
-    """None where there is none, or none that can be used. Never raises."""
+    """The live state; None if there is no usable one. Never raises."""
     try:
         document = load_json(read_regular(folder / LIVE_NAME, _LARGEST_BYTES))
     except (OSError, ValueError):

@@ -1,7 +1,7 @@
-"""`seal.json` beside the log of a closed session: how long it was, and what was in it. Written once, never again.
+"""`seal.json` beside the log of a closed session: its length and hash. Written once.
 
-A log grows after its session was closed where something is noted later; each time a further seal (`seal-2.json`, ...)
-covers that too. A seal holds for the beginning of the log that it was written for.
+A log grows after closing if something is noted later; a further seal (`seal-2.json`, ...) then covers that too. A seal
+holds for the beginning of the log that it was written for.
 """
 
 import hashlib
@@ -28,13 +28,13 @@ _NAME = re.compile(r"seal(-(?P<number>\d{1,6}))?\.json", re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class Seal:
-    """Of the log as it was when this was written."""
+    """Of the log when this was written."""
 
     session: str
     lines: Count
     bytes: Count
     head: Annotated[str, Field(pattern=f"^[0-9a-f]{{{DIGITS}}}$")]
-    """Checksum of the last line: the head of the chain."""
+    """Checksum of the last line: the head of the hash chain."""
     sha256: Sha256
     """Of these bytes of `events.jsonl`."""
 
@@ -43,15 +43,15 @@ SEAL: TypeAdapter[Seal] = TypeAdapter(Seal)
 
 
 def seal_paths(folder: Path) -> dict[int, Path]:
-    """By their numbers, in the order in which they were written."""
+    """By number, in the order of writing."""
     found = ((_NAME.fullmatch(path.name), path) for path in folder.glob("seal*.json"))
     return dict(sorted((int(match["number"] or 1), path) for match, path in found if match))
 
 
 def write_seal(folder: Path, contents: LogContents) -> bool:
-    """On return the log is sealed on the disk. False where a seal covers all of it already.
+    """On return the seal is on the disk. False if a seal covers the whole log already.
 
-    contents: of a closed session whose log carries checksums. Raises StudyError.
+    contents: of a closed session whose log has checksums. Raises StudyError.
     """
     if check_seals(folder, contents) == contents.chain.lines:
         return False
@@ -70,14 +70,14 @@ def write_seal(folder: Path, contents: LogContents) -> bool:
 
 
 def seal_log(log: Path) -> None:
-    """Right after the last line of a closed session. Where it cannot be written, the seal stays due: `hapteq resume`
-    and `hapteq analyze` write it and say so."""
+    """Seal right after the last line of a closed session. If that fails, the seal stays due: `hapteq resume` and
+    `hapteq analyze` write it and say so."""
     with suppress(StudyError):
         write_seal(log.parent, read_log(log))
 
 
 def read_seal(path: Path) -> Seal:
-    """Raises CannotReadError, UnusableFileError."""
+    """Read a seal. Raises CannotReadError, UnusableFileError."""
     document = read_json(path, SEAL_FORMAT, SEAL_VERSION)
     try:
         return SEAL.validate_json(json.dumps(document), strict=True)
@@ -88,7 +88,7 @@ def read_seal(path: Path) -> Seal:
 
 
 def check_seals(folder: Path, contents: LogContents) -> int:
-    """How many lines of the log are sealed; 0 where there is no seal. Raises StudyError where one does not hold."""
+    """Number of sealed lines; 0 without a seal. Raises StudyError if one does not hold."""
     sealed = 0
     for path in seal_paths(folder).values():
         try:
@@ -110,9 +110,9 @@ def check_seals(folder: Path, contents: LogContents) -> int:
 
 
 def is_sealed(folder: Path, content: bytes) -> bool:
-    """Whether all seals hold, at least one of them, and every line matches its checksum; nothing is parsed.
+    """Whether there is a seal, all seals hold, and every line matches its checksum; nothing is parsed.
 
-    Raises StudyError where a seal does not hold.
+    Raises StudyError if a seal does not hold.
     """
     *lines, tail = content.split(b"\n")
     chain = Chain()

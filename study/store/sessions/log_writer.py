@@ -1,4 +1,4 @@
-"""Whether a log is being written right now, as the operating system knows it: its lock dies with its holder."""
+"""Whether a log is being written right now, by the operating system's lock, which ends with its holder."""
 
 from pathlib import Path
 
@@ -6,9 +6,9 @@ from study.store.disk.regular_file import open_regular
 
 
 def is_log_locked(log: Path) -> bool | None:
-    """None where this cannot be known (no such locks here, no such log).
+    """None if unknown (no such locks here, no such log).
 
-    Looking takes the lock for some microseconds, in which a program that wants it is refused: look seldom.
+    Probing holds the lock for some microseconds, in which a writer would be refused: probe rarely.
     """
     try:
         import fcntl

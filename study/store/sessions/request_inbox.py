@@ -1,7 +1,7 @@
-"""What reaches a running session from beside it: one small file per request, in a folder of the session.
+"""Requests to a running session: one small file per request, in a folder of the session.
 
-A program that asks writes a file under a name of its own and renames it into place; the session looks, reads, removes.
-A name begins with what is asked, so that a stop is a stop even where its content cannot be read.
+The sender writes a file under a unique name and renames it into place; the session reads and removes it. The name
+begins with the kind of request, so that a stop is recognised even if its content cannot be read.
 """
 
 import errno
@@ -32,12 +32,12 @@ _WHO = get_args(Who)
 _LARGEST = 1 << 16
 """Bytes of a request that are read; a note is a sentence or two."""
 _AT_ONCE = 50
-"""Requests taken in one look: the session's own loop must not wait for a flood."""
+"""Requests taken in one look: a flood must not block the session's loop."""
 _counter = itertools.count()
 
 
 class RequestInbox:
-    """Implements `study.workflows.trial.requests_port.Requests`. Any number may send; one session takes."""
+    """Implements `study.workflows.trial.requests_port.Requests`. Many senders, one receiver."""
 
     def __init__(self, session: Path) -> None:
         self._folder = session / REQUESTS_NAME
@@ -45,7 +45,7 @@ class RequestInbox:
         """Names that could be neither used nor removed: looked at once, not twenty times a second."""
 
     def send(self, request: Request) -> str:
-        """Returns the request's name, for `unread` and `take_back`. Raises StudyError where it cannot be written."""
+        """Returns the request's name, for `unread` and `take_back`. Raises StudyError if it cannot be written."""
         kind = next(word for word, known in KINDS.items() if isinstance(request, known))
         key = f"{time.time_ns():020d}-{os.getpid():07d}-{next(_counter):06d}-{secrets.token_hex(4)}"
         name = f"{kind}-{key}.json"
@@ -69,7 +69,7 @@ class RequestInbox:
         return (self._folder / name).exists()
 
     def take_back(self, name: str) -> bool:
-        """Remove a request that was not taken. False where it was taken after all."""
+        """Remove a request. False if it was already taken."""
         try:
             (self._folder / name).unlink()
         except OSError:
@@ -77,8 +77,7 @@ class RequestInbox:
         return True
 
     def clear(self) -> None:
-        """At the start of a sitting: yesterday's stop must not end today's. Notes that were not taken are kept:
-        they are still for the log. Never raises."""
+        """At the start of a sitting: remove old stop and pause requests. Notes are kept for the log. Never raises."""
         try:
             self._make_folder()
             names = os.listdir(self._folder)  # noqa: PTH208
@@ -89,7 +88,7 @@ class RequestInbox:
                 self._remove(name)
 
     def take(self) -> tuple[Request, ...]:
-        """Stops first, then the oldest first; what was taken is removed. Never raises."""
+        """Take and remove requests, stops first, then oldest first. Never raises."""
         try:
             # listdir takes half the time of Path.iterdir, twenty times a second.
             present = os.listdir(self._folder) if is_real_folder(self._folder) else ()  # noqa: PTH208
@@ -99,7 +98,7 @@ class RequestInbox:
         return tuple(request for name in names[:_AT_ONCE] if (request := self._take_one(name)) is not None)
 
     def _make_folder(self) -> None:
-        """Raises OSError; also where it is a link: what that leads to is not the session's, and would be removed."""
+        """Raises OSError, also for a link, whose target is not the session's."""
         self._folder.mkdir(mode=PRIVATE_FOLDER, exist_ok=True)
         if not is_real_folder(self._folder):
             raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(self._folder))
@@ -121,7 +120,7 @@ class RequestInbox:
             self._passed_over.add(name)
 
     def _set_aside(self, name: str) -> None:
-        """Under a hidden name, for a later look at what it was."""
+        """Rename to a hidden name, for later inspection."""
         try:
             (self._folder / name).rename(self._folder / f".unusable-{name}")
         except OSError:
@@ -133,7 +132,7 @@ def _stops_then_oldest(name: str) -> tuple[bool, str]:
 
 
 def _content(path: Path) -> bytes:
-    """Empty where it is no plain file: opening a pipe would wait for its other end."""
+    """Content; empty if it is not a regular file: opening a pipe would block."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
     except OSError:

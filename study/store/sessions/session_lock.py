@@ -1,4 +1,4 @@
-"""One writer per session: a lock that the operating system drops when its holder dies, however it dies."""
+"""One writer per session: a lock that the operating system releases when its holder ends."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,12 +12,12 @@ from study.store.disk.privacy import PRIVATE_FILE
 LOCK_NAME = "session.lock"
 PLACES_NAME = ".places.lock"
 PATIENCE_S = 20.0
-"""Taking a place means reading the first lines of every session beside it."""
+"""Taking a place reads the first lines of all sessions in the folder."""
 
 
 @contextmanager
 def hold_session_lock(folder: Path) -> Iterator[None]:
-    """Hold the session's lock. Raises StudyError at once where another program does."""
+    """Hold the session's lock. Raises StudyError at once if another program holds it."""
     lock = FileLock(folder / LOCK_NAME, mode=PRIVATE_FILE)
     try:
         lock.acquire(timeout=0)

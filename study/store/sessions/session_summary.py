@@ -1,4 +1,4 @@
-"""`session.json`: what a session's log comes to, for those who do not fold it. Made from the log, as the tables are."""
+"""`session.json`: summary of a session's log for readers that do not fold it; derived from the log."""
 
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ SUMMARY_FORMAT, SUMMARY_VERSION = "hapteq-session-summary", 1
 
 
 def read_summary(folder: Path) -> dict[str, Any] | None:
-    """None where there is none, or none that can be read. Without its provenance."""
+    """The summary without provenance; None if there is no readable one."""
     try:
         summary = read_json(folder / SUMMARY_NAME, SUMMARY_FORMAT, SUMMARY_VERSION)
     except StudyError:
@@ -21,7 +21,7 @@ def read_summary(folder: Path) -> dict[str, Any] | None:
 
 
 def closed_and_presentations(summary: dict[str, Any] | None) -> tuple[bool, int]:
-    """Whether the session was closed when this was written, and how many presentations its log had."""
+    """Whether the session was closed when the summary was written, and the number of presentations in its log."""
     if summary is None:
         return False, 0
     presentations = summary.get("presentations")

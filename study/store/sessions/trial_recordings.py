@@ -1,4 +1,4 @@
-"""The recording of each trial, beside the log: written once, named by run, trial and attempt."""
+"""Recording of each trial, beside the log: written once, named by run, trial and attempt."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -19,15 +19,16 @@ class SavedRecording:
 
 
 def recording_name(run: int, trial: int, attempt: int) -> str:
+    """Name of a trial's recording, relative to the session folder."""
     return f"recordings/run-{run:02d}_trial-{trial:03d}_attempt-{attempt}.h5"
 
 
 def save_trial_recording(
     folder: SessionFolder, name: str, recording: Recording, conditions: Mapping[str, Any]
 ) -> SavedRecording:
-    """On return it is on the disk. conditions: JSON values that say what was played and how the device fared.
+    """On return it is on the disk. conditions: JSON values about what was played and the device's state.
 
-    Nothing is overwritten: where a disk lost the end of a log but not its recordings, the name gets a number.
+    Nothing is overwritten: if a disk lost the end of a log but not its recordings, the name gets a number.
     """
     name = _free_name(folder.path, name)
     path = folder.path / name
@@ -36,9 +37,9 @@ def save_trial_recording(
 
 
 def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecording, Recording] | None:
-    """A recording that reached the disk although the log does not know of it; the latest of its name.
+    """A recording on the disk that the log does not mention; the latest of its name.
 
-    Raises StudyError where it cannot be read.
+    Raises StudyError if it cannot be read.
     """
     stem = Path(name).stem
     ours = [path for path in folder.recordings.glob(f"{stem}_*.h5") if path.stem.rpartition("_")[2].isdigit()]

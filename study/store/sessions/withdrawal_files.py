@@ -1,7 +1,7 @@
-"""What stands for a participant's sessions from the moment of withdrawal: first the intent, then a tombstone each.
+"""Records of a withdrawal: first the intent, then a tombstone for each session.
 
-The intent is one file in the data folder. As long as it is there, erasing is not finished, and no session of the
-participant counts as data any more, whatever is still there of it.
+The intent is one file in the data folder. While it exists, erasing is unfinished, and no session of the participant
+counts as data, whatever remains of it.
 """
 
 from collections.abc import Mapping
@@ -21,17 +21,17 @@ WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION = "hapteq-withdrawal", 1
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """What a session folder says of the participant who began it: nothing measured."""
+    """What a session folder says of its participant: nothing measured."""
 
     protocol: str
     simulated: bool
     number: int | None
-    """The place in the balanced order; None where none was taken."""
+    """Place in the balanced order; None if none was taken."""
 
 
 @dataclass(frozen=True, slots=True)
 class Intent:
-    """What is about to be erased, as it was proved before anything was."""
+    """What is about to be erased, determined before any erasing."""
 
     subject: str
     withdrawn_utc: str
@@ -41,13 +41,13 @@ class Intent:
 
 
 def write_intent(data: Path, intent: Intent) -> None:
-    """On return it is on the disk."""
+    """Write the intent; on return it is on the disk."""
     path = withdrawal_file(data, intent.subject)
     write_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION, asdict(intent), overwrite=True)
 
 
 def read_intent(data: Path, subject: str) -> Intent | None:
-    """None where there is none, or none that can be used: what it would name is then found anew. Raises nothing."""
+    """The intent; None if there is no usable one: its content is then determined again. Never raises."""
     path = withdrawal_file(data, subject)
     if not is_real_file(path):
         return None
@@ -61,14 +61,14 @@ def read_intent(data: Path, subject: str) -> Intent | None:
 
 
 def write_tombstone(folder: SessionFolder, withdrawn_utc: str, begun: Begun | None) -> None:
-    """In the place of all else. One that is there stays as it is."""
+    """Replace the session's contents. An existing tombstone is kept."""
     if not is_real_file(folder.tombstone):
         left = {"session": folder.name, "withdrawn_utc": withdrawn_utc, "begun": asdict(begun) if begun else None}
         write_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION, left, overwrite=True)
 
 
 def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
-    """Empty where there is none, or none that can be read. Raises nothing."""
+    """The tombstone; empty if there is no readable one. Never raises."""
     try:
         return read_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION)
     except StudyError:
@@ -76,11 +76,12 @@ def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
 
 
 def read_begun(folder: SessionFolder) -> Begun | None:
+    """The participant facts in a tombstone."""
     return _parse_begun(read_tombstone(folder).get("begun"))
 
 
 def remaining_entries(folder: SessionFolder) -> tuple[str, ...]:
-    """What is still there in the folder of a session that was withdrawn; folders end in a slash. Raises nothing."""
+    """What remains in the folder of a withdrawn session; folders end in a slash. Never raises."""
     try:
         with open_folder(folder.path) as place:
             names = [name for name in place.names() if name not in (folder.tombstone.name, LOCK_NAME)]
@@ -90,7 +91,7 @@ def remaining_entries(folder: SessionFolder) -> tuple[str, ...]:
 
 
 def how_to_finish(folder: SessionFolder) -> str:
-    """Empty where a withdrawal left nothing; else what is still there, and the command that goes on."""
+    """Empty if a withdrawal is complete; otherwise what remains, and the command that continues."""
     left = remaining_entries(folder)
     if not left and folder.tombstone.exists() and not folder.withdrawal.exists():
         return ""

@@ -1,4 +1,4 @@
-"""Which folders outside a data folder hold numbers of its participants: noted, so that a withdrawal can name them."""
+"""Folders outside a data folder that contain its participants' numbers: noted, so that a withdrawal can name them."""
 
 import os
 from contextlib import suppress
@@ -14,9 +14,9 @@ WRITTEN_ELSEWHERE = "written_elsewhere.txt"
 
 
 def note_written(source: Path, out: Path) -> None:
-    """A line with the absolute path of `out`, where a withdrawal would not find it by itself.
+    """Note the absolute path of `out` if a withdrawal would not find it.
 
-    source: a data folder, or a session's in it. Data that may only be read are left alone.
+    source: a data folder, or a session's in it. Read-only data are left unchanged.
     """
     out, source = out.resolve(), source.resolve()
     data = source.parent if FOLDER.fullmatch(source.name) else source
@@ -31,7 +31,7 @@ def note_written(source: Path, out: Path) -> None:
 
 
 def folders_written_elsewhere(data: Path) -> tuple[Path, ...]:
-    """Empty where nothing was noted, or the note cannot be read."""
+    """The noted folders; empty if nothing was noted, or the note cannot be read."""
     note = data / WRITTEN_ELSEWHERE
     if not is_real_file(note):
         return ()

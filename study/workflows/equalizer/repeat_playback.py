@@ -87,9 +87,9 @@ def _play_all(
     states.append(replace(begun, repetition=repetition, noise_floor=repetition.noise_floor))
     while states[-1].verdict is Verdict.CONTINUE and len(played) <= plan.repeats:
         number = len(played)
-        one = _play(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
-        measured = _usable_response(one)
-        played.append(one)
+        last = _play(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
+        measured = _usable_response(last)
+        played.append(last)
         states.append(next_forces(states[-1], measured))
 
 

@@ -71,8 +71,8 @@ def _draw_stop(at: EffectContext) -> dict[str, float]:
 
 def _build_stop(device: Device, axis: int, values: Values) -> Device:
     place = values["position"]
-    one, other = (ABOVE, BELOW) if place > 0.0 else (BELOW, ABOVE)
-    cells = {one: place, STOP: values["stiffness"]}
+    side, other = (ABOVE, BELOW) if place > 0.0 else (BELOW, ABOVE)
+    cells = {side: place, STOP: values["stiffness"]}
     return with_forces(device, axis, cells | ({other: -place} if values["opposite"] else {}))
 
 
