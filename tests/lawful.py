@@ -4,7 +4,7 @@ import numpy as np
 
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search.explain import Explanation, retuned_alone
 from analysis.diagnosis.search.search_context import SearchContext
@@ -70,6 +70,6 @@ def arena_of(recording: Recording, model: MechanicalModel | None = None) -> tupl
     measure = measure_of([recording], given).measure
     tuning = tuning_of(given, recording.command.channels)
     context = SearchContext(measure.shorten(), measure, tuning, map)
-    before = evaluated(context.measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+    before = evaluate_fit(context.measure, tuning, np.zeros(len(tuning.names)), NOTHING)
     given_, retuned = (context.confirmed(context.candidate(fitted)) for fitted in (before, retuned_alone(context)))
     return context, Explanation(given_, retuned, retuned, (), ())

@@ -22,7 +22,7 @@ from analysis.diagnosis.data.observed_parts import names_of_parts
 from analysis.diagnosis.discovery.add_laws import add_laws, has_law
 from analysis.diagnosis.errors.choose_measure import Compared, measure_of
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.reference.compare_with_reference import (
@@ -145,7 +145,7 @@ def _beside_clean(
         if unweighed is not None:
             return unweighed
     context = _search_context(recordings[0], look, settings, map_)
-    given = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     stands = context.confirmed(context.candidate(given))
     found = Searched(context, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
     progress("writing down what was found", 0.95)

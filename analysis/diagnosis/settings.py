@@ -55,7 +55,7 @@ MASSLESS_SHARE = 1e-3  # of the force's rms: the inertia of a body that shows no
 SPRING_SHARE = 0.05  # of the misfit that springs must take to be part of it
 RETUNING_NAMED, RETUNING_DOUBTED = 1.0, 3.0  # standard deviations from which a moved number is named, and doubted
 
-# Where a mismatch sits (`mismatch_cells`, `level_trends`, `entry_point`, `tied_states`). By hand.
+# Where a mismatch sits (`mismatch_cells`, `level_trends`, `entry_point`, `find_tied_states`). By hand.
 FALSE_DISCOVERY_RATE = 0.01  # of cells and states, by the test of Benjamini and Bogomolov (2014)
 DISTORTION_P = 0.001  # p-value below which a kind of distortion is there
 STEADY_DB = 1.5  # change of distortion per doubling of the level that is neither rising nor falling

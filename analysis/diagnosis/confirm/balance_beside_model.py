@@ -124,7 +124,7 @@ def _of_modes(
     moved = band_motion(seen, motion.rate_hz, motion.band_hz)
     steps = MOVED * np.eye(len(tuning.names))[first:]
     here, *there = (
-        needed_force(_structure(add_carried_weight(tuning.tuned(step), recording), known), moved).force
+        needed_force(_structure(add_carried_weight(tuning.tune(step), recording), known), moved).force
         for step in (0 * steps[0], *steps)
     )
     yield from ((each - here) / MOVED for each in there)

@@ -21,8 +21,8 @@ from analysis.diagnosis.confirm.laws_to_play import (
     refitted,
     released_numbers,
 )
-from analysis.diagnosis.errors.hypothesis import together
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.hypothesis import combine
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import final_errors
@@ -60,7 +60,7 @@ def searched_by_balance(context: SearchContext, balances: Sequence[Balance], rep
     if not named:
         return None
     constant = constants_of(balances)
-    given = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), constant)
+    given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), constant)
     before, retuned = context.confirmed(context.candidate(given)), context.candidate(refine(context, given))
     confirmed = context.confirmed(retuned)
     named, plain = refitted(balances, named), Explanation(before, confirmed, confirmed, (), ()).plain
@@ -92,7 +92,7 @@ def borne_out(seen: Searched, repeats: bool) -> Searched:
         else:
             found = replace(found, after=found.retuned, steps=())
         seen = replace(seen, found=found, judged=judge(found), errors=None)
-    names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed()}
+    names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed_effects()}
     if repeats or seen.judged.verdict != "explained" or names <= set(CONSTANTS):
         return seen
     return replace(seen, judged=replace(seen.judged, verdict="partly_explained"))
@@ -151,7 +151,7 @@ def _steps(
     whole = retuned.fitted.hypothesis
     steps = [retuned for _ in whole.claims]
     for axis, law in named:
-        start = evaluated(context.measure, context.tuning, deviations, together(whole, as_claim(axis, law)))
+        start = evaluate_fit(context.measure, context.tuning, deviations, combine(whole, as_claim(axis, law)))
         found = refine(context, start)
         steps.append(context.candidate(found))
         whole, deviations = found.hypothesis, found.deviations

@@ -11,7 +11,7 @@ from analysis.diagnosis.data.operating_point import about_operating_point
 from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
 from analysis.diagnosis.errors.fit_score import fit_score
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.first_model.model_of_balance import first_model, share_within
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduced_recordings
@@ -61,7 +61,7 @@ def _left(model: MechanicalModel, chosen: Chosen) -> float:
     """As the model is, on what may be fitted to: the error over the noise."""
     measure = chosen.measure
     tuning = tuning_of(model, measure.records[0].recording.command.channels)
-    given = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+    given = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
     return fit_score(measure, given.residuals).worst_channel
 
 

@@ -9,7 +9,7 @@ from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.structures import values_of
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.signal import FloatArray
@@ -52,13 +52,15 @@ def constants_of(balances: Sequence[Balance]) -> Hypothesis:
         force = -float(regression.weights(regression.columns_of(()))[-1])
         if force:
             claim = Claim(EFFECTS[CONSTANT], "one", (axis,))
-            whole = together(whole, claimed(claim, [{"force": force}]))
+            whole = combine(whole, hypothesis_of_claim(claim, [{"force": force}]))
     return whole
 
 
 def as_claim(axis: int, judged: JudgedLaw) -> Hypothesis:
     effect = EFFECTS[judged.law.effect]
-    return claimed(Claim(effect, "one", (axis,)), [{p.name: judged.values[p.name] for p in effect.parameters}])
+    return hypothesis_of_claim(
+        Claim(effect, "one", (axis,)), [{p.name: judged.values[p.name] for p in effect.parameters}]
+    )
 
 
 def released_numbers(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:

@@ -12,8 +12,8 @@ from analysis.diagnosis.discovery.law_of_sum import hypothesis_of, law_of_sum
 from analysis.diagnosis.discovery.matched_filter import View, views_of
 from analysis.diagnosis.discovery.screen_terms import cross_validate_terms, products_of
 from analysis.diagnosis.discovery.snap_exponents import snap_exponents
-from analysis.diagnosis.errors.hypothesis import together
-from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit
+from analysis.diagnosis.errors.hypothesis import combine
+from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, worthwhile
 from analysis.diagnosis.search.same_within_errors import inseparable
@@ -57,7 +57,7 @@ def discover(context: SearchContext, known: Explanation, progress: Progress, tim
     """The laws found, fitted by output error; None where none is worth its numbers. known: what the named effects
     explain."""
     retuned = known.retuned.fitted
-    base = context.candidate(evaluated(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
+    base = context.candidate(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
     rounds: list[Round] = []
     steps: list[FittedCandidate] = []
     while len(rounds) < LAW_MOST_ROUNDS and time_left() and base.score.worst_channel > NOISE_ALONE:
@@ -152,7 +152,7 @@ def _starting_fit(context: SearchContext, base: Fitted, each: Sum) -> Fitted | N
     found: list[Fitted] = []
     for deviations in (base.deviations, np.clip(base.deviations + each.model_shift, -RETUNING_BOUND, RETUNING_BOUND)):
         try:
-            found.append(evaluated(context.measure, context.tuning, deviations, together(base.hypothesis, law)))
+            found.append(evaluate_fit(context.measure, context.tuning, deviations, combine(base.hypothesis, law)))
         except (MechanicalModelError, np.linalg.LinAlgError):
             continue
     return min(found, key=lambda start: start.cost, default=None)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import AXES
-from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, claimed
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, hypothesis_of_claim
 from equalizer.effects.discovered_law import Channels, axis_names, law_effect, law_values
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
@@ -34,7 +34,7 @@ def _renumber(shape: str, first: int) -> str:
 
 def hypothesis_of(law: Law, axis: int, recording: Recording) -> Hypothesis:
     effect = law_effect(law, channels_of(recording))
-    return claimed(Claim(effect, "one", (axis,)), [law_values(law)])
+    return hypothesis_of_claim(Claim(effect, "one", (axis,)), [law_values(law)])
 
 
 def channels_of(recording: Recording) -> Channels:

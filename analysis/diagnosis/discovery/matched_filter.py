@@ -97,7 +97,7 @@ class View:
 
 def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
     """One view per driven axis."""
-    model, placed = tuning.tuned(fitted.deviations), fitted.hypothesis.placed()
+    model, placed = tuning.tune(fitted.deviations), fitted.hypothesis.placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
     seen = tuple(_filter_record(measure, record, told) for record, told in zip(measure.records, evidence, strict=True))
     residual = np.concatenate(
@@ -131,12 +131,12 @@ def _parameter_columns(
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     if number < 3 * len(pairs):
         return np.concatenate([each.filter_forces(_parameter_force(each, tuning, pairs, number)) for each in seen])
-    base = measure.residuals(tuning.tuned(fitted.deviations), ())
+    base = measure.residuals(tuning.tune(fitted.deviations), ())
     for move in (MOVED, -MOVED):
         there = fitted.deviations.copy()
         there[number] += move
         try:
-            moved = measure.residuals(tuning.tuned(there), ())
+            moved = measure.residuals(tuning.tune(there), ())
         except (MechanicalModelError, np.linalg.LinAlgError):
             continue
         change = [

@@ -7,9 +7,9 @@ from functools import reduce
 import numpy as np
 
 from analysis.diagnosis.discovery.law_of_sum import channels_of, laws_of
-from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, claimed, together
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.intervals import standard_errors
-from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit
+from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, SearchContext, sensitivity_at
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
 from equalizer.effects.discovered_law import law_effect, law_values
@@ -25,7 +25,7 @@ def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
     plain = _with_simple_exponents(context, fitted.hypothesis, errors)
     if plain is None:
         return fitted
-    start = evaluated(context.measure, context.tuning, fitted.deviations, plain)
+    start = evaluate_fit(context.measure, context.tuning, fitted.deviations, plain)
     found = fit(context.measure, context.tuning, start, known, FIRST_ROUNDS)
     return found if found.cost <= fitted.cost * (1 + LAW_SNAP) else fitted
 
@@ -44,15 +44,15 @@ def _with_simple_exponents(context: SearchContext, whole: Hypothesis, errors: np
         simple = _simplify_exponents(law, own)
         changed |= simple is not law
         effect = law_effect(simple, channels_of(recording))
-        parts.append(claimed(Claim(effect, "one", claim.sites), [law_values(simple)]))
+        parts.append(hypothesis_of_claim(Claim(effect, "one", claim.sites), [law_values(simple)]))
     if not changed:
         return None
-    return reduce(together, parts)
+    return reduce(combine, parts)
 
 
 def _single_claim(whole: Hypothesis, number: int) -> Hypothesis:
     claim = whole.claims[number]
-    return claimed(claim, [dict(placed.values) for placed in whole.of_claim(number)])
+    return hypothesis_of_claim(claim, [dict(placed.values) for placed in whole.of_claim(number)])
 
 
 def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:

@@ -23,7 +23,7 @@ LOWEST, HIGHEST = 2.0, 0.48
 LONGEST_S, LEAST = 8.0, 256
 """Of a stretch without segments, and samples of any stretch."""
 HEARD = 4.0
-"""Times the noise's power, from which a band counts."""
+"""Power of a band over the noise's, from which on it counts."""
 PARTS = ("fit", "choose", "test")
 Residuals = tuple[FloatArray, ...]
 
@@ -59,14 +59,14 @@ class BandPower:
         with np.errstate(divide="ignore"):
             return np.where(power > HEARD * self._noise, 0.5 * np.log(power), np.nan)
 
-    def predicted(self, residuals: Residuals) -> FloatArray:
-        """The same of what a model foresees, to which noise adds."""
+    def predict(self, residuals: Residuals) -> FloatArray:
+        """(stretches, bands, c): logarithm of the predicted amplitude, the noise's power added."""
         unit = self.measure.unit
         courses = [r.measured - left * unit for r, left in zip(self.measure.records, residuals, strict=True)]
         return np.asarray(0.5 * np.log(self._power(courses) + self._noise))
 
     def misfits(self, off: FloatArray) -> FitScore:
-        """off: a difference of such logarithms. Its rms by channel, for each purpose; NaN where nothing counts."""
+        """Rms by channel of a difference of logarithms `off`, on the samples to fit, choose and test by; NaN = none."""
         seen = np.where(np.isnan(self.measured), np.nan, off)
         return FitScore(*(_rms(seen[[stretch.part == part for stretch in self.stretches]]) for part in PARTS))
 
@@ -102,7 +102,7 @@ class BandPower:
 
 
 def _inside(mask: Mask, first: int, last: int) -> list[tuple[int, int]]:
-    """The longest run of samples that count, between the two."""
+    """The longest run of samples that count, between first and last; empty where it is short."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[first:last].astype(np.int8), [0]]))).reshape(-1, 2)
     runs = [(first + int(a), first + int(b)) for a, b in edges if b - a >= LEAST]
     return [max(runs, key=lambda run: run[1] - run[0])] if runs else []

@@ -1,7 +1,7 @@
-"""Least squares on band powers by Gauss and Newton's steps, for the numbers of a hypothesis and of the model.
+"""Robust Gauss-Newton least squares on band powers, for the numbers of a hypothesis and of the model.
 
-Chance is in each prediction, so numbers are moved far to see what they do, and each band of a segment weighs by how
-much chance there is in it.
+Predictions of impacts vary by chance, so finite differences take large steps, and each band of a segment is weighted by
+the inverse of its chance variation.
 """
 
 from dataclasses import dataclass, replace
@@ -17,67 +17,67 @@ from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
 MOVES, WIDEST = (0.02, 0.2), 12.0
-"""Least and most that a logarithm is moved by; and so many times its usual move."""
+"""Finite-difference move of a logarithm, least and most; and the same over its usual move."""
 LONGEST_STEP = 0.5
-"""Of a logarithm, and so many moves of what has either sign."""
+"""Step of a logarithm at most; two moves for numbers of either sign."""
 MOST_BY_CHANCE = 0.8
-"""Of what columns seem to know, the largest share that is taken for chance."""
+"""Share of a column's apparent information that is attributed to chance, at most."""
 LEAST_KNOWN = 1e-6
-"""Information on a combination of numbers that nothing moves."""
+"""Information on a combination of numbers to which the prediction is not sensitive."""
 SHARES = (1.0, 0.3, 0.1, 0.03)
-"""Of a step that are tried."""
+"""Shares of a step that are tried (line search)."""
 FLOOR = 0.04
-"""Of the logarithm of an amplitude: no simulation foresees it better."""
+"""Standard deviation of the logarithm of an amplitude at least: no simulation predicts it better."""
 TRUSTED = 2.0
-"""What is off by more standard deviations pulls no harder (Huber 1964): the model may lack more than one thing."""
+"""Huber's threshold in standard deviations (Huber 1964): the model may lack more than one thing."""
 RESTS = 1e-4
-"""Of a cost, that a step must gain to go on."""
+"""Relative decrease of the cost below which a step is the last."""
 
 
-APART = 1e-9
+PERTURBATION = 1e-9
 """Initial difference between simulations of one hypothesis, in the logarithm of a number."""
 
 
-def apart(hypothesis: Hypothesis, number: int) -> Hypothesis:
-    return replace(hypothesis, point=hypothesis.point + number * APART)
+def perturb(hypothesis: Hypothesis, number: int) -> Hypothesis:
+    return replace(hypothesis, point=hypothesis.point + number * PERTURBATION)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """What is compared, and how."""
+    """The band powers that are compared, their weights, and what is fitted."""
 
     power: BandPower
     tuning: Tuning
     map_: Mapper
     spread: float | FloatArray = 0.05
-    """What chance does to the logarithms, standard deviation; (stretches, bands, c) or one for all."""
+    """Standard deviation of the logarithms by chance; (stretches, bands, c), or a single one for all."""
     by_deviations: FloatArray | None = None
-    """(t, stretches, bands, c): what the model's own numbers do; None: they stay as they are."""
+    """(t, stretches, bands, c): sensitivity to the model's own numbers; None = these are not fitted."""
     ensemble: int = 1
     """Simulations over which a prediction is averaged, from numbers that differ by APART: chance in it falls."""
 
-    def predicted(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
-        """(stretches, bands, c): mean over the ensemble; NaN throughout where that is no model."""
+    def predict(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
+        """(stretches, bands, c): mean prediction over the ensemble; NaN throughout where the model is invalid."""
         members = range(self.ensemble if len(hypothesis.point) else 1)
-        return np.asarray(np.mean([self._member(deviations, apart(hypothesis, k)) for k in members], axis=0))
+        return np.asarray(np.mean([self._member(deviations, perturb(hypothesis, k)) for k in members], axis=0))
 
     def _member(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
         try:
-            model = self.tuning.tuned(deviations)
-            return self.power.predicted(self.power.measure.residuals(model, hypothesis.placed()))
+            model = self.tuning.tune(deviations)
+            return self.power.predict(self.power.measure.residuals(model, hypothesis.placed_effects()))
         except (MechanicalModelError, np.linalg.LinAlgError):
             return np.full(self.power.measured.shape, np.nan)
 
     @property
     def weights(self) -> FloatArray:
-        """(stretches, bands, c): none for what is sealed or drowned."""
+        """(stretches, bands, c): 0 for held-out stretches and bands below the noise."""
         fit = np.array([stretch.part != "test" for stretch in self.power.stretches], dtype=np.bool_)
         known = np.isfinite(self.power.measured) & fit[:, None, None]
         return np.asarray(np.where(known, 1 / np.hypot(self.spread, FLOOR), 0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Foreseen:
+class BandPowerFit:
     """A hypothesis, with what it predicts."""
 
     hypothesis: Hypothesis
@@ -85,7 +85,7 @@ class Foreseen:
     predicted: FloatArray
     """(stretches, bands, c)"""
     cost: float
-    """Huber's mean of what is off, over the bands that are fitted to; inf for what is no model."""
+    """Mean Huber loss over the fitted bands; inf for an invalid model."""
     errors: FloatArray
     """(numbers,): standard errors of the point; empty before a step."""
 
@@ -93,23 +93,23 @@ class Foreseen:
         return np.asarray(view.power.measured - self.predicted)
 
 
-def foreseen(view: View, deviations: FloatArray, hypothesis: Hypothesis) -> Foreseen:
-    predicted = view.predicted(deviations, hypothesis)
+def evaluate_hypothesis(view: View, deviations: FloatArray, hypothesis: Hypothesis) -> BandPowerFit:
+    predicted = view.predict(deviations, hypothesis)
     weights = view.weights
     if not np.isfinite(predicted[weights > 0]).all():
-        return Foreseen(hypothesis, deviations, predicted, np.inf, np.zeros(0))
-    weighed = _weighed(view, view.power.measured - predicted)
+        return BandPowerFit(hypothesis, deviations, predicted, np.inf, np.zeros(0))
+    weighed = _weight(view, view.power.measured - predicted)
     cost = (float(_huber(weighed).sum()) + float(deviations @ deviations)) / max(len(weighed), 1)
-    return Foreseen(hypothesis, deviations, predicted, cost, np.zeros(0))
+    return BandPowerFit(hypothesis, deviations, predicted, cost, np.zeros(0))
 
 
-def fitted(view: View, start: Foreseen, rounds: int) -> Foreseen:
-    """The start or better."""
+def fit_band_power(view: View, start: BandPowerFit, rounds: int) -> BandPowerFit:
+    """The best fit within so many Gauss-Newton steps; never worse than the start."""
     best = start
     for _ in range(rounds):
         if not np.isfinite(best.cost):
             return best
-        better = _stepped(view, best)
+        better = _gauss_newton_step(view, best)
         gained = best.cost - better.cost
         best = better if gained > 0 else replace(best, errors=better.errors)
         if gained < RESTS * best.cost:
@@ -117,8 +117,8 @@ def fitted(view: View, start: Foreseen, rounds: int) -> Foreseen:
     return best
 
 
-def own_columns(view: View, at: Foreseen) -> FloatArray:
-    """(numbers, stretches, bands, c): what the hypothesis's numbers do, moved either way."""
+def hypothesis_columns(view: View, at: BandPowerFit) -> FloatArray:
+    """(numbers, stretches, bands, c): sensitivity to the hypothesis's numbers, by central differences."""
     numbers = at.hypothesis.numbers
     jobs = [(number, way) for number in range(len(numbers)) for way in (1.0, -1.0)]
 
@@ -126,7 +126,7 @@ def own_columns(view: View, at: Foreseen) -> FloatArray:
         number, way = job
         point = at.hypothesis.point.copy()
         point[number] += way * _move(numbers[number])
-        return view.predicted(at.deviations, replace(at.hypothesis, point=point))
+        return view.predict(at.deviations, replace(at.hypothesis, point=point))
 
     there: list[FloatArray] = list(view.map_(moved, jobs))  # type: ignore[arg-type]
     return np.array(
@@ -134,11 +134,11 @@ def own_columns(view: View, at: Foreseen) -> FloatArray:
     ).reshape(len(numbers), *at.predicted.shape)
 
 
-def _stepped(view: View, at: Foreseen) -> Foreseen:
-    own = np.array([_weighed(view, column) for column in own_columns(view, at)])
-    off = _weighed(view, view.power.measured - at.predicted)
+def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
+    own = np.array([_weight(view, column) for column in hypothesis_columns(view, at)])
+    off = _weight(view, view.power.measured - at.predicted)
     t = 0 if view.by_deviations is None else len(at.deviations)
-    known = [_weighed(view, column) for column in (() if view.by_deviations is None else view.by_deviations)]
+    known = [_weight(view, column) for column in (() if view.by_deviations is None else view.by_deviations)]
     columns = np.vstack([*known, *own])
     columns[~np.isfinite(columns).all(axis=1)] = 0.0
     trust = np.minimum(1.0, TRUSTED / np.maximum(np.abs(off), TRUSTED))
@@ -150,22 +150,24 @@ def _stepped(view: View, at: Foreseen) -> Foreseen:
         pull[:t] -= at.deviations
         products[:t, :t] += np.eye(t)
     products += 1e-9 * np.diag(np.maximum(np.diagonal(products), 1e-9))
-    low, high = _reach(at, t)
+    low, high = _step_bounds(at, t)
     step = bounded_step(products, pull, low, high)
     there = at
     for share in SHARES:
         deviations = at.deviations + share * step[:t] if t else at.deviations
-        there = foreseen(view, deviations, replace(at.hypothesis, point=at.hypothesis.point + share * step[t:]))
+        there = evaluate_hypothesis(
+            view, deviations, replace(at.hypothesis, point=at.hypothesis.point + share * step[t:])
+        )
         if there.cost < at.cost:
             break
     return replace(there, errors=_errors(view, at, products))
 
 
-def _errors(view: View, at: Foreseen, products: FloatArray) -> FloatArray:
-    """(numbers,): standard errors, by the information that is left without what chance put into the columns."""
+def _errors(view: View, at: BandPowerFit, products: FloatArray) -> FloatArray:
+    """(numbers,): standard errors from the information matrix, less what chance adds to the columns."""
     numbers = at.hypothesis.numbers
     first = len(products) - len(numbers)
-    chance = _weighed(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))
+    chance = _weight(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))
     information = products.copy()
     for k, number in enumerate(numbers, start=first):
         by_chance = float(chance @ chance) / (2 * view.ensemble * _move(number) ** 2)
@@ -176,7 +178,7 @@ def _errors(view: View, at: Foreseen, products: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(spread[first:]))
 
 
-def _reach(at: Foreseen, t: int) -> tuple[FloatArray, FloatArray]:
+def _step_bounds(at: BandPowerFit, t: int) -> tuple[FloatArray, FloatArray]:
     numbers = at.hypothesis.numbers
     most = np.array([LONGEST_STEP if number.parameter.scale == "log" else 2 * _move(number) for number in numbers])
     bounds = np.array([number.bounds for number in numbers]).reshape(-1, 2) - at.hypothesis.point[:, None]
@@ -196,6 +198,6 @@ def _huber(off: FloatArray) -> FloatArray:
     return np.asarray(np.where(size <= TRUSTED, size**2, TRUSTED * (2 * size - TRUSTED)))
 
 
-def _weighed(view: View, of: FloatArray) -> FloatArray:
+def _weight(view: View, of: FloatArray) -> FloatArray:
     weights = view.weights
     return np.asarray((of * weights)[weights > 0])

@@ -1,4 +1,4 @@
-"""The error measure of recordings and a model: by the rule of `measure_rule`, or as a user asks."""
+"""Makes the error measure of recordings and a model: by the rule of `measure_rule`, or as a user asks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.effect_words import EFFECT_WORDS
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.measure_rule import UNTIMED, Choice, choose_measure, settled_after
+from analysis.diagnosis.errors.measure_rule import UNTIMED, Choice, choose_measure, samples_to_settle
 from analysis.diagnosis.errors.windows import windows_of
 from analysis.diagnosis.forces.force_views import force_views
 from analysis.diagnosis.noise.noise_floor import NoiseFloor, noise_floor
@@ -28,9 +28,9 @@ Compared = Literal["auto", "motion", "force"]
 """What a user asks to be compared; auto: by the rule."""
 
 DITHER = 0.02
-"""Steps of a converter: with less noise than that before it, repeats do not show it."""
+"""Noise in steps of a converter below which repeats do not show the noise."""
 ORDERED = 0.45
-"""Of the sample rate: nearly all that samples without a clock can show."""
+"""End of the band over the sample rate, for samples without a clock."""
 BY_FORCE = (
     "The force that the model needs along the measured motion is compared with the one that entered: the motion was "
     "measured, and small errors of a model that was fitted to it would grow in a simulation."
@@ -64,7 +64,7 @@ def measure_of(
     if compared == "force":
         return measure_by_force(recordings, model, None)
     records, others = (
-        tuple(_settled(record, model) for record in observed_parts(these, model.outputs)) if these else ()
+        tuple(_leave_out_beginning(record, model) for record in observed_parts(these, model.outputs)) if these else ()
         for these in (recordings, beside)
     )
     floors = tuple(noise_floor(record.recording) for record in records)
@@ -117,9 +117,9 @@ def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
     return (f"The model names effects of its own, which are part of every simulation: {kinds}.",)
 
 
-def _settled(record: Observed, model: MechanicalModel) -> Observed:
-    """Without the beginning, where that is in motion and short."""
-    after = settled_after(record, model)
+def _leave_out_beginning(record: Observed, model: MechanicalModel) -> Observed:
+    """The record without its beginning, where that is in motion and short."""
+    after = samples_to_settle(record, model)
     if not after:
         return record
     later = np.arange(len(record.command)) >= after
@@ -127,10 +127,12 @@ def _settled(record: Observed, model: MechanicalModel) -> Observed:
 
 
 def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
-    """(c,): the quietest recording's, rms."""
+    """(c,): rms noise of each channel in the quietest recording."""
     count = records[0].measured.shape[1]
     rows = [
-        np.concatenate([_unrounded(f, record), f.position_rms if f.position_rms is not None else []])[:count]
+        np.concatenate([_noise_before_rounding(f, record), f.position_rms if f.position_rms is not None else []])[
+            :count
+        ]
         for f, record in zip(floors, records, strict=True)
     ]
     signal = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
@@ -138,7 +140,7 @@ def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatAr
     return np.asarray(np.where(np.isfinite(quietest) & (quietest > 0), quietest, UNKNOWN_NOISE_SHARE * signal))
 
 
-def _unrounded(floor: NoiseFloor, record: Observed) -> FloatArray:
+def _noise_before_rounding(floor: NoiseFloor, record: Observed) -> FloatArray:
     """(p,): the response's rms noise before a converter rounded it, for that is physics that a model may lack; what
     rounds a position is known of every encoder. Of repeats alone: elsewhere rounding and noise cannot be told apart."""
     noise = floor.response_rms

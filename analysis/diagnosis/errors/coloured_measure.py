@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColouredMeasure:
-    """Residuals are those of `plain`, whitened; they count where all samples that the filter uses are known."""
+    """An error measure whose residuals are whitened; they count where all samples that the filter uses are known."""
 
     plain: ErrorMeasure
     colour: WhiteningFilter
@@ -48,21 +48,21 @@ class ColouredMeasure:
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         left = self.plain.residuals(model, effects)
-        return tuple(self.colour.whitened(residual * self.plain.unit) / self.unit for residual in left)
+        return tuple(self.colour.apply(residual * self.plain.unit) / self.unit for residual in left)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """Of the residuals that are not whitened: estimators of starting values look at time series."""
+        """Evidence of the residuals before whitening, for estimators of starting values need time series."""
         return self.plain.evidence(model, effects, self.plain.residuals(model, effects))
 
 
-def coloured(plain: ErrorMeasure, colour: WhiteningFilter, noise: FloatArray) -> ColouredMeasure:
-    """noise: (c,), see `ColouredMeasure`."""
-    warm = [_counted(record, colour) for record in plain.records]
+def whiten_measure(plain: ErrorMeasure, colour: WhiteningFilter, noise: FloatArray) -> ColouredMeasure:
+    """The measure with whitened residuals. noise: (c,), see `ColouredMeasure`."""
+    warm = [_leave_out_warm_up(record, colour) for record in plain.records]
     return ColouredMeasure(plain.with_records(tuple(warm)), colour, noise, noise)
 
 
-def _counted(record: Observed, colour: WhiteningFilter) -> Observed:
+def _leave_out_warm_up(record: Observed, colour: WhiteningFilter) -> Observed:
     warm = colour.warm(record.measured)
     return replace(record, fit=record.fit & warm, choose=record.choose & warm, test=record.test & warm)

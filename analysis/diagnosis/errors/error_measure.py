@@ -1,4 +1,4 @@
-"""Port of the error measures: residuals of a model with effects, sample by sample, in units of the noise.
+"""Protocol of the error measures: residuals of a model with effects, sample by sample, in units of the noise.
 
 Three ways of looking, one per file: `free_simulation`, `windows`, `predicted_force`; which one suits is said by
 `choose_measure`.
@@ -15,11 +15,11 @@ from equalizer.signals.signal import FloatArray
 
 
 class ErrorMeasure(Protocol):
-    """Port. What is compared: whole simulated courses, windows of them, or forces."""
+    """What is compared: whole simulated responses, windows of them, or forces."""
 
     @property
     def name(self) -> str:
-        """As `diagnosis.json` says it."""
+        """The measure's name in `diagnosis.json`."""
 
     @property
     def records(self) -> tuple[Observed, ...]:
@@ -31,23 +31,23 @@ class ErrorMeasure(Protocol):
 
     @property
     def unit(self) -> FloatArray:
-        """(c,): what 1 in a residual is in each channel's own unit."""
+        """(c,): unit of a residual, in each channel's own unit."""
 
     @property
     def least(self) -> float:
-        """Times the noise: no error counts as less, for what lies below tells nothing."""
+        """Least error in units of the noise: smaller ones count as this."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        """The same records, with samples that count for something else."""
+        """The measure on the same records with other sample roles."""
 
     def with_floor(self, rms: FloatArray) -> Self:
-        """rms: (c,), in each channel's own unit: so much more counts as noise, and no error as less than that."""
+        """The measure with more noise, and no error below it. rms: (c,), in each channel's own unit."""
 
     def shorten(self) -> Self:
-        """Without the samples behind the last that decisions may see."""
+        """The measure without the samples after the last to fit or to choose by."""
 
     def can_observe(self, effect: Effect) -> bool:
-        """Whether it could see the effect at all; others are not to be considered."""
+        """Whether the effect changes what is compared; other effects are not considered."""
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         """Per record (n, c): measured less predicted, in units of `unit`."""
@@ -55,4 +55,5 @@ class ErrorMeasure(Protocol):
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """Per record, what starting values are drawn from; `residuals` are those of the same model and effects."""
+        """Per record, the motion and missing force from which starting values are estimated; `residuals` are those of
+        the same model and effects."""

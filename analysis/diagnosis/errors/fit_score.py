@@ -27,7 +27,7 @@ class FitScore:
 
     @property
     def mean_log_error(self) -> float:
-        """What explanations are compared by: the mean over channels of the logarithm of the error power, 0 = noise.
+        """Criterion of comparisons: the mean over channels of the logarithm of the error power, 0 = noise.
 
         The likelihood where each channel's error is as strong as it is: no channel drowns the others.
         """
@@ -53,7 +53,7 @@ def fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitSc
 
 
 def rms_over(records: tuple[Observed, ...], residuals: tuple[FloatArray, ...], masks: list[Mask]) -> FloatArray:
-    """(c,); NaN where no sample counts."""
+    """(c,): rms residual over the masked samples of all records; NaN where no sample counts."""
     squares = sum(np.einsum("nc,nc->c", each[mask], each[mask]) for each, mask in zip(residuals, masks, strict=True))
     count = sum(int(mask.sum()) for mask in masks)
     return np.asarray(np.sqrt(squares / count)) if count else np.full(residuals[0].shape[1], np.nan)

@@ -1,4 +1,4 @@
-"""Free simulation: the measured signals against a simulation from the commands alone."""
+"""Error measure by free simulation: the measured signals against a simulation from the commands alone."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -45,11 +45,12 @@ class FreeSimulation:
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
             return tuple(
-                _less(record.measured, self._played(model, effects, record, simulate_response)) / self.unit
+                _subtract_prediction(record.measured, self._simulate(model, effects, record, simulate_response))
+                / self.unit
                 for record in self.records
             )
 
-    def _played(
+    def _simulate(
         self,
         model: MechanicalModel,
         effects: Sequence[PlacedEffect],
@@ -67,20 +68,20 @@ class FreeSimulation:
     ) -> tuple[Evidence, ...]:
         found = []
         for record, left in zip(self.records, residuals, strict=True):
-            played = self._played(model, effects, record, simulate_mechanism)
+            played = self._simulate(model, effects, record, simulate_mechanism)
             there = add_carried_weight(model, record.recording)
             found.append(evidence_of(there, record, played, left, (self.unit, self.noise)))
         return tuple(found)
 
 
-def _less(measured: FloatArray, played: SimulationResult) -> FloatArray:
-    """What was played taken off."""
+def _subtract_prediction(measured: FloatArray, played: SimulationResult) -> FloatArray:
+    """The residual: measured less simulated signals."""
     p, rest = played.response.shape[1], measured.copy()
     rest[:, :p] -= played.response
     rest[:, p:] -= played.position[:, : rest.shape[1] - p]
     return rest
 
 
-def channels(played: SimulationResult, count: int) -> FloatArray:
+def predicted_channels(played: SimulationResult, count: int) -> FloatArray:
     """(n, c): the response and, where there are so many channels, the position."""
     return np.hstack([played.response, played.position])[:, :count]

@@ -14,7 +14,7 @@ Spread = Literal["one", "all", "each"]
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One effect somewhere."""
+    """One effect at one or several sites."""
 
     effect: Effect
     spread: Spread
@@ -51,7 +51,7 @@ class Number:
 
     @property
     def move(self) -> float:
-        """How far it is moved to see what it does."""
+        """Step of the finite differences."""
         return 1.0 if self.parameter.scale == "linear" else self.parameter.step
 
     @property
@@ -81,7 +81,7 @@ class Hypothesis:
             Number(p, _unit(p, start)) for of, start in zip(groups, self.starts, strict=True) for p in of if not p.fixed
         )
 
-    def placed(self, point: FloatArray | None = None) -> tuple[PlacedEffect, ...]:
+    def placed_effects(self, point: FloatArray | None = None) -> tuple[PlacedEffect, ...]:
         left = list(self.numbers)
         coordinates = list(self.point if point is None else point)
         effects: list[PlacedEffect] = []
@@ -97,9 +97,9 @@ class Hypothesis:
         return tuple(effects)
 
     def of_claim(self, number: int) -> tuple[PlacedEffect, ...]:
-        """What one claim places."""
+        """The placed effects of one claim."""
         first = sum(claim.groups for claim in self.claims[:number])
-        return self.placed()[first : first + self.claims[number].groups]
+        return self.placed_effects()[first : first + self.claims[number].groups]
 
 
 def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
@@ -114,14 +114,14 @@ def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
     )
 
 
-def claimed(claim: Claim, values: Sequence[Values]) -> Hypothesis:
+def hypothesis_of_claim(claim: Claim, values: Sequence[Values]) -> Hypothesis:
     """values: one set per group."""
     free = [(p, of_group) for of_group in values for p in claim.effect.parameters if not p.fixed]
     point = np.array([Number(p, _unit(p, of_group)).coordinate(of_group[p.name]) for p, of_group in free])
     return Hypothesis((claim,), tuple(dict(of_group) for of_group in values), point)
 
 
-def together(first: Hypothesis, other: Hypothesis) -> Hypothesis:
+def combine(first: Hypothesis, other: Hypothesis) -> Hypothesis:
     return Hypothesis(
         first.claims + other.claims, first.starts + other.starts, np.concatenate([first.point, other.point])
     )
@@ -130,10 +130,10 @@ def together(first: Hypothesis, other: Hypothesis) -> Hypothesis:
 NOTHING = Hypothesis((), (), np.zeros(0))
 
 
-def alike(whole: Hypothesis) -> Iterator[Hypothesis]:
-    """The same with other numbers that do almost the same, one effect at a time."""
+def similar_hypotheses(whole: Hypothesis) -> Iterator[Hypothesis]:
+    """The hypothesis with other parameters that have almost the same effect, one effect at a time."""
     numbers, begin = whole.numbers, 0
-    for placed in whole.placed():
+    for placed in whole.placed_effects():
         end = begin + sum(not p.fixed for p in placed.effect.parameters)
         for other in placed.effect.alike(placed.values):
             point = whole.point.copy()

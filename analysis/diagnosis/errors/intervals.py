@@ -7,21 +7,20 @@ import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, fitting, own_columns
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, hypothesis_sensitivity, residuals_to_fit
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 STRETCH_S = 0.5
 AT_AN_END = 1e-6
-"""Of a coordinate, where a move makes a difference by about 1."""
+"""Distance of a coordinate from its bound up to which it counts as at the bound."""
 
 
 def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known: Sensitivity) -> FloatArray:
-    """(t + numbers,), of deviations and of the hypothesis's point; 0 where a number stands at an end of its range: it
-    is held there."""
-    errors = fitting(measure, fitted.residuals)
-    own = own_columns(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
+    """(t + numbers,): standard errors of the deviations and of the hypothesis's point; 0 for numbers at a bound."""
+    errors = residuals_to_fit(measure, fitted.residuals)
+    own = hypothesis_sensitivity(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
     pulls = _stretches(measure, known, own, errors)
     middle = pulls @ pulls.T
     t, across = len(fitted.deviations), known.on(own)
@@ -41,7 +40,7 @@ def _at_an_end(hypothesis: Hypothesis) -> Mask:
 
 
 def _stretches(measure: ErrorMeasure, known: Sensitivity, own: FloatArray, errors: FloatArray) -> FloatArray:
-    """(t + numbers, stretches): each column's pull, stretch by stretch."""
+    """(t + numbers, stretches): score of each number (column times residual), summed per stretch."""
     pulls, first = [], 0
     for record in measure.records:
         width = record.measured.shape[1] * max(int(STRETCH_S * record.recording.sample_rate_hz), 1)

@@ -1,4 +1,4 @@
-"""Which error measure suits recordings and a model, by a stated rule.
+"""The rule by which the error measure of recordings and a model is chosen.
 
 Free simulation, from rest by the commands alone, is the strictest: nothing measured helps it. It cannot be asked of
 
@@ -69,7 +69,7 @@ class Choice:
 def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choice:
     """The rule of this module's first lines."""
     longest_s = max(len(record.command) / record.recording.sample_rate_hz for record in records)
-    holds, motion = holds_itself(model, longest_s), all(has_motion(record.recording, model) for record in records)
+    holds, motion = is_self_stable(model, longest_s), all(has_motion(record.recording, model) for record in records)
     if motion and any(time_unit(record.recording) != "s" for record in records):
         return Choice("predicted force", UNTIMED)
     if any(record.recording.meta.get("imposed") for record in records):
@@ -81,33 +81,34 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
     if not holds:
         return Choice("windows", DRIFTS)
     if any(
-        _begins_moving(record) and _settling(record, model) > MOST_LEFT_OUT * len(record.command) for record in records
+        _begins_moving(record) and _settling_samples(record, model) > MOST_LEFT_OUT * len(record.command)
+        for record in records
     ):
         return Choice("windows", NOT_AT_REST)
     return Choice("free simulation", "")
 
 
-def holds_itself(model: MechanicalModel, longest_s: float) -> bool:
+def is_self_stable(model: MechanicalModel, longest_s: float) -> bool:
     """Whether all motion dies out well within a recording (so that no pole is at or near the unit circle)."""
-    return _slowest(model) * DIES_OUT_SHARE * longest_s > 1
+    return _slowest_decay_rate(model) * DIES_OUT_SHARE * longest_s > 1
 
 
-def settled_after(record: Observed, model: MechanicalModel) -> int:
+def samples_to_settle(record: Observed, model: MechanicalModel) -> int:
     """Samples to leave out at the beginning, where that is in motion and short; 0 = none."""
-    after = _settling(record, model)
+    after = _settling_samples(record, model)
     if after > MOST_LEFT_OUT * len(record.command) or not _begins_moving(record):
         return 0
     return int(np.ceil(after))
 
 
-def _settling(record: Observed, model: MechanicalModel) -> float:
-    """Samples until what was at first is gone."""
-    slowest = _slowest(model)
+def _settling_samples(record: Observed, model: MechanicalModel) -> float:
+    """Samples until the initial motion has decayed."""
+    slowest = _slowest_decay_rate(model)
     return SETTLED_CONSTANTS / slowest * record.recording.sample_rate_hz if slowest > 0 else np.inf
 
 
-def _slowest(model: MechanicalModel) -> float:
-    """Rate at which the slowest motion dies out, 1/s; below zero for one that grows."""
+def _slowest_decay_rate(model: MechanicalModel) -> float:
+    """Decay rate of the slowest free motion, 1/s; negative for one that grows."""
     n = model.coordinates
     motion = np.block(
         [

@@ -1,7 +1,7 @@
-"""Regularised least squares: the model's own numbers, with their calibration as prior, and a hypothesis's numbers.
+"""Output-error fit: regularised least squares of the model's own numbers, with their calibration as prior, and of a
+hypothesis's numbers, by bounded Gauss-Newton steps.
 
-Gauss and Newton's steps inside bounds. What the model's own numbers do is computed once and kept; what a hypothesis's
-numbers do, at each step.
+The sensitivity to the model's own numbers is computed once and kept; that to a hypothesis's numbers, at each step.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from equalizer.signals.signal import FloatArray
 MOVED = 0.1
 """Step of the finite differences, in standard deviations."""
 LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
-"""Of a hypothesis's number, by its scale: a factor of e, so many times its start, none."""
+"""Largest step of a hypothesis's number, by its scale: a factor of e, so many times its start, none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,11 +30,11 @@ class Sensitivity:
     """Sensitivity of the prediction to the model's own numbers, on the samples to fit."""
 
     at: FloatArray
-    """(t,): deviations where it was taken,"""
+    """(t,): deviations at which it was computed."""
     columns: FloatArray
-    """(t, samples): change of prediction per standard deviation, and"""
+    """(t, samples): change of the prediction per standard deviation."""
     squares: FloatArray
-    """(t, t): their products."""
+    """(t, t): products of the columns."""
     repeated: npt.NDArray[np.int64] | None = None
     """Where columns hold one period of each segment: per sample to fit, which of the columns' samples is its own."""
 
@@ -42,7 +42,7 @@ class Sensitivity:
         """(t,) or (t, k): products of the columns with errors on the samples to fit, (samples,) or (k, samples)."""
         rows = np.atleast_2d(errors)
         if self.repeated is not None:
-            rows = np.array([self._folded(row) for row in rows]).reshape(len(rows), self.columns.shape[1])
+            rows = np.array([self._sum_periods(row) for row in rows]).reshape(len(rows), self.columns.shape[1])
         products = self.columns @ rows.T
         return products if errors.ndim > 1 else products[:, 0]
 
@@ -66,8 +66,8 @@ class Sensitivity:
         assert self.repeated is not None
         return int(self.columns.shape[1] // (int(self.repeated.max(initial=-1)) + 1))
 
-    def _folded(self, errors: FloatArray) -> FloatArray:
-        """Periods summed up. errors: (samples,), channel after channel at each instant."""
+    def _sum_periods(self, errors: FloatArray) -> FloatArray:
+        """Errors summed over the periods of each segment. errors: (samples,), channel after channel at each instant."""
         assert self.repeated is not None
         each = errors.reshape(len(self.repeated), -1)
         short = self.columns.shape[1] // each.shape[1]
@@ -86,8 +86,8 @@ class Fitted:
     """Mean square over the fitting samples, with the calibration's pull."""
 
 
-def fitting(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatArray:
-    """The residuals of the samples that are fitted to, in one row."""
+def residuals_to_fit(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatArray:
+    """The residuals of the samples to fit, all records in one row."""
     parts = [each[record.fit].ravel() for each, record in zip(residuals, measure.records, strict=True)]
     return np.concatenate(parts)
 
@@ -100,9 +100,9 @@ def sensitivity(
     map_: object = map,
     beside: tuple[FloatArray, Sequence[int]] | None = None,
 ) -> Sensitivity:
-    """By moving each number. map_: `map`, or one that works in parallel. beside: columns that are known, and the
-    numbers whose columns are not."""
-    base = fitting(measure, measure.residuals(tuning.tuned(at), hypothesis.placed()))
+    """Sensitivity to the model's own numbers by finite differences. map_: `map`, or a parallel one. beside: known
+    columns, and the numbers whose columns must be computed."""
+    base = residuals_to_fit(measure, measure.residuals(tuning.tune(at), hypothesis.placed_effects()))
 
     def moved(number: int) -> FloatArray:
         for move in (MOVED, -MOVED):
@@ -110,7 +110,9 @@ def sensitivity(
             there[number] += move
             try:
                 with np.errstate(over="ignore", invalid="ignore"):
-                    change = base - fitting(measure, measure.residuals(tuning.tuned(there), hypothesis.placed()))
+                    change = base - residuals_to_fit(
+                        measure, measure.residuals(tuning.tune(there), hypothesis.placed_effects())
+                    )
             except (MechanicalModelError, np.linalg.LinAlgError):
                 continue
             if np.isfinite(change).all():
@@ -129,11 +131,11 @@ def sensitivity(
 def fit(
     measure: ErrorMeasure, tuning: Tuning, start: Fitted, known: Sensitivity, rounds: int, map_: object = map
 ) -> Fitted:
-    """Better than the start, or the start. known: of the model's numbers, taken anywhere near. map_: as for
-    `sensitivity`."""
+    """The best fit within so many Gauss-Newton steps; never worse than the start. known: sensitivity to the model's
+    numbers, computed anywhere near. map_: as for `sensitivity`."""
     best = start
     for _ in range(rounds):
-        better = _stepped(measure, tuning, best, known, map_)
+        better = _gauss_newton_step(measure, tuning, best, known, map_)
         if better is None:
             return best
         gained = best.cost - better.cost
@@ -143,9 +145,9 @@ def fit(
     return best
 
 
-def evaluated(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis) -> Fitted:
-    residuals = measure.residuals(tuning.tuned(deviations), hypothesis.placed())
-    return Fitted(hypothesis, deviations, residuals, _cost(fitting(measure, residuals), deviations))
+def evaluate_fit(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis) -> Fitted:
+    residuals = measure.residuals(tuning.tune(deviations), hypothesis.placed_effects())
+    return Fitted(hypothesis, deviations, residuals, _cost(residuals_to_fit(measure, residuals), deviations))
 
 
 def _cost(errors: FloatArray, deviations: FloatArray) -> float:
@@ -154,9 +156,11 @@ def _cost(errors: FloatArray, deviations: FloatArray) -> float:
     return cost if np.isfinite(cost) else np.inf
 
 
-def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensitivity, map_: object) -> Fitted | None:
-    errors = fitting(measure, from_.residuals)
-    own = own_columns(measure, tuning, from_, errors, map_)
+def _gauss_newton_step(
+    measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensitivity, map_: object
+) -> Fitted | None:
+    errors = residuals_to_fit(measure, from_.residuals)
+    own = hypothesis_sensitivity(measure, tuning, from_, errors, map_)
     t = len(from_.deviations)
     with np.errstate(over="ignore", invalid="ignore"):
         cross = known.on(own)
@@ -173,9 +177,9 @@ def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensit
         step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, low, high)
         there = replace(from_.hypothesis, point=from_.hypothesis.point + step[t:])
         try:
-            if is_unstable_within(tuning.tuned(from_.deviations + step[:t]), _longest_s(measure)):
+            if is_unstable_within(tuning.tune(from_.deviations + step[:t]), _longest_s(measure)):
                 continue
-            tried = evaluated(measure, tuning, from_.deviations + step[:t], there)
+            tried = evaluate_fit(measure, tuning, from_.deviations + step[:t], there)
         except (MechanicalModelError, np.linalg.LinAlgError):
             continue
         if tried.cost < from_.cost * (1 - 1e-9):
@@ -187,18 +191,20 @@ def _longest_s(measure: ErrorMeasure) -> float:
     return max(len(record.command) / record.recording.sample_rate_hz for record in measure.records)
 
 
-def own_columns(
+def hypothesis_sensitivity(
     measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray, map_: object = map
 ) -> FloatArray:
     """(numbers, samples): sensitivity of the prediction to the hypothesis's numbers."""
-    model: MechanicalModel = tuning.tuned(from_.deviations)
+    model: MechanicalModel = tuning.tune(from_.deviations)
     moves = [number.move for number in from_.hypothesis.numbers]
 
     def moved(number: int) -> FloatArray:
         point, move = from_.hypothesis.point.copy(), moves[number]
         point[number] += move
         with np.errstate(over="ignore", invalid="ignore"):
-            change = errors - fitting(measure, measure.residuals(model, from_.hypothesis.placed(point)))
+            change = errors - residuals_to_fit(
+                measure, measure.residuals(model, from_.hypothesis.placed_effects(point))
+            )
             return np.divide(change, move, out=change)
 
     columns = list(map_(moved, range(len(moves))))  # type: ignore[operator]
@@ -216,7 +222,7 @@ def _longest(hypothesis: Hypothesis) -> FloatArray:
 
 
 def bounded_step(products: FloatArray, pull: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Least squares within bounds: what presses against one is held there, and let go where it pulls back."""
+    """Least-squares step within bounds: numbers that leave their range are held at its end (active set)."""
     step, held = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
     for _ in range(2 * len(pull) + 2):
         free = ~held
@@ -232,5 +238,5 @@ def bounded_step(products: FloatArray, pull: FloatArray, low: FloatArray, high: 
 
 
 def gather_evidence(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Evidence, ...]:
-    """What starting values are drawn from: the motion and the force that a fit leaves unexplained, one per record."""
-    return measure.evidence(tuning.tuned(fitted.deviations), fitted.hypothesis.placed(), fitted.residuals)
+    """Motion and missing force of a fit, one per record, from which starting values are estimated."""
+    return measure.evidence(tuning.tune(fitted.deviations), fitted.hypothesis.placed_effects(), fitted.residuals)

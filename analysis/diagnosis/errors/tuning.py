@@ -19,7 +19,7 @@ from equalizer.signals.signal import FloatArray
 
 UNSTATED = Tolerance(modes=UNSTATED_MODES)
 DAMPING_PER_MODES = 10.0
-"""A mode's damping is known so many times worse than its frequency."""
+"""Relative uncertainty of a mode's damping over that of its frequency."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,15 +31,16 @@ class Tuning:
     deviation: FloatArray
     """(parameters,): one standard deviation, SI or relative."""
     units: tuple[str, ...]
-    tuned: Callable[[FloatArray], MechanicalModel]
-    """From deviations (parameters,), in standard deviations. Raises MechanicalModelError for a mass that is none."""
+    tune: Callable[[FloatArray], MechanicalModel]
+    """The model with its numbers changed by deviations (parameters,), in standard deviations. Raises
+    MechanicalModelError where the mass is not positive definite."""
 
     def values(self, deviations: FloatArray) -> FloatArray:
         return np.asarray(deviations * self.deviation)
 
 
 def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning:
-    """What the model's tolerances leave open; where it states none, a tenth is taken."""
+    """The numbers that the model's tolerances leave open; where it states none, a tenth is taken."""
     split = _split(model)
     m = model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
@@ -55,7 +56,7 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
     relative = UNSTATED.modes if tolerance.modes is None else tolerance.modes
     assert relative is not None
     grounded = [
-        _stated(stated, matrix[:m, :m])
+        _stated_deviation(stated, matrix[:m, :m])
         for stated, matrix in (
             (tolerance.mass_kg, split.mass),
             (tolerance.damping_n_s_per_m, split.damping),
@@ -72,7 +73,7 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
         tuple(names),
         deviation,
         tuple(unit for unit in units for _ in pairs) + ("1",) * (3 * len(modes)),
-        lambda deviations: _tuned(model, split, pairs, np.asarray(deviations) * deviation),
+        lambda deviations: _tune(model, split, pairs, np.asarray(deviations) * deviation),
     )
 
 
@@ -88,7 +89,7 @@ class _Split:
     frequency_hz: FloatArray
 
 
-def _stated(stated: float | None, grounded: FloatArray) -> float:
+def _stated_deviation(stated: float | None, grounded: FloatArray) -> float:
     if stated is not None:
         return stated
     return UNSTATED_SHARE * float(np.abs(np.diagonal(grounded)).max()) or UNSTATED_SHARE
@@ -116,7 +117,7 @@ def _split(model: MechanicalModel) -> _Split:
     return _Split(mass, damping, stiffness, np.linalg.inv(basis), frequency)
 
 
-def _tuned(model: MechanicalModel, split: _Split, pairs: list[tuple[int, int]], values: FloatArray) -> MechanicalModel:
+def _tune(model: MechanicalModel, split: _Split, pairs: list[tuple[int, int]], values: FloatArray) -> MechanicalModel:
     m, modes = model.inputs, len(split.frequency_hz)
     grounded = values[: 3 * len(pairs)].reshape(3, len(pairs))
     frequency, weight, loss = values[3 * len(pairs) :].reshape(3, modes)

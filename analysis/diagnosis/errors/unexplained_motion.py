@@ -1,4 +1,4 @@
-"""The residual of a simulation as a missing force along each axis, with its motion."""
+"""Converts the residual of a simulation to a missing force along each axis, with its motion."""
 
 import numpy as np
 
@@ -20,7 +20,8 @@ def evidence_of(
     left: FloatArray,
     scales: tuple[FloatArray, FloatArray],
 ) -> Evidence:
-    """left: (n, c), the residuals of what was played. scales: the error measure's unit and noise, (c,) each."""
+    """The evidence of one record. left: (n, c), residuals of the simulation. scales: the error measure's unit and
+    noise, (c,) each."""
     unit, noise = scales
     residuals = np.where(np.isfinite(left), left, 0.0)
     rate_hz, p = record.recording.sample_rate_hz, model.outputs
@@ -46,8 +47,8 @@ def evidence_of(
 
 
 def without_gaps(measured: FloatArray, left: FloatArray, played: SimulationResult) -> tuple[FloatArray, FloatArray]:
-    """Measured and predicted, (n, c) each. Estimators look at whole courses: where nothing was measured, what was
-    played stands for both, so that nothing differs."""
+    """Measured and predicted signals, (n, c) each, without gaps: where nothing was measured, both are the simulation,
+    so that they do not differ."""
     known = np.isfinite(measured)
     course = np.hstack([played.response, played.position])[:, : measured.shape[1]]
     predicted = np.where(known, measured - left, course)

@@ -30,8 +30,8 @@ class WhiteningFilter:
     def lags(self) -> int:
         return len(self.steps) - 1
 
-    def whitened(self, left: FloatArray) -> FloatArray:
-        """(n, c), NaN where it was. The filter is causal; unknown samples count as 0."""
+    def apply(self, left: FloatArray) -> FloatArray:
+        """(n, c): residuals through the causal filter; unknown samples count as 0 and stay NaN."""
         known = np.isfinite(left)
         filled = np.where(known, left, 0.0)
         room = next_fast_len(len(left) + self.lags, True)
@@ -39,14 +39,15 @@ class WhiteningFilter:
         return np.where(known, passed[: len(left)], np.nan)
 
     def warm(self, left: FloatArray) -> Mask:
-        """(n,): where all samples that the filter uses are known."""
+        """(n,): mask of the samples for which all samples that the filter uses are known."""
         unknown = np.concatenate([np.ones(self.lags), ~np.isfinite(left).all(axis=1)])
         until = np.concatenate([[0.0], np.cumsum(unknown)])
         return np.asarray(until[self.lags + 1 :] == until[: len(left)], dtype=np.bool_)
 
 
 def whitening_filter(courses: Sequence[FloatArray], least: FloatArray) -> WhiteningFilter:
-    """courses: (n, c) each, NaN where not known. least: (c,), rms of noise that is white."""
+    """Autoregression fitted to residuals by Yule-Walker. courses: (n, c) each, NaN where not known. least: (c,), rms of
+    white noise, which bounds the spectrum from below."""
     count = sum(int(np.isfinite(course).all(axis=1).sum()) for course in courses)
     lags = int(np.clip(count // SAMPLES_PER_LAG, 1, MOST_LAGS))
     alike: FloatArray = np.sum([lagged_products(course, lags) for course in courses], axis=0) / max(count, 1)

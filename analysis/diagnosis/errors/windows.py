@@ -1,6 +1,7 @@
-"""Multiple short simulations, each from a smoothed state, so that plants without a restoring force cannot drift far.
+"""Error measure by windows (multiple shooting): short simulations, each from a smoothed state, so that plants without a
+restoring force cannot drift far.
 
-What is left of an error in the state is fitted to each window, and does not count.
+The remaining error of the initial state is fitted to each window, and does not count.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ import numpy as np
 from analysis.diagnosis.data.carried_weight import add_carried_weight
 from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motion
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.free_simulation import channels
+from analysis.diagnosis.errors.free_simulation import predicted_channels
 from analysis.diagnosis.errors.unexplained_motion import without_gaps
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
 from equalizer.effects.simulation.along_motion import actuator_force
@@ -72,7 +73,9 @@ class Windows:
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         every = (*self.known, *effects)
-        return tuple(self._seen(model, every, *pair)[1] for pair in zip(self.records, self.states, strict=True))
+        return tuple(
+            self._simulate_from_states(model, every, *pair)[1] for pair in zip(self.records, self.states, strict=True)
+        )
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
@@ -82,10 +85,10 @@ class Windows:
             for record, states in zip(self.records, self.states, strict=True)
         )
 
-    def _seen(
+    def _simulate_from_states(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
     ) -> tuple[SimulationResult, FloatArray]:
-        """And what is left, (n, c)."""
+        """The windows' simulation, and its residuals (n, c) without the fitted initial states."""
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
@@ -99,7 +102,7 @@ class Windows:
             Restarts(length, states),
         )
         with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
-            left = (record.measured - channels(played, record.measured.shape[1])) / self.unit
+            left = (record.measured - predicted_channels(played, record.measured.shape[1])) / self.unit
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure
@@ -108,20 +111,22 @@ class Windows:
     def _without_states(
         self, structure: MechanicalModel, left: FloatArray, sample_rate_hz: float, length: int
     ) -> FloatArray:
-        """(n, c) less what other states at the windows' beginnings would make of it."""
+        """(n, c): residuals with the free motion of other initial states of the windows projected out."""
         n, c = left.shape
         # A fit may try a model that is unstable.
         with np.errstate(over="ignore", invalid="ignore"):
-            free = _free(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
+            free = _free_motion(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
             told = np.isfinite(left).all() and np.isfinite(np.sum(free**2))
         if not told:
             return left
         whole = n // length * length
         found = left.copy()
         if whole:
-            found[:whole] = _beside(left[:whole].reshape(-1, length * c), free.reshape(length * c, -1)).reshape(-1, c)
+            found[:whole] = _project_out(left[:whole].reshape(-1, length * c), free.reshape(length * c, -1)).reshape(
+                -1, c
+            )
         if n > whole:
-            found[whole:] = _beside(
+            found[whole:] = _project_out(
                 left[whole:].reshape(1, -1), free[: n - whole].reshape((n - whole) * c, -1)
             ).reshape(-1, c)
         return found
@@ -129,7 +134,7 @@ class Windows:
     def _evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
     ) -> Evidence:
-        played, left = self._seen(model, effects, record, states)
+        played, left = self._simulate_from_states(model, effects, record, states)
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
         entered = actuator_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
@@ -156,8 +161,8 @@ class Windows:
 def windows_of(
     records: tuple[Observed, ...], model: MechanicalModel, scales: tuple[FloatArray, FloatArray], window_s: float = 1.0
 ) -> Windows:
-    """scales: unit and noise, (c,) each. window_s: at least. Raises numpy.linalg.LinAlgError where the motion cannot be
-    estimated."""
+    """The measure with each window's initial state estimated by a smoother. scales: unit and noise, (c,) each.
+    window_s: at least. Raises numpy.linalg.LinAlgError where the motion cannot be estimated."""
     unit, noise = scales
     fitted = 2 * len(model.mass) / records[0].measured.shape[1]
     window_s = max(window_s, STATES * fitted / records[0].recording.sample_rate_hz)
@@ -174,8 +179,8 @@ def samples_of(window_s: float, sample_rate_hz: float) -> int:
     return max(round(window_s * sample_rate_hz), 1)
 
 
-def _free(structure: MechanicalModel, sample_rate_hz: float, length: int, count: int) -> FloatArray:
-    """(length, c, 2n): the channels' free motion from each state of size 1."""
+def _free_motion(structure: MechanicalModel, sample_rate_hz: float, length: int, count: int) -> FloatArray:
+    """(length, c, 2n): free response of the channels to each unit initial state."""
     steps = linear_steps(structure, 1 / sample_rate_hz)
     states = np.empty((length, *steps.advance.shape))
     states[0] = np.eye(len(steps.advance))
@@ -186,7 +191,7 @@ def _free(structure: MechanicalModel, sample_rate_hz: float, length: int, count:
     return np.asarray(seen[:, :, :count].transpose(0, 2, 1))
 
 
-def _beside(left: FloatArray, free: FloatArray) -> FloatArray:
+def _project_out(left: FloatArray, free: FloatArray) -> FloatArray:
     """Rows of left (windows, samples) without what lies along the columns of free (samples, k)."""
     size = np.linalg.norm(free, axis=0)
     along, sizes, _ = np.linalg.svd(free / np.where(size > 0, size, 1.0), full_matrices=False)

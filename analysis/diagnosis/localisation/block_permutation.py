@@ -14,14 +14,16 @@ IntArray = npt.NDArray[np.int64]
 _MEMORIES = 3.0
 """Length of a block, in correlation times."""
 _COUNTED = 10
+"""Shuffles as large as the statistic from which on they are counted instead of fitted."""
 SMALLEST = 1e-6
-"""p-value: the tail of a curve through a few shuffles is not believed beyond."""
+"""Least p-value: the fitted tail is not trusted beyond."""
 _LEAST_BLOCKS = 8
-"""Per stratum."""
+"""Blocks per stratum at least."""
 
 
 def correlation_time(series: FloatArray) -> float:
-    """In samples: 1 + twice the sum of the squared autocorrelation, which is what inflates a variance. (n,)"""
+    """Correlation time of a series (n,) in samples: 1 + twice the sum of the squared autocorrelation, the factor by
+    which a variance is inflated."""
     n = len(series)
     centred = series - series.mean()
     spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
@@ -33,7 +35,7 @@ def correlation_time(series: FloatArray) -> float:
     return float((2 * np.sum((covariance / covariance[0]) ** 2) - 1) / (1 + 2 * lags / n))
 
 
-def shuffled(strata: IntArray, block: int, random: np.random.Generator) -> IntArray:
+def shuffle_blocks(strata: IntArray, block: int, random: np.random.Generator) -> IntArray:
     """Indices (n,) that exchange blocks within each stratum, cut from a random offset on. strata: (n,), contiguous."""
     order = np.arange(len(strata))
     edges = np.concatenate([[0], np.flatnonzero(np.diff(strata)) + 1, [len(strata)]])
@@ -61,7 +63,7 @@ def permutation_p_values(
     """(tests,): upper tails of a gamma distribution with the shuffles' mean and variance (Winkler and others 2016),
     never less than it says. statistics: of the indices by which the series is shuffled, (tests,)."""
     seen = statistics(np.arange(len(strata)))
-    chance = np.array([statistics(shuffled(strata, block, random)) for _ in range(permutations)])
+    chance = np.array([statistics(shuffle_blocks(strata, block, random)) for _ in range(permutations)])
     mean, variance = chance.mean(axis=0), np.maximum(chance.var(axis=0, ddof=1), np.finfo(np.float64).tiny)
     p_values = gammaincc(mean**2 / variance, seen * mean / variance)
     # Shuffles that were as large are believed before the curve through them.

@@ -1,4 +1,4 @@
-"""The mismatch that a model leaves on clean recordings, by cell and by channel: it is not evidence for an effect."""
+"""The mismatch that a model leaves on clean recordings, by cell and by channel, which is no evidence for an effect."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from analysis.diagnosis.data.frequency_cells import Band
 
 @dataclass(frozen=True, slots=True)
 class CleanFloor:
-    """Shares of the signal (rms)."""
+    """Rms mismatch over the rms signal of clean recordings, raised by `beyond`."""
 
     shares: Mapping[tuple[str, str, str, Band], float] = field(default_factory=dict)
     """By output, its quantity, input and octave."""
@@ -20,7 +20,7 @@ class CleanFloor:
 
     @property
     def beyond(self) -> float:
-        """By how much the largest that was seen was raised to give these shares: the fewer recordings, the more."""
+        """Factor by which the largest observed share was raised: the fewer recordings, the more."""
         return 1 + 1 / max(self.recordings, 1)
 
     def share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:

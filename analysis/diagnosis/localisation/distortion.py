@@ -1,5 +1,5 @@
-"""What kind of distortion a device has, from repeats and from lines that were not driven: by channel, input, level and
-band. Which kinds can be told apart depends on the recording; `Distortions.remarks` say what could not."""
+"""Nonlinear distortion by kind (odd, even, varying), from repeats and from silent lines of a periodic excitation, by
+channel, input, level and band. `Distortions.remarks` say which kinds the recording cannot show."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import numpy as np
 from analysis.diagnosis.data.detection_lines import DetectionLines, detection_lines, hold_length
 from analysis.diagnosis.data.frequency_cells import Band, lines_in_band, octaves_between
 from analysis.diagnosis.data.line_statistics import excess
-from analysis.diagnosis.localisation.driven_looks import DrivenLook, driven_looks
+from analysis.diagnosis.localisation.segment_spectra import SegmentSpectrum, segment_spectra
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.noise.periods import Periods, period_spectra, settled_periods
 from analysis.diagnosis.types import Mask
@@ -48,13 +48,13 @@ class Distortion:
     rms: float
     """In the output's unit, over all lines of the band that this kind reaches; 0 where not above the noise."""
     limit_rms: float
-    """Less would not have been seen."""
+    """Detection limit."""
     signal_rms: float
     """The response on the driven lines."""
     p_value: float
     """Chance of as much from noise alone."""
     lines: int
-    """That it was measured on."""
+    """Number of lines that it was measured on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +63,8 @@ class Distortions:
     remarks: tuple[str, ...]
 
 
-def distortion(recording: Recording, floor: NoiseFloor) -> Distortions:
-    """Per channel of response and position x input x level x (whole driven band and each octave of it)."""
+def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
+    """Distortion per channel of response and position x input x level x (whole driven band and each octave of it)."""
     if not floor.known:
         return Distortions((), ("The noise is not known, so no distortion can be told from it.",))
     found = settled_periods(recording)
@@ -79,12 +79,12 @@ def distortion(recording: Recording, floor: NoiseFloor) -> Distortions:
         signals.append((recording.position, floor.position))
     cells: list[Distortion] = []
     for signal, noise in signals:
-        for look in driven_looks(recording, signal, noise, floor.frequency_hz, periods):
+        for look in segment_spectra(recording, signal, noise, floor.frequency_hz, periods):
             cells += _cells(look, signal)
-    return Distortions(tuple(cells), tuple(_what_is_missing(periods)))
+    return Distortions(tuple(cells), tuple(_untestable_remarks(periods)))
 
 
-def _what_is_missing(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:
+def _untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:
     remarks = []
     if all(period.count < 2 for period, _ in periods):
         remarks.append("No period was repeated: what varies from period to period cannot be seen.")
@@ -101,7 +101,7 @@ def _what_is_missing(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[
     return remarks
 
 
-def _cells(look: DrivenLook, signal: Signal) -> list[Distortion]:
+def _cells(look: SegmentSpectrum, signal: Signal) -> list[Distortion]:
     lowest, highest = (float(line) for line in look.frequency_hz[look.lines.driven][[0, -1]])
     cells = []
     octaves = octaves_between(lowest, highest)
@@ -114,28 +114,28 @@ def _cells(look: DrivenLook, signal: Signal) -> list[Distortion]:
     return cells
 
 
-def _kinds(look: DrivenLook, channel: int, inside: Mask, where: _Where, whole: bool) -> list[Distortion]:
+def _kinds(look: SegmentSpectrum, channel: int, inside: Mask, where: _Where, whole: bool) -> list[Distortion]:
     power, error = np.abs(look.mean[:, channel]) ** 2, look.error[:, channel]
     signal_rms = float(np.sqrt(2 * np.sum(power[inside & look.lines.driven])))
     found: list[tuple[Kind, tuple[float, float, float], float, int]] = []
-    for kind, chosen, reached in _silent(look, inside):
-        freedom = float(2 * max(look.looks - 1, 1) * chosen.sum())
+    for kind, chosen, reached in _detection_masks(look, inside):
+        freedom = float(2 * max(look.count - 1, 1) * chosen.sum())
         beyond = excess(power[chosen], error[chosen], freedom)
         found.append((kind, beyond, reached / chosen.sum(), int(chosen.sum())))
-    if look.looks > 1:
+    if look.count > 1:
         # Each line is known from looks - 1 differences.
-        seen = np.repeat(look.spread[inside, channel], look.looks - 1)
+        seen = np.repeat(look.spread[inside, channel], look.count - 1)
         beyond = excess(
-            seen, np.repeat(look.floor[inside, channel], look.looks - 1), float(look.floor_freedom[channel])
+            seen, np.repeat(look.floor[inside, channel], look.count - 1), float(look.floor_freedom[channel])
         )
-        found.append(("varying", beyond, 1 / (look.looks - 1), int(inside.sum())))
+        found.append(("varying", beyond, 1 / (look.count - 1), int(inside.sum())))
     return [
         Distortion(*where, whole, kind, _rms(share * beyond), _rms(share * limit), signal_rms, p_value, lines)
         for kind, (beyond, limit, p_value), share, lines in found
     ]
 
 
-def _silent(look: DrivenLook, inside: Mask) -> list[tuple[Kind, Mask, int]]:
+def _detection_masks(look: SegmentSpectrum, inside: Mask) -> list[tuple[Kind, Mask, int]]:
     """Kinds of detection lines, those in the band, and how many lines of the band that kind of distortion reaches."""
     numbers = np.arange(1, len(inside) + 1)
     multiple = inside & (numbers % look.lines.step == 0)

@@ -1,5 +1,5 @@
-"""Through which component a mismatch enters: a force at an axis, whatever its cause, moves all channels in proportions
-that the model knows; an error of one sensor shows in that channel alone.
+"""Finds through which component a mismatch enters: a force at an axis, whatever its cause, moves all channels in
+proportions that the model knows; an error of one sensor shows in that channel alone.
 
 The score is the mean logarithm of the power that an entry leaves unexplained, line by line. A share of the power summed
 over lines says little, for where the device moves as one rigid body nearly all directions look alike.
@@ -29,7 +29,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _BLOCK_LINES = 8
-"""Neighbouring lines share their fate: so many count as one when two entries are compared."""
+"""Neighbouring lines, which are correlated, that count as one when two entries are compared."""
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -41,7 +41,7 @@ class SensorRule:
     """What the response's residual would leave in position if the device moved so, in units of position's noise
     (power), on the lines where that would be seen."""
     seen: float
-    """What is there, likewise, noise taken out."""
+    """The power found in position, in the same unit, noise subtracted."""
 
 
 def sensor_rule(spectra: ResidualSpectra, derivative: int) -> SensorRule | None:
@@ -71,8 +71,8 @@ class Entry:
     place: Place
     axis: str | None
     directions: ComplexArray
-    """(lines, channels, k): what k independent unit inputs there do to response and position. (1, channels, k) where
-    alike at all lines."""
+    """(lines, channels, k): frequency response of the channels to k independent inputs there; (1, channels, k) where it
+    is the same at all lines."""
     of_position: bool = False
     """A sensor entry of the position sensor."""
 
@@ -87,7 +87,7 @@ class EntryScore:
     share: float
     """Of the residual's power beyond noise that it explains, median over lines."""
     p_value: float
-    """That it explains as much as the best; 1 for the best and what is like it."""
+    """p-value of explaining as much as the best; 1 for the best and for entries like it."""
     alike: tuple[str, ...]
     """Entries that these channels cannot tell from it."""
 
@@ -118,16 +118,16 @@ def entry_point(
         return EntryPoint((), rule, int(loud.sum()))
     weights = 1 / np.sqrt(np.maximum(spectra.noise.mean(axis=0), _TINY))
     bases = [_basis(entry, weights) for entry in entries]
-    lefts = [_unexplained(whitened, total, basis) for basis in bases]
+    lefts = [_unexplained_power(whitened, total, basis) for basis in bases]
     logs = [np.log1p(left / max(channels - basis.shape[2], 1)) for left, basis in zip(lefts, bases, strict=True)]
     scores = [float(np.mean(log[loud])) for log in logs]
-    ranked = sorted(range(len(entries)), key=lambda k: scores[k] + _against(rule, entries[k], bases[k].shape[2]))
+    ranked = sorted(range(len(entries)), key=lambda k: scores[k] + _score_penalty(rule, entries[k], bases[k].shape[2]))
     best = ranked[0]
     ranking = []
     for k in ranked:
         alike = tuple(entries[j].name for j in ranked if j != k and _angle(bases[j], bases[k]) < ENTRY_ANGLE)
         same = k == best or entries[best].name in alike
-        p_value = 1.0 if same else _as_good(logs[k], logs[best], loud)
+        p_value = 1.0 if same else _p_value_as_good(logs[k], logs[best], loud)
         explained = 1 - lefts[k][loud] / total[loud]
         entry = entries[k]
         share = float(np.median(explained))
@@ -146,14 +146,14 @@ def _basis(entry: Entry, weights: FloatArray) -> ComplexArray:
     return np.asarray(np.linalg.qr(directions / np.maximum(size, _TINY))[0], dtype=np.complex128)
 
 
-def _unexplained(whitened: ComplexArray, total: FloatArray, basis: ComplexArray) -> FloatArray:
+def _unexplained_power(whitened: ComplexArray, total: FloatArray, basis: ComplexArray) -> FloatArray:
     """(experiments, lines)"""
     along = np.einsum("lck,elc->elk", basis.conj(), whitened)
     return np.asarray(np.maximum(total - np.sum(np.abs(along) ** 2, axis=2), 0.0))
 
 
-def _against(rule: SensorRule | None, entry: Entry, dimensions: int) -> float:
-    """What is added to a score: for more dimensions, and where the rule about position and response speaks."""
+def _score_penalty(rule: SensorRule | None, entry: Entry, dimensions: int) -> float:
+    """Penalty on a score: for more dimensions, and where the sensor rule contradicts the entry."""
     parsimony = ENTRY_PER_DIMENSION * (dimensions - 1)
     if rule is None or rule.verdict == "undecided":
         return parsimony
@@ -170,7 +170,7 @@ def _angle(first: ComplexArray, other: ComplexArray) -> float:
     return float(np.mean(np.sqrt(np.maximum(1 - cosines**2, 0.0))))
 
 
-def _as_good(log: FloatArray, best: FloatArray, loud: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> float:
+def _p_value_as_good(log: FloatArray, best: FloatArray, loud: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> float:
     """One-sided paired t-test over blocks of neighbouring loud lines."""
     difference = (log - best)[loud]
     blocks = len(difference) // _BLOCK_LINES

@@ -1,4 +1,4 @@
-"""How distortion changes with level: the five numbers per band that point at a kind of physics before any fit.
+"""Trends of distortion with level, which point at a kind of physics before any fit.
 
 Relative to the linear response, friction and dead zones fall with level, stiffness and drag rise, limits rise from
 nothing, what is tied to position stays, timing makes more of what varies, and noise from outside takes no notice of it.
@@ -29,13 +29,13 @@ class LevelTrend:
     whole_band: bool
     kind: Kind
     relative_db: float
-    """At the highest level, to the response on driven lines."""
+    """Distortion over the response on driven lines, at the highest level."""
     p_value: float
-    """That there is any at all: the smallest over levels, corrected for their number."""
+    """p-value of no distortion: the smallest over levels, corrected for their number."""
     db_per_doubling: float | None
-    """Of the relative size, with the level; None where seen at no level, or with one level only."""
+    """Slope of the relative size with the level; None where seen at no level, or with one level only."""
     slope_p_value: float | None
-    """That the slope is 0."""
+    """p-value of a slope of 0."""
     from_nothing: bool
     """It was not seen at the lowest level: the slope is a lower bound."""
 
@@ -72,14 +72,14 @@ def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distorti
     relative_db = 20 * np.log10(np.maximum(sizes, _TINY) / np.maximum(signals, _TINY))
     p_value = min(1.0, min(cell.p_value for cell in cells) * len(cells))
     seen = np.array([cell.p_value < DISTORTION_P for cell in cells])
-    slope, slope_p = _course(levels, relative_db, np.array([cell.lines for cell in cells]), seen)
+    slope, slope_p = _slope_with_limits(levels, relative_db, np.array([cell.lines for cell in cells]), seen)
     if key[4]:
         band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
         key = (*key[:3], band, *key[4:])
     return LevelTrend(*key, float(relative_db[-1]), p_value, slope, slope_p, bool(seen.any() and not seen[0]))
 
 
-def _course(
+def _slope_with_limits(
     levels: FloatArray, relative_db: FloatArray, lines: FloatArray, seen: Mask
 ) -> tuple[float | None, float | None]:
     """Slope and p-value. Where nothing was seen at a level, the limit of what would have been bounds the slope: from

@@ -1,4 +1,4 @@
-"""Where a mismatch sits: in which state of motion, through which component it enters, and of what kind it is."""
+"""Localises a mismatch: in which state of motion it sits, through which component it enters, and of what kind it is."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ from analysis.diagnosis.localisation.entry_point import Entry, EntryPoint, entry
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, Prediction
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.residual_spectra import residual_spectra
-from analysis.diagnosis.localisation.tied_states import tied_errors, tied_forces
+from analysis.diagnosis.localisation.state_dependence import error_states, force_states
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from equalizer.effects.placing import axis_letter
 from equalizer.effects.starts.evidence import Evidence
@@ -32,17 +32,16 @@ _DERIVATIVES: Mapping[str, Literal[0, 1, 2]] = {
 @dataclass(frozen=True, slots=True, eq=False)
 class Localisation:
     states: Mapping[str, tuple[StateMismatch, ...]] = field(default_factory=dict)
-    """By "before", "retuned", "after": significant ones."""
+    """Significant state dependences, by "before", "retuned", "after"."""
     entry: EntryPoint | None = None
-    """Of what re-tuning leaves; None where that is nothing, or directions say nothing: the model drifts, or the noise
-    is not known."""
+    """Entry point of what re-tuning leaves; None where that is nothing, the model drifts, or the noise is not known."""
     distortions: Distortions = field(default_factory=lambda: Distortions((), ()))
 
 
-def entered(
+def find_entry_point(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, floor: NoiseFloor, cells: Sequence[MismatchCell]
 ) -> EntryPoint | None:
-    """Of the first recording, which stands for the device. cells: of this fit, the re-tuned model's."""
+    """The entry point by the first recording, which stands for the device. cells: of this fit, the re-tuned model's."""
     if measure.name != "free simulation" or not any(cell.beyond_noise for cell in cells):
         return None
     record = measure.records[0]
@@ -52,13 +51,13 @@ def entered(
     spectra = residual_spectra(recording, Prediction(predicted[:, :p], position), floor, record.fit | record.choose)
     if spectra is None:
         return None
-    model, beside = tuning.tuned(fitted.deviations), spectra.residual.shape[2] > p
-    entries = entries_of(model, recording, spectra.frequency_hz, beside)
+    model, beside = tuning.tune(fitted.deviations), spectra.residual.shape[2] > p
+    entries = possible_entries(model, recording, spectra.frequency_hz, beside)
     kinds = {_DERIVATIVES.get(quantity) for quantity in recording.response.quantities}
     return entry_point(spectra, entries, kinds.pop() if len(kinds) == 1 else None)
 
 
-def tied_states(
+def find_tied_states(
     measure: ErrorMeasure,
     tuning: Tuning,
     fitted: Fitted,
@@ -66,22 +65,23 @@ def tied_states(
     entry: EntryPoint | None,
     known: Sequence[Evidence] = (),
 ) -> tuple[StateMismatch, ...]:
-    """Significant ones, of the first recording. cells: of this fit. known: its evidence, where that is known."""
+    """Significant state dependences of the first recording. cells: of this fit. known: its evidence, where known."""
     if not any(cell.beyond_noise for cell in cells):
         return ()
     recording, evidence = measure.records[0].recording, (known or gather_evidence(measure, tuning, fitted))[0]
     best = entry.ranking[0] if entry is not None and entry.ranking else None
     if best is not None and best.place == "sensor":
         channels = recording.response.channels if best.axis is None else (best.axis,)
-        return tied_errors(evidence, recording, cells, channels)
-    return tied_forces(evidence, recording, cells, tuning.model.system)
+        return error_states(evidence, recording, cells, channels)
+    return force_states(evidence, recording, cells, tuning.model.system)
 
 
 # Where a mismatch can enter a given model: as a force along an axis, or as an error of a sensor.
-def entries_of(
+def possible_entries(
     model: MechanicalModel, recording: Recording, frequency_hz: FloatArray, position: bool
 ) -> tuple[Entry, ...]:
-    """frequency_hz: (lines,). position: whether its channels are looked at beside the response's."""
+    """Entries at which a mismatch may enter the model. frequency_hz: (lines,). position: whether the position's
+    channels are compared beside the response's."""
     seen = axis_transfer(model, recording.sample_rate_hz, frequency_hz)
     forces = np.concatenate([seen.response, seen.position], axis=1) if position else seen.response
     axes = tuple(axis_letter(channel, recording.command.channels) for channel in recording.command.channels)

@@ -1,4 +1,4 @@
-"""Where a mismatch sits, in plain sentences."""
+"""Sentences about where a mismatch sits."""
 
 from collections.abc import Sequence
 
@@ -14,20 +14,26 @@ _FORCES = "drives, mechanism and a hand enter so, and so does timing, which shif
 
 
 def localisation_sentences(local: Localisation) -> tuple[str, ...]:
-    """Of what re-tuning leaves: where it enters, and the states that it is tied to."""
+    """Sentences about what re-tuning leaves: where it enters, and the states that it depends on."""
     said = (entry_sentence(local.entry), states_sentence(local.states.get("retuned", ())))
     return tuple(sentence for sentence in said if sentence)
 
 
 def entry_sentence(entry: EntryPoint | None) -> str:
-    """Empty where too little is there to say it."""
+    """Where the mismatch enters; empty where too few lines are loud."""
     if entry is None or not entry.ranking or entry.lines < ENTRY_LEAST_LINES:
         return ""
     best = entry.ranking[0]
     kind = "" if best.place == "sensor" else f" ({_FORCES if best.axis is None else _FORCE})"
     explained = f"{_percent(best)} of it, at the median of {entry.lines} frequency lines"
     return " ".join(
-        filter(None, (f"What re-tuning leaves enters as {best.name}{kind}: {explained}{_next(entry)}.", _rule(entry)))
+        filter(
+            None,
+            (
+                f"What re-tuning leaves enters as {best.name}{kind}: {explained}{_rival_entry(entry)}.",
+                _sensor_rule_sentence(entry),
+            ),
+        )
     )
 
 
@@ -42,7 +48,7 @@ def states_sentence(states: Sequence[StateMismatch]) -> str:
     return f"It is tied to a state: {'; '.join(parts)}."
 
 
-def _next(entry: EntryPoint) -> str:
+def _rival_entry(entry: EntryPoint) -> str:
     best, others = entry.ranking[0], [score for score in entry.ranking[1:] if score.name not in entry.ranking[0].alike]
     alike = f"; so does {listed(best.alike)}, which looks the same" if best.alike else ""
     # Forces along several axes hold each single one, and errors of several channels each channel's.
@@ -56,7 +62,7 @@ def _next(entry: EntryPoint) -> str:
     return f"{alike}; next comes {second.name} with {_percent(second)} ({chance} that it is as good)"
 
 
-def _rule(entry: EntryPoint) -> str:
+def _sensor_rule_sentence(entry: EntryPoint) -> str:
     if entry.rule is None or entry.rule.verdict == "undecided":
         return ""
     if entry.rule.verdict == "motion":

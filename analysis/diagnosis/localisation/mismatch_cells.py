@@ -1,7 +1,7 @@
-"""Tests of prediction against recording, per cell: channel x driving input x octave x level.
+"""Tests a prediction against a recording, per cell: channel x driving input x octave x level.
 
-The residual is tested against noise, and what counts as none beside it: what clean recordings have, where there are
-any; `model_error` tests it against what a model errs by elsewhere.
+The residual is tested against noise and an equivalence margin, which includes what clean recordings have, where there
+are any; `model_error` tests it against the model's error elsewhere.
 """
 
 from collections.abc import Hashable, Sequence
@@ -32,7 +32,7 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """What is no mismatch: so much of the signal in a cell, and what clean recordings have, squares added."""
+    """Equivalence margin: a share of the signal in a cell and the share of clean recordings, squares added."""
 
     share: float = MODEL_FLOOR
     learned: CleanFloor = field(default_factory=CleanFloor)
@@ -62,10 +62,10 @@ class MismatchCell:
     p_value: float
     """Chance of as much from noise and a mismatch of the margin's size."""
     adjusted_p_value: float
-    """For the number of cells, within channel and band."""
+    """Adjusted for the number of cells, within channel and band."""
     seconds: float
     lines: float = 1.0
-    """That are independent of each other."""
+    """Number of independent lines."""
     freedom: float = 1.0
     """Degrees of freedom that the noise is known with."""
     signal_in_noise: float = 0.0
@@ -73,7 +73,7 @@ class MismatchCell:
     part: int = 0
     """Of the recordings' parts, in which it lies."""
     beyond_noise: bool = False
-    """More than noise and margin leave, whatever the model errs by elsewhere."""
+    """Significant beyond noise and margin, whatever the model's error elsewhere."""
 
     @property
     def share(self) -> float:
@@ -92,7 +92,7 @@ def mismatch_cells(
     used: Mask | None = None,
     margin: Margin | None = None,
 ) -> tuple[MismatchCell, ...]:
-    """used: (n,), the samples that count; None = all. Empty where the noise is not known.
+    """All cells of a recording. used: (n,), the samples that count; None = all. Empty where the noise is not known.
 
     Raises ValueError where a prediction has another shape than what it predicts.
     """
@@ -110,7 +110,7 @@ def mismatch_cells(
             groups.setdefault((lines.input, lines.band_hz, lines.amplitude), []).append(lines)
         for group in groups.values():
             cells += [_cell(group, k, name, observation, allowed) for k, name in enumerate(channels)]
-    return tuple(replace(cell, beyond_noise=cell.significant) for cell in adjusted(cells))
+    return tuple(replace(cell, beyond_noise=cell.significant) for cell in adjust_for_cells(cells))
 
 
 def _observations(
@@ -148,16 +148,16 @@ def _cell(group: Sequence[ResidualLines], k: int, name: str, seen: Observation, 
     )  # fmt: skip
 
 
-def adjusted(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, ...]:
-    """With p-values for the number of cells."""
+def adjust_for_cells(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, ...]:
+    """The cells with p-values adjusted for their number."""
     paths = [((cell.output, cell.quantity), cell.band_hz) for cell in cells]
-    p_values = closed_adjusted(np.array([cell.p_value for cell in cells]), paths, FALSE_DISCOVERY_RATE)
+    p_values = adjust_nested_p_values(np.array([cell.p_value for cell in cells]), paths, FALSE_DISCOVERY_RATE)
     return tuple(replace(cell, adjusted_p_value=float(p)) for cell, p in zip(cells, p_values, strict=True))
 
 
 def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
-    """From the cells of recordings in which nothing is missing, one sequence for each. The largest share over
-    recordings and levels, and the more beyond it, the fewer recordings there are."""
+    """The largest share of each cell over clean recordings and levels, raised the more, the fewer recordings there are.
+    clean: the cells of each recording."""
     shares: dict[tuple[str, str, str, Band], float] = {}
     for cells in clean:
         for cell in cells:
@@ -167,10 +167,10 @@ def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
     return CleanFloor({key: beyond * share for key, share in shares.items()}, recordings=len(clean))
 
 
-# Many tests at once: false discoveries are controlled family by family, and only below what was found. Families nest
-# (channel, then band, then cell). A family's own p-value is Simes' of its members. Members of a family are looked at
-# only where the family was found, at a level lowered by the share of families that were (Benjamini and Bogomolov 2014).
-def closed_adjusted(p_values: FloatArray, families: Sequence[tuple[Hashable, ...]], level: float) -> FloatArray:
+# Hierarchical multiple testing: the false discovery rate is controlled family by family. Families nest (channel, then
+# band, then cell). A family's own p-value is Simes' of its members. Members are tested only where their family was
+# found, at a level lowered by the share of families that were found (Benjamini and Bogomolov 2014).
+def adjust_nested_p_values(p_values: FloatArray, families: Sequence[tuple[Hashable, ...]], level: float) -> FloatArray:
     """Adjusted p-values (tests,): found are those up to `level`.
 
     families: one path per test, widest family first; paths of equal length. The test is the last, innermost member.
@@ -178,11 +178,11 @@ def closed_adjusted(p_values: FloatArray, families: Sequence[tuple[Hashable, ...
     if len(p_values) == 0:
         return p_values.copy()
     adjusted = np.zeros(len(p_values))
-    _descend(np.asarray(p_values), families, np.arange(len(p_values)), (0, 1.0, level), adjusted)
+    _adjust_families(np.asarray(p_values), families, np.arange(len(p_values)), (0, 1.0, level), adjusted)
     return np.minimum(adjusted, 1.0)
 
 
-def _descend(
+def _adjust_families(
     p_values: FloatArray,
     families: Sequence[tuple[Hashable, ...]],
     members: np.ndarray[tuple[int], np.dtype[np.intp]],
@@ -204,7 +204,7 @@ def _descend(
     for group, p_value in zip(within, own, strict=True):
         adjusted[group] = np.maximum(adjusted[group], p_value)
         if p_value <= level:
-            _descend(p_values, families, group, (depth + 1, factor * len(within) / found, level), adjusted)
+            _adjust_families(p_values, families, group, (depth + 1, factor * len(within) / found, level), adjusted)
         else:
             adjusted[group] = np.maximum(adjusted[group], p_values[group])
 

@@ -1,4 +1,4 @@
-"""Where the given, the re-tuned and the completed model disagree with what was recorded, by channel, band and level."""
+"""Mismatch maps of the given, the re-tuned and the completed model, by channel, band and level."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,13 +12,13 @@ from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.mismatch_cells import Margin, MismatchCell, Prediction, mismatch_cells
-from analysis.diagnosis.localisation.model_error import beyond_error, model_error
+from analysis.diagnosis.localisation.model_error import adjust_for_model_error, model_error
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.types import Mapper
 
 Cells = tuple[MismatchCell, ...]
 STRETCHES = 16
-"""Of a record, that errors are taken over."""
+"""Stretches of a record, over which error powers are compared with noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +28,7 @@ class Maps:
 
     @property
     def rows(self) -> tuple[Mismatch, ...]:
-        """Of the model as given: all that was looked at."""
+        """Rows of all cells of the model as given."""
         return tuple(
             Mismatch(
                 c.output, c.input, c.band_hz, c.amplitude or None, None, min(c.share, 1.0), min(c.adjusted_p_value, 1.0)
@@ -37,16 +37,16 @@ class Maps:
         )
 
 
-def maps_of(
+def mismatch_maps(
     measure: ErrorMeasure,
     stages: Mapping[str, Fitted],
     floors: tuple[NoiseFloor, ...],
     learned: CleanFloor | None = None,
     map_: Mapper = map,
 ) -> Maps:
-    """stages: see `Explanation.stages`. learned: what is no mismatch, from clean recordings; beside it, what the
-    last stage errs by on held-out samples is none."""
-    # What is the same fit is looked at once.
+    """Maps of all stages. stages: see `Explanation.stages`. learned: the mismatch of clean recordings, which does not
+    count; neither does the error of the last stage on held-out samples."""
+    # Stages with the same fit are tested once.
     fits = list({id(fitted): fitted for fitted in stages.values()}.values())
 
     def looked_at(number: int) -> Cells:
@@ -56,7 +56,7 @@ def maps_of(
 
     found: list[Cells] = list(map_(looked_at, range(len(fits) + 1)))  # type: ignore[arg-type]
     error, cells = model_error(found[-1]), {id(fitted): own for fitted, own in zip(fits, found, strict=False)}
-    return Maps({stage: beyond_error(cells[id(fitted)], error) for stage, fitted in stages.items()})
+    return Maps({stage: adjust_for_model_error(cells[id(fitted)], error) for stage, fitted in stages.items()})
 
 
 def whole_mismatch(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tuple[Mismatch, ...]:
@@ -69,11 +69,11 @@ def whole_mismatch(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tu
     signal = np.sqrt(np.nanmean(measure.records[0].measured[:, worst] ** 2))
     left = float(errors[worst] * measure.noise[worst])
     share = min(left / signal, 1.0) if signal > 0 else 1.0
-    inputs, p_value = "+".join(record.command.channels), _more_than_noise(measure, fitted, worst)
+    inputs, p_value = "+".join(record.command.channels), _p_value_of_noise(measure, fitted, worst)
     return (Mismatch(names[worst], inputs, (0.0, record.sample_rate_hz / 2), None, None, share, p_value),)
 
 
-def _more_than_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> float:
+def _p_value_of_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> float:
     """p-value of a larger error power than noise's, over stretches of time: within one, errors hang together."""
     powers = []
     for record, residuals in zip(measure.records, fitted.residuals, strict=True):
@@ -94,7 +94,7 @@ def cells_of(
     learned: CleanFloor | None = None,
     held_out: bool = False,
 ) -> Cells:
-    """held_out: of samples that nothing was fitted to, alone."""
+    """Cells of all records for one fit. held_out: only of samples that nothing was fitted to."""
     margin = Margin(learned=learned or CleanFloor())
     cells: list[MismatchCell] = []
     for part, (record, residuals, floor) in enumerate(zip(measure.records, fitted.residuals, floors, strict=True)):

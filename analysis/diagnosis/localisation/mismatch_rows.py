@@ -14,7 +14,7 @@ MOST_ROWS = 40
 
 @dataclass(frozen=True, slots=True)
 class StateMismatch:
-    """A region of state, and the channel, inputs and band whose mismatch was looked at."""
+    """A region of state in which a mismatch is large, with the mismatch's channel, inputs and band."""
 
     output: str
     input: str
@@ -25,7 +25,7 @@ class StateMismatch:
 def mismatch_rows(
     cells: Sequence[MismatchCell], states: Sequence[StateMismatch] = (), most: int = MOST_ROWS
 ) -> tuple[Mismatch, ...]:
-    """Significant ones: states first, those that hold most of the mismatch's power at the top; then cells, by the share
+    """Significant rows: states first, those that hold most of the mismatch's power at the top; then cells, by the share
     of their channel's whole signal that is missing there. `share` of a cell's row is that of the signal within the
     cell (rms, at most 1), which is large in bands without signal and says little by itself."""
     tied = [state for state in states if state.region.p_value <= FALSE_DISCOVERY_RATE]

@@ -1,4 +1,4 @@
-"""What a model errs by on data that nothing was fitted to: its level and spectrum, by which a mismatch stands out.
+"""A model's typical error on held-out data, by channel and band, beyond which a mismatch is significant.
 
 No model is exact, and noise says nothing of how far it is off. So the residual in a cell is taken for noise and model
 error, both random, the error's power a share of the signal's that changes slowly with frequency. The share is learned
@@ -14,14 +14,14 @@ import numpy as np
 from scipy.special import fdtrc
 
 from analysis.diagnosis.data.frequency_cells import Band
-from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, adjusted
+from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, adjust_for_cells
 
 BESIDE = 2.1
 """Ratio of two octaves' lower ends up to which they are the same or neighbours."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Held:
+class _HeldOutShare:
     fold: tuple[int, str, float]
     """Part, input and level."""
     band_hz: Band
@@ -30,11 +30,11 @@ class _Held:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelError:
-    held: Mapping[tuple[str, str], tuple[_Held, ...]]
+    held: Mapping[tuple[str, str], tuple[_HeldOutShare, ...]]
     """By channel and quantity."""
 
     def of(self, cell: MismatchCell) -> tuple[float, int]:
-        """Expected square of the share, and from how many cells, without its own; 0 and 0 where there are none."""
+        """Expected square of the cell's share, from other cells near it, and their number; 0 and 0 without any."""
         near = [
             held.share**2
             for held in self.held.get((cell.output, cell.quantity), ())
@@ -51,20 +51,20 @@ class ModelError:
 
 def model_error(held_out: Sequence[MismatchCell]) -> ModelError:
     """held_out: cells of samples that nothing was fitted to, of the most complete model."""
-    found: dict[tuple[str, str], list[_Held]] = {}
+    found: dict[tuple[str, str], list[_HeldOutShare]] = {}
     for cell in held_out:
-        found.setdefault((cell.output, cell.quantity), []).append(_Held(_fold(cell), cell.band_hz, cell.share))
+        found.setdefault((cell.output, cell.quantity), []).append(_HeldOutShare(_fold(cell), cell.band_hz, cell.share))
     return ModelError({channel: tuple(held) for channel, held in found.items()})
 
 
-def beyond_error(cells: Sequence[MismatchCell], error: ModelError) -> tuple[MismatchCell, ...]:
-    """With p-values of as much from noise and model error; `beyond_noise` stays."""
-    return adjusted([replace(cell, p_value=_p_value(cell, error)) for cell in cells])
+def adjust_for_model_error(cells: Sequence[MismatchCell], error: ModelError) -> tuple[MismatchCell, ...]:
+    """The cells with p-values against noise and model error together; `beyond_noise` is kept."""
+    return adjust_for_cells([replace(cell, p_value=_p_value(cell, error)) for cell in cells])
 
 
 def _p_value(cell: MismatchCell, error: ModelError) -> float:
-    """Of a ratio of two sums of powers, each with the degrees of freedom of a chi-squared sum of its mean and variance
-    (Satterthwaite 1946). The cell: noise on each of its lines, and a model error that is as if of a single line."""
+    """p-value of an F ratio of two sums of powers, each with the degrees of freedom of a chi-squared variable of its
+    mean and variance (Satterthwaite 1946). In the cell, the model error counts as if on a single line."""
     share, count = error.of(cell)
     erred = share * cell.signal_in_noise
     if not count or erred <= 0:

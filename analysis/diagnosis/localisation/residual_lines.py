@@ -21,9 +21,9 @@ _DRIVEN_IN_BAND = 1e-4
 _DRIVEN_IN_WINDOW = 1e-2
 """Share of its band's strongest window below which a window does not count for the band."""
 _HANN_NEIGHBOURS = 1.944
-"""1 + 2 (4/9 + 1/36): by how much the neighbours of a line in a Hann window lower its degrees of freedom,"""
+"""1 + 2 (4/9 + 1/36): factor by which neighbouring lines of a Hann window lower the degrees of freedom."""
 _HANN_OVERLAP = 1.056
-"""1 + 2/36: and windows that overlap by half."""
+"""1 + 2/36: the same for windows that overlap by half."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,20 +34,20 @@ class ResidualLines:
     amplitude: float
     band_hz: Band
     seconds: float
-    """That it is made of."""
+    """Duration of the data."""
     lines: float
-    """That are independent of each other."""
+    """Number of independent lines."""
     residual: FloatArray
     """Power per second, summed over lines: mean square, noise included."""
     noise: FloatArray
-    """What noise alone would leave of it."""
+    """The same expected from noise alone."""
     signal: FloatArray
     """Mean square of the response without its noise."""
     whitened: FloatArray
     """Mean over lines of residual power / noise power: 1 for noise alone."""
     signal_to_noise: FloatArray
-    """Summed over independent lines: (mean square of the signal, channels that hear little counted as if they heard a
-    tenth of the loudest) / noise."""
+    """Signal over noise power, summed over independent lines; weak channels count with a tenth of the loudest's
+    amplitude."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,13 +61,14 @@ class Observation:
     quantities: tuple[str, ...]
 
 
-_HEARD = 0.1
-"""Of the loudest channel of its quantity: as much a channel hears at least. What leaks into one that hears next to
-nothing is a matter of a degree of misalignment, and judged by the loudest."""
+_LEAST_AMPLITUDE = 0.1
+"""Amplitude of a channel at least, over the loudest channel of its quantity: what leaks into a channel that is hardly
+driven is a matter of a degree of misalignment, and is judged by the loudest."""
 
 
 def residual_lines(recording: Recording, seen: Observation, used: Mask) -> list[ResidualLines]:
-    """used: (n,), the samples that count. Segments without a whole period or window of them are left out."""
+    """Residual power by segment and band. used: (n,), the samples that count. Segments without a whole period or window
+    of them are left out."""
     whole = used & np.isfinite(seen.measured).all(axis=1) & np.isfinite(seen.predicted).all(axis=1)
     periods = {period.index: period for period in settled_periods(recording)}
     left = seen.measured - seen.predicted
@@ -102,7 +103,7 @@ def _of_periods(recording: Recording, seen: Observation, left: FloatArray, perio
         chosen = inside & lines_in_band(lines_hz, band)
         if (chosen & driven.driven).any():
             where = (inputs, periods.segment.amplitude, band, seconds, float(chosen.sum()))
-            found.append(_summed(where, residual[chosen], noise[chosen], response[chosen], seen.quantities))
+            found.append(_sum_lines(where, residual[chosen], noise[chosen], response[chosen], seen.quantities))
     return found
 
 
@@ -143,7 +144,7 @@ def _of_windows(
             max(independent, 1.0),
         )
         flat = [power_of[chosen].reshape(windows * width, -1) for power_of in (residual, noise, response)]
-        per_window = _summed(where, flat[0], flat[1], flat[2], seen.quantities)
+        per_window = _sum_lines(where, flat[0], flat[1], flat[2], seen.quantities)
         found.append(_per_window(per_window, windows))
     return found
 
@@ -156,12 +157,12 @@ def _window_power(samples: FloatArray, starts: Sequence[int], length: int) -> Fl
 
 
 def _noise_power(seen: Observation, lines_hz: FloatArray, looks: int) -> FloatArray:
-    """Times length: of the mean of that many looks. What repeats of rounding does not average out."""
+    """Noise power times length, of the mean of `looks` periods; the repeating part of rounding does not average out."""
     density = np.stack([np.interp(lines_hz, seen.noise_hz, channel) for channel in seen.noise.density.T], axis=1)
     return (density - seen.noise.rounding) / looks + seen.noise.rounding
 
 
-def _summed(
+def _sum_lines(
     where: tuple[str, float, Band, float, float],
     residual: FloatArray,
     noise: FloatArray,
@@ -171,7 +172,7 @@ def _summed(
     """residual, noise, response: (lines, channels) squared magnitudes of a one-sided spectrum."""
     signal = np.maximum(response - noise, 0.0)
     loudest = np.stack([signal[:, [q == own for q in quantities]].max(axis=1) for own in quantities], axis=1)
-    heard = np.maximum(signal, _HEARD**2 * loudest)
+    heard = np.maximum(signal, _LEAST_AMPLITUDE**2 * loudest)
     quiet = np.maximum(noise, np.finfo(np.float64).tiny)
     lines = where[4]
     return ResidualLines(

@@ -1,4 +1,4 @@
-"""A residual's spectrum over all channels at once, response first, then position: what an entry point is judged by."""
+"""Spectra of a residual over all channels, response first, then position, from which the entry point is found."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 _WINDOW_S = 2.0
-_HEARD = 0.1
+_LEAST_AMPLITUDE = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +31,7 @@ class ResidualSpectra:
     noise: FloatArray
     """(experiments, lines, channels): expected |error|²."""
     responses: int
-    """So many of the channels are the response's."""
+    """Number of response channels."""
 
 
 def residual_spectra(
@@ -51,7 +51,9 @@ def residual_spectra(
         noises.append(floor.position)
     residual = np.hstack(left)
     whole = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
-    looks = [period for period in (_within(periods, whole) for periods in settled_periods(recording)) if period.starts]
+    looks = [
+        period for period in (_whole_periods(periods, whole) for periods in settled_periods(recording)) if period.starts
+    ]
     if not looks:
         looks = _windows(recording, whole)
     looks = [look for look in looks if look.length == looks[0].length]
@@ -67,17 +69,17 @@ def residual_spectra(
     inside = slice(int(first), int(last) + 1)
     spectra = np.stack([period_spectra(residual, look).mean(axis=0)[inside] for look in looks])
     noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], look) for look in looks])
-    noise += model_error**2 * np.stack([_answered(recording, look, len(noises) > 1)[inside] for look in looks])
+    noise += model_error**2 * np.stack([_response_power(recording, look, len(noises) > 1)[inside] for look in looks])
     return ResidualSpectra(lines_hz[inside], spectra, noise, left[0].shape[1])
 
 
-def _within(periods: Periods, whole: Mask) -> Periods:
+def _whole_periods(periods: Periods, whole: Mask) -> Periods:
     starts = tuple(start for start in periods.starts if whole[start : start + periods.length].all())
     return Periods(periods.index, periods.segment, starts, periods.settled)
 
 
 def _windows(recording: Recording, whole: Mask) -> list[Periods]:
-    """Each a look of its own, for windows are not alike."""
+    """Windows of a recording without periods, each as a period of its own."""
     length = min(round(_WINDOW_S * recording.sample_rate_hz), len(recording))
     found = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
@@ -88,13 +90,13 @@ def _windows(recording: Recording, whole: Mask) -> list[Periods]:
     return found
 
 
-def _answered(recording: Recording, periods: Periods, position: bool) -> FloatArray:
+def _response_power(recording: Recording, periods: Periods, position: bool) -> FloatArray:
     """(lines, channels): squared magnitudes; a channel counts for a tenth of the loudest of its signal at least."""
     signals = [recording.response, *([recording.position] if position and recording.position is not None else [])]
     parts = []
     for signal in signals:
         power = np.abs(period_spectra(signal.samples, periods).mean(axis=0)) ** 2
-        parts.append(np.maximum(power, _HEARD**2 * power.max(axis=1, keepdims=True)))
+        parts.append(np.maximum(power, _LEAST_AMPLITUDE**2 * power.max(axis=1, keepdims=True)))
     return np.hstack(parts)
 
 

@@ -15,12 +15,12 @@ StateKind = Literal["position", "velocity", "command", "response", "time"]
 _BINS = 12
 PERMUTATIONS = 60
 _CONCENTRATED = 1.5
-"""Mean square of a bin, of what it would be anywhere, from which on a bin belongs to a region."""
+"""Mean square of a bin over the expected one, from which on a bin belongs to a region."""
 _LEAST_SHARE = 0.05
-"""Of the power that means over bins must explain."""
+"""Share of the power that bin means must explain."""
 _TINY = np.finfo(np.float64).tiny
-_TOLD = 1e-9
-"""Of a bin's mean: where less is expected, nothing is told."""
+_LEAST_EXPECTED = 1e-9
+"""Expected power of a bin over the mean at least; bins with less, as at rest, are not tested."""
 _READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 
 
@@ -84,17 +84,17 @@ def state_regions(
     inside = [(state, state.values[used]) for state in states if state.kind != "time"]
     if inside:
         expected = _mean_square_in(values, strata)
-        found += _tested(_Asked(values, expected, strata, block), inside, permutations, random)
+        found += _test_states(_Sample(values, expected, strata, block), inside, permutations, random)
     times = [(state, _within_stratum(strata)) for state in states if state.kind == "time"]
     if times and disturbance.signal is not None:
         signal = disturbance.signal[used] ** 2
         share = _mean_square_in(values, strata) / np.maximum(_mean_square_in(disturbance.signal[used], strata), _TINY)
-        found += _tested(_Asked(values, share * signal, strata, block), times, permutations, random)
+        found += _test_states(_Sample(values, share * signal, strata, block), times, permutations, random)
     return tuple(sorted(found, key=lambda region: (region.p_value, -region.share)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Asked:
+class _Sample:
     values: FloatArray
     expected: FloatArray
     """Mean square that each sample would have if the state did not matter."""
@@ -102,10 +102,10 @@ class _Asked:
     block: int
 
 
-def _tested(
-    asked: _Asked, states: Sequence[tuple[State, FloatArray]], permutations: int, random: np.random.Generator
+def _test_states(
+    asked: _Sample, states: Sequence[tuple[State, FloatArray]], permutations: int, random: np.random.Generator
 ) -> list[StateRegion]:
-    by_size = [_equal_bins(np.abs(v) if _by_magnitude(state) else v) for state, v in states]
+    by_size = [_equal_bins(np.abs(v) if _uses_magnitude(state) else v) for state, v in states]
     by_sign = [_equal_bins(v) for state, v in states if _has_sign(state)]
     power, total = asked.values**2, float(np.sum(asked.values**2))
 
@@ -132,12 +132,13 @@ def _tested(
     return found
 
 
-def _region(state: State, values: FloatArray, bins: IntArray, asked: _Asked) -> tuple[float, float, str] | None:
-    """Share, occupied, words of the stretch of bins around the largest that stand out; None where none does."""
+def _region(state: State, values: FloatArray, bins: IntArray, asked: _Sample) -> tuple[float, float, str] | None:
+    """Share, occupied and words of the run of bins around the largest that exceed `_CONCENTRATED`; None = no such
+    bin."""
     power = asked.values**2
     one_stratum = bool((asked.strata == asked.strata[0]).all())
     expected = _sums(bins, asked.expected)
-    ratio = _sums(bins, power) / np.maximum(expected, max(_TOLD * float(expected.mean()), _TINY))
+    ratio = _sums(bins, power) / np.maximum(expected, max(_LEAST_EXPECTED * float(expected.mean()), _TINY))
     top = int(np.argmax(ratio))
     if ratio[top] < _CONCENTRATED:
         return None
@@ -154,14 +155,14 @@ def _region(state: State, values: FloatArray, bins: IntArray, asked: _Asked) -> 
 
 
 def _unevenness(seen: FloatArray, expected: FloatArray) -> float:
-    """Where next to nothing is expected, as at rest, nothing is told."""
+    """Chi-squared statistic of bin powers against the expected ones, over the total power."""
     whole = float(expected.sum())
-    told = expected > _TOLD * whole / len(expected)
+    told = expected > _LEAST_EXPECTED * whole / len(expected)
     return float(np.sum((seen - expected)[told] ** 2 / expected[told])) / whole if whole > _TINY else 0.0
 
 
 def _within_stratum(strata: IntArray) -> FloatArray:
-    """How far into its stratum each sample lies, 0 to 1. strata: (n,), sorted."""
+    """(n,): relative position of each sample in its stratum, 0 to 1. strata: (n,), sorted."""
     _, first, number, length = np.unique(strata, return_index=True, return_inverse=True, return_counts=True)
     return np.asarray((np.arange(len(strata)) - first[number]) / length[number], dtype=np.float64)
 
@@ -177,12 +178,12 @@ def _mean_square_in(values: FloatArray, strata: IntArray) -> FloatArray:
 
 
 def _equal_bins(values: FloatArray) -> IntArray:
-    """Equally filled, as far as equal values allow. (n,)"""
+    """(n,): bin numbers of values (n,), in equally filled bins as far as equal values allow."""
     edges = np.unique(np.quantile(values, np.linspace(0, 1, _BINS + 1)[1:-1]))
     return np.unique(np.searchsorted(edges, values, side="right"), return_inverse=True)[1].astype(np.int64)
 
 
-def _by_magnitude(state: State) -> bool:
+def _uses_magnitude(state: State) -> bool:
     return state.kind in ("velocity", "command", "response")
 
 

@@ -115,11 +115,11 @@ def _squares_after_retuning(
 def _simulate(
     bench: Bench, deviations: FloatArray, hypothesis: Hypothesis, point: FloatArray, experiment: Experiment
 ) -> FloatArray:
-    model: MechanicalModel = bench.tuning.tuned(deviations)
+    model: MechanicalModel = bench.tuning.tune(deviations)
     model = add_mass(model, experiment.added) if experiment.added else model
     with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
         played = simulate_mechanism(
-            model, experiment.commands, bench.sample_rate_hz, hypothesis.placed(point), bench.hold
+            model, experiment.commands, bench.sample_rate_hz, hypothesis.placed_effects(point), bench.hold
         )
         signals = np.hstack([played.response, played.position])[:, : len(bench.noise)]
         return np.asarray((signals / bench.noise).ravel())

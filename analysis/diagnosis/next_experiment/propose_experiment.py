@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.document import NextExperiment
-from analysis.diagnosis.errors.output_error import fitting, own_columns
+from analysis.diagnosis.errors.output_error import hypothesis_sensitivity, residuals_to_fit
 from analysis.diagnosis.next_experiment.choose_experiment import Bench, PredictedGain, as_document, predict_gains
 from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
 from analysis.diagnosis.search.explain import Explanation
@@ -69,7 +69,9 @@ def _best_rival(fitted_candidates: tuple[FittedCandidate, ...]) -> FittedCandida
 def _recorded_information(context: SearchContext, candidate: FittedCandidate) -> FloatArray:
     """Information matrix of a candidate's numbers from what has been recorded, calibration included."""
     fitted = candidate.fitted
-    own = own_columns(context.measure, context.tuning, fitted, fitting(context.measure, fitted.residuals))
+    own = hypothesis_sensitivity(
+        context.measure, context.tuning, fitted, residuals_to_fit(context.measure, fitted.residuals)
+    )
     columns = np.vstack([sensitivity_at(context, fitted.deviations, fitted.hypothesis).columns, own])
     known = columns @ columns.T
     t = len(fitted.deviations)

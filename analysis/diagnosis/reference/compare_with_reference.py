@@ -11,7 +11,7 @@ from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.signal_faults import SignalFault, find_hum, find_quantization, find_sensor_noise
 from analysis.diagnosis.errors.choose_measure import Chosen
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.played_errors import played_error
+from analysis.diagnosis.errors.prediction_error import prediction_error
 from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.types import TimeBudget
@@ -72,7 +72,7 @@ def contrast_of(
 
 
 def foresees(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
-    errors = [played_error(recording, model, "all").as_it_is for recording in clean]
+    errors = [prediction_error(recording, model, "all").as_it_is for recording in clean]
     return all(error is not None and error <= FORESEEN for error in errors)
 
 
@@ -85,5 +85,5 @@ def noise_is_from_repeats(chosen: Chosen) -> bool:
 
 def hums_low(found: Explanation) -> bool:
     """A line far below any mains is a harmonic of what drives the device."""
-    placed = found.after.fitted.hypothesis.placed()
+    placed = found.after.fitted.hypothesis.placed_effects()
     return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.choose_measure import Chosen, measure_of
-from analysis.diagnosis.errors.coloured_measure import ColouredMeasure, coloured
+from analysis.diagnosis.errors.coloured_measure import ColouredMeasure, whiten_measure
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.tuning import Tuning, tuning_of
 from analysis.diagnosis.errors.whitening_filter import WhiteningFilter, whitening_filter
@@ -64,7 +64,7 @@ class LearnedError:
 
     def noise_measure(self, measure: ErrorMeasure, model: MechanicalModel) -> ColouredMeasure:
         """The error measure of the recordings to diagnose, with this residual as coloured noise."""
-        return coloured(measure, self.colour, self.share * _signal(measure, measure.residuals(model, ())))
+        return whiten_measure(measure, self.colour, self.share * _signal(measure, measure.residuals(model, ())))
 
 
 def learn_model_error(
@@ -108,14 +108,14 @@ def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) ->
     courses = [course for lesson in lessons for course in lesson.courses]
     colour = whitening_filter(courses, np.min([lesson.measure.noise for lesson in lessons], axis=0))
     shares = [
-        _rms([colour.whitened(course) for course in lesson.courses])
+        _rms([colour.apply(course) for course in lesson.courses])
         / _signal(lesson.measure, lesson.retuned.fitted.residuals)
         for lesson in lessons
     ]
     share = np.max(shares, axis=0)
     learned = [
         reference_recording(
-            coloured(count_as_noise(lesson.measure, floor), colour, share * lesson.signal),
+            whiten_measure(count_as_noise(lesson.measure, floor), colour, share * lesson.signal),
             lesson.tuning,
             lesson.retuned.fitted.deviations,
             map_,

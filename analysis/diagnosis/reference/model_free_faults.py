@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, claimed
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, hypothesis_of_claim
 from analysis.diagnosis.settings import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST, STEP_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Effect, Values
@@ -54,7 +54,7 @@ Found = tuple[tuple[int, ...], Values]
 
 def _hypothesis_of(effect: Effect, channels: tuple[int, ...], values: Values) -> Hypothesis:
     spread: Spread = "all" if len(channels) > 1 else "one"
-    return claimed(Claim(effect, spread, channels), [values])
+    return hypothesis_of_claim(Claim(effect, spread, channels), [values])
 
 
 def _readings(recordings: Sequence[Recording]) -> FloatArray:

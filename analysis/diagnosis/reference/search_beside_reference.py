@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import fit_score
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.reference.learn_model_error import LearnedError, count_as_noise
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
@@ -45,7 +45,7 @@ def search_beside_reference(
 def _mean_log_error(context: SearchContext, seen: Searched) -> float:
     """Mean log error power of what is named, on the samples to fit and to choose by."""
     stands = seen.found.after if seen.judged.named else seen.found.retuned
-    fitted = evaluated(context.measure, context.tuning, stands.fitted.deviations, stands.fitted.hypothesis)
+    fitted = evaluate_fit(context.measure, context.tuning, stands.fitted.deviations, stands.fitted.hypothesis)
     return FittedCandidate(fitted, fit_score(context.measure, fitted.residuals)).score.mean_log_error
 
 
@@ -104,7 +104,7 @@ def _refit_by(context: SearchContext, found: Explanation) -> Explanation:
     law that is not exact would be biased by frequencies with little weight."""
     after = found.after.fitted
     if after.hypothesis.claims and not context.certain:
-        start = evaluated(context.measure, context.tuning, after.deviations, after.hypothesis)
+        start = evaluate_fit(context.measure, context.tuning, after.deviations, after.hypothesis)
         after = refine(context, start)
     steps = [*found.steps[:-1], *(replace(step, fitted=after) for step in found.steps[-1:])]
     return replace(
@@ -118,5 +118,6 @@ def _refit_by(context: SearchContext, found: Explanation) -> Explanation:
 
 def _evaluate_by(measure: ErrorMeasure, context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
     return replace(
-        candidate, fitted=evaluated(measure, context.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
+        candidate,
+        fitted=evaluate_fit(measure, context.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis),
     )

@@ -12,7 +12,7 @@ from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.first_model.turned_round import as_recorded
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.localisation import Localisation
-from analysis.diagnosis.localisation.mismatch_maps import Maps, maps_of, whole_mismatch
+from analysis.diagnosis.localisation.mismatch_maps import Maps, mismatch_maps, whole_mismatch
 from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
 from analysis.diagnosis.next_experiment.propose_experiment import Proposal, propose_experiment
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
@@ -46,10 +46,13 @@ def assemble_findings(
     nothing is named. names: of the recordings. learned: the residual of clean recordings, counted as noise."""
     context, found, judged = searched.context, searched.found, searched.judged
     measure, tuning = context.whole, context.tuning
-    recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.placed()
+    recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.placed_effects()
     said, (improved, retuned) = labels_of(recording, tuning.model), _models(searched, recording)
     channels, errors = channel_names(recording, len(measure.noise)), _standard_errors(searched)
-    maps, courses = maps_of(measure, found.stages, floors, learned, context.map_), _time_series(measure, found, names)
+    maps, courses = (
+        mismatch_maps(measure, found.stages, floors, learned, context.map_),
+        _time_series(measure, found, names),
+    )
     looked = looks_of(searched, floors[0], maps)
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
     document = _document(searched, errors, (maps, looked.local), proposal)
@@ -84,9 +87,9 @@ def _models(searched: Searched, recording: Recording) -> tuple[MechanicalModel, 
     """The re-tuned models with the named effects and without, driven by the commands as they were recorded."""
     tuning, found = searched.context.tuning, searched.found
     fitted, said = found.after.fitted, labels_of(recording, tuning.model)
-    effects = (*tuning.model.effects, *model_effects(fitted.hypothesis.placed(), said.inputs, said.outputs))
-    with_them = replace(tuning.tuned(fitted.deviations), effects=effects)
-    return as_recorded(with_them, recording), as_recorded(tuning.tuned(found.retuned.fitted.deviations), recording)
+    effects = (*tuning.model.effects, *model_effects(fitted.hypothesis.placed_effects(), said.inputs, said.outputs))
+    with_them = replace(tuning.tune(fitted.deviations), effects=effects)
+    return as_recorded(with_them, recording), as_recorded(tuning.tune(found.retuned.fitted.deviations), recording)
 
 
 def _remarks(

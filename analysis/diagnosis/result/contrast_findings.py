@@ -146,7 +146,7 @@ def _directly_shown_fault(found: Contrast, recording: Recording) -> NamedEffect 
         name, sites, values, place = found.line.effect, found.line.channels, found.line.values, found.line.place
     elif found.shown is not None:
         claim = found.shown.claims[0]
-        name, sites, values = claim.effect.name, claim.sites, dict(found.shown.placed()[0].values)
+        name, sites, values = claim.effect.name, claim.sites, dict(found.shown.placed_effects()[0].values)
     else:
         return None
     signal = recording.response if place == "sensor" else recording.command

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import partial
 
 from analysis.diagnosis.errors.hypothesis import without_claim
-from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
-from analysis.diagnosis.localisation.distortion import Distortions, distortion
-from analysis.diagnosis.localisation.localisation import Localisation, entered, tied_states
+from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
+from analysis.diagnosis.localisation.distortion import Distortions, find_distortions
+from analysis.diagnosis.localisation.localisation import Localisation, find_entry_point, find_tied_states
 from analysis.diagnosis.localisation.mismatch_maps import Maps
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.black_box import black_box
@@ -39,12 +39,12 @@ def looks_of(searched: Searched, floor: NoiseFloor, maps: Maps) -> Looks:
     context, found = searched.context, searched.found
     measure, tuning, stages = context.whole, context.tuning, found.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
-    look = partial(entered, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])
+    look = partial(find_entry_point, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])
     entry = context.guard.part(WHERE, "its work", look, None)
     # What is the same fit is looked at once.
     fits = {id(fitted): stage for stage, fitted in stages.items()}
     tied = [
-        partial(tied_states, measure, tuning, stages[stage], maps.cells[stage], entry, known)
+        partial(find_tied_states, measure, tuning, stages[stage], maps.cells[stage], entry, known)
         for stage in fits.values()
         for known in [evidence if stages[stage] is stages["retuned"] else ()]
     ]
@@ -52,7 +52,7 @@ def looks_of(searched: Searched, floor: NoiseFloor, maps: Maps) -> Looks:
         *(Part(WHERE, "its work", work, ()) for work in tied),
         Part("the curves of effects", "their making", partial(_signatures, context, found), ()),
         Part("the black box", "its fit", partial(_black_box, context, found), None),
-        Part(WHERE, "its work", partial(distortion, measure.records[0].recording, floor), Distortions((), ())),
+        Part(WHERE, "its work", partial(find_distortions, measure.records[0].recording, floor), Distortions((), ())),
     ]
     *each, signatures, box, distortions = context.guard.parts(context.map_, pieces)
     by_fit = dict(zip(fits, each, strict=True))
@@ -77,9 +77,9 @@ def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, 
     )
     for number in range(len(fitted.hypothesis.claims)):
         others = without_claim(fitted.hypothesis, number)
-        bare = gather_evidence(measure, tuning, evaluated(measure, tuning, fitted.deviations, others))
+        bare = gather_evidence(measure, tuning, evaluate_fit(measure, tuning, fitted.deviations, others))
         main = max(fitted.hypothesis.of_claim(number), key=lambda placed: _strength(placed.values))
-        drawn.append(signature_of(bare[0], main, others.placed(), names, recording.hold))
+        drawn.append(signature_of(bare[0], main, others.placed_effects(), names, recording.hold))
     return tuple(drawn)
 
 

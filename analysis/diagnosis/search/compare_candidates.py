@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import alike
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, fitting
+from analysis.diagnosis.errors.hypothesis import similar_hypotheses
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, residuals_to_fit
 from analysis.diagnosis.search.search_context import FITTING, FittedCandidate, SearchContext, sensitivity_at
 from analysis.diagnosis.search.short_recordings import short_recordings_of
 from analysis.diagnosis.settings import (
@@ -57,7 +57,7 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
 
 
 def _timeless(law: Fitted) -> bool:
-    return not any(placed.effect.of_time for placed in law.hypothesis.placed())
+    return not any(placed.effect.of_time for placed in law.hypothesis.placed_effects())
 
 
 def _repeats(context: SearchContext, law: Fitted, other: Fitted) -> bool:
@@ -67,7 +67,7 @@ def _repeats(context: SearchContext, law: Fitted, other: Fitted) -> bool:
 
 def _apart(context: SearchContext, law: Fitted, other: Fitted) -> float:
     """Mean square of what their predictions differ by, in units of the noise."""
-    apart = fitting(context.measure, law.residuals) - fitting(context.measure, other.residuals)
+    apart = residuals_to_fit(context.measure, law.residuals) - residuals_to_fit(context.measure, other.residuals)
     with np.errstate(over="ignore", invalid="ignore"):
         return float(apart @ apart) / max(len(apart), 1)
 
@@ -92,8 +92,10 @@ def refined_with(
     if short_form is None:
         return _settled(context, fitted, known)
     short = short_form.context
-    near, known = _settled(short, evaluated(short.measure, short.tuning, fitted.deviations, fitted.hypothesis), known)
-    start = evaluated(context.measure, context.tuning, near.deviations, near.hypothesis)
+    near, known = _settled(
+        short, evaluate_fit(short.measure, short.tuning, fitted.deviations, fitted.hypothesis), known
+    )
+    start = evaluate_fit(context.measure, context.tuning, near.deviations, near.hypothesis)
     found = fit(context.measure, context.tuning, start, short_form.repeated(known), WHOLE_ROUNDS, context.map_)
     # What one period leaves open may run away on the whole.
     return (_plainest(context, found) if found.cost <= fitted.cost else _settled(context, fitted)[0]), known
@@ -107,7 +109,7 @@ def _settled(context: SearchContext, fitted: Fitted, known: Sensitivity | None =
     here, known = _of_alike(context, here, known)
     if context.candidate(here).score.worst_channel <= NO_SECOND_START:
         return here, known
-    calibrated = evaluated(context.measure, context.tuning, np.zeros_like(here.deviations), here.hypothesis)
+    calibrated = evaluate_fit(context.measure, context.tuning, np.zeros_like(here.deviations), here.hypothesis)
     there, beside = _refined_from(context, calibrated, known)
     return (there, beside) if there.cost < here.cost else (here, known)
 
@@ -115,17 +117,17 @@ def _settled(context: SearchContext, fitted: Fitted, known: Sensitivity | None =
 def _of_alike(context: SearchContext, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
     """The best of the hypotheses that behave almost alike, each fitted; the plain one where it is as good as any."""
     best = fitted, known
-    for other in alike(fitted.hypothesis):
-        beside = _refined_from(context, evaluated(context.measure, context.tuning, fitted.deviations, other), known)
+    for other in similar_hypotheses(fitted.hypothesis):
+        beside = _refined_from(context, evaluate_fit(context.measure, context.tuning, fitted.deviations, other), known)
         best = beside if beside[0].cost < best[0].cost else best
     return _plainest(context, best[0]), best[1]
 
 
 def _plainest(context: SearchContext, fitted: Fitted) -> Fitted:
     best = fitted
-    for other in alike(fitted.hypothesis):
-        plain = evaluated(context.measure, context.tuning, best.deviations, other)
-        samples = len(fitting(context.measure, plain.residuals))
+    for other in similar_hypotheses(fitted.hypothesis):
+        plain = evaluate_fit(context.measure, context.tuning, best.deviations, other)
+        samples = len(residuals_to_fit(context.measure, plain.residuals))
         best = plain if plain.cost < best.cost + RICHER_LAW_SQUARES / samples else best
     return best
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together
-from analysis.diagnosis.errors.output_error import Fitted, evaluated, gather_evidence
+from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine
+from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, gather_evidence
 from analysis.diagnosis.search.compare_candidates import compare_candidates, refine
 from analysis.diagnosis.search.no_prediction import predicts_nothing
 from analysis.diagnosis.search.parsimony import excludes, plainest_first
@@ -49,12 +49,12 @@ def fits_on_short_recordings(
     """On all samples, the best first. timed: what hangs on when a sample was taken, which short recordings cannot
     judge."""
     short, guard = short_form.context, context.guard
-    there = evaluated(short.measure, short.tuning, base.deviations, base.hypothesis)
+    there = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
     known = sensitivity_at(short, base.deviations, base.hypothesis)
     screened = screen(short.measure, short.tuning, there, known, timeless, guard.over(short.map_, SCREENING))
 
     def whole(fitted: Fitted) -> Fitted:
-        return evaluated(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
+        return evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
 
     each = guard.over(context.map_, FITTING)
     fits: list[Fitted] = list(each(whole, first_fits(short, there, known, screened)))  # type: ignore[arg-type]
@@ -122,7 +122,7 @@ def explain(
     context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget = always
 ) -> Explanation:
     """time_left: asked before each piece of the search for effects; what was found when it says no is kept."""
-    before = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    before = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
     retuned = _retuned_from(context, before)
     base = context.candidate(retuned)
@@ -161,8 +161,8 @@ def explain(
 
 def _with(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:
     """With a hypothesis that is certain, whether or not it lowers the error."""
-    start = evaluated(
-        context.measure, context.tuning, base.fitted.deviations, together(base.fitted.hypothesis, hypothesis)
+    start = evaluate_fit(
+        context.measure, context.tuning, base.fitted.deviations, combine(base.fitted.hypothesis, hypothesis)
     )
     return context.candidate(refine(context, start))
 
@@ -170,7 +170,7 @@ def _with(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis)
 def retuned_alone(context: SearchContext) -> Fitted:
     """The model re-tuned, without any added effect."""
     return _retuned_from(
-        context, evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+        context, evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Number
 from analysis.diagnosis.errors.intervals import STRETCH_S, standard_errors
-from analysis.diagnosis.errors.output_error import Fitted, evaluated
+from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
 from analysis.diagnosis.search.search_context import SearchContext, sensitivity_at
@@ -41,7 +41,7 @@ def final_errors(context: SearchContext, found: Explanation) -> FloatArray:
     last = found.steps[-1] if found.steps else found.retuned
     if found.errors is not None and found.errors[0] is last.fitted:
         return found.errors[1]
-    fitted = evaluated(context.measure, context.tuning, last.fitted.deviations, last.fitted.hypothesis)
+    fitted = evaluate_fit(context.measure, context.tuning, last.fitted.deviations, last.fitted.hypothesis)
     single = context.tuning.model.coordinates == 1
     short_form = short_recordings_of(context, fitted.hypothesis)
     near = context if short_form is None else short_form.context
@@ -148,7 +148,7 @@ def told_from_none(context: SearchContext, found: Explanation, effect: int) -> f
     with_it = found.steps[-1].fitted
     fewer = found.retuned if len(found.steps) == 1 else without_effect(context, found, effect).steps[-1]
     # The re-tuned model is kept as it is on all samples.
-    without = evaluated(context.measure, context.tuning, fewer.fitted.deviations, fewer.fitted.hypothesis)
+    without = evaluate_fit(context.measure, context.tuning, fewer.fitted.deviations, fewer.fitted.hypothesis)
     gained = np.concatenate([
         _stretches(context.measure, without) - _stretches(context.measure, with_it),
         # The calibration is an observation of its own.

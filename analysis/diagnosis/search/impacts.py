@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.band_power import BandPower
-from analysis.diagnosis.errors.band_power_fit import Foreseen, View, apart, fitted, foreseen
+from analysis.diagnosis.errors.band_power_fit import BandPowerFit, View, evaluate_hypothesis, fit_band_power, perturb
+from analysis.diagnosis.errors.excited_segments import select_excited_segments
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed
-from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
-from analysis.diagnosis.errors.shaken_axis import shaken_along
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.search.explain import Explanation, Statistic
@@ -53,12 +53,12 @@ def rattling(
         return None
     if not irregular(context, found, floors):
         return None
-    given = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     evidence = gather_evidence(context.measure, context.tuning, given)[0]
     view = View(BandPower(context.measure), context.tuning, context.map_)
     claims = [Claim(effects["backlash"], "one", (axis,)) for axis in range(context.tuning.model.inputs)]
     places = sorted((_at(view, evidence, claim) for claim in claims), key=lambda claim: claim.cost)
-    if places[0].cost >= foreseen(view, given.deviations, NOTHING).cost:
+    if places[0].cost >= evaluate_hypothesis(view, given.deviations, NOTHING).cost:
         return None
     best = _refined(view, places[0])
     others = list(places[1:])
@@ -67,34 +67,34 @@ def rattling(
     return _judged(context, found, best, [rival.hypothesis for rival in others if _is_model(rival)])
 
 
-def _at(view: View, evidence: Evidence, claim: Claim) -> Foreseen:
+def _at(view: View, evidence: Evidence, claim: Claim) -> BandPowerFit:
     """The best fit of a claim, on the segments that excite its axis."""
     measure = view.power.measure
     assert isinstance(measure, FreeSimulation)
-    near = View(BandPower(shaken_along(measure, claim.sites[0])), view.tuning, view.map_)
+    near = View(BandPower(select_excited_segments(measure, claim.sites[0])), view.tuning, view.map_)
     given = np.zeros(len(view.tuning.names))
     starts = claim.effect.starts(evidence, claim.sites[0])[:1]
     net = [{**values, "gap": float(wide * values["gap"])} for values in starts for wide in WIDTHS]
 
-    def at(values: Values) -> Foreseen:
-        return foreseen(near, given, claimed(claim, [values]))
+    def at(values: Values) -> BandPowerFit:
+        return evaluate_hypothesis(near, given, hypothesis_of_claim(claim, [values]))
 
-    tried: list[Foreseen] = list(near.map_(at, net))  # type: ignore[arg-type]
-    best = fitted(near, min(tried, key=lambda trial: trial.cost), FIRST_ROUNDS) if tried else None
-    return foreseen(view, given, NOTHING if best is None else best.hypothesis)
+    tried: list[BandPowerFit] = list(near.map_(at, net))  # type: ignore[arg-type]
+    best = fit_band_power(near, min(tried, key=lambda trial: trial.cost), FIRST_ROUNDS) if tried else None
+    return evaluate_hypothesis(view, given, NOTHING if best is None else best.hypothesis)
 
 
-def _is_model(trial: Foreseen) -> bool:
+def _is_model(trial: BandPowerFit) -> bool:
     return bool(trial.hypothesis.claims) and bool(np.isfinite(trial.cost))
 
 
-def _refined(view: View, start: Foreseen) -> Foreseen:
+def _refined(view: View, start: BandPowerFit) -> BandPowerFit:
     """Own and the model's numbers together: with play, the model's numbers do something else than without."""
     view = _with_chance(view, start)
-    best = foreseen(view, start.deviations, start.hypothesis)
+    best = evaluate_hypothesis(view, start.deviations, start.hypothesis)
     for _ in range(ROUNDS):
         view = replace(view, by_deviations=_by_deviations(view, best))
-        better = fitted(view, best, STEPS)
+        better = fit_band_power(view, best, STEPS)
         gained = best.cost - better.cost
         best = better
         if gained <= GAINED * best.cost:
@@ -102,22 +102,22 @@ def _refined(view: View, start: Foreseen) -> Foreseen:
     return best
 
 
-def _with_chance(view: View, at: Foreseen) -> View:
+def _with_chance(view: View, at: BandPowerFit) -> View:
     """With the spread of each band between simulations, and ready to average over as many."""
 
     def course(number: int) -> FloatArray:
-        return view.predicted(at.deviations, apart(at.hypothesis, number))
+        return view.predict(at.deviations, perturb(at.hypothesis, number))
 
     spread = np.std(np.array(list(view.map_(course, range(COURSES)))), axis=0, ddof=1)
     return replace(view, spread=spread, ensemble=COURSES)
 
 
-def _by_deviations(view: View, at: Foreseen) -> FloatArray:
+def _by_deviations(view: View, at: BandPowerFit) -> FloatArray:
     """(t, stretches, bands, c): a forward difference of one tolerance: a shorter one would drown in chance."""
     ways = np.eye(len(at.deviations))
 
     def moved(number: int) -> FloatArray:
-        change = view.predicted(at.deviations + ways[number], at.hypothesis) - at.predicted
+        change = view.predict(at.deviations + ways[number], at.hypothesis) - at.predicted
         return np.where(np.isfinite(change), change, 0.0)
 
     return np.array(list(view.map_(moved, range(len(ways)))))
@@ -133,8 +133,8 @@ class _Comparison:
     """(c,)"""
 
     def scored(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
-        whole = evaluated(self.context.whole, self.context.tuning, deviations, hypothesis)
-        off = self.power.misfits(self.power.measured - self.power.predicted(whole.residuals))
+        whole = evaluate_fit(self.context.whole, self.context.tuning, deviations, hypothesis)
+        off = self.power.misfits(self.power.measured - self.power.predict(whole.residuals))
         return FittedCandidate(whole, FitScore(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
 
     def _times(self, off: FloatArray) -> FloatArray:
@@ -143,7 +143,7 @@ class _Comparison:
 
 
 def _judged(
-    context: SearchContext, found: Explanation, best: Foreseen, others: Sequence[Hypothesis]
+    context: SearchContext, found: Explanation, best: BandPowerFit, others: Sequence[Hypothesis]
 ) -> Explanation | None:
     comparison = _comparison(context, best)
     named = comparison.scored(best.deviations, best.hypothesis)
@@ -165,11 +165,11 @@ def _judged(
     return Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
 
 
-def _comparison(context: SearchContext, best: Foreseen) -> _Comparison:
-    power, model = BandPower(context.whole), context.tuning.tuned(best.deviations)
+def _comparison(context: SearchContext, best: BandPowerFit) -> _Comparison:
+    power, model = BandPower(context.whole), context.tuning.tune(best.deviations)
 
     def course(number: int) -> FloatArray:
-        return power.predicted(context.whole.residuals(model, apart(best.hypothesis, number).placed()))
+        return power.predict(context.whole.residuals(model, perturb(best.hypothesis, number).placed_effects()))
 
     first, other = (np.asarray(each) for each in context.map_(course, range(2)))
     differ = power.misfits(first - other)

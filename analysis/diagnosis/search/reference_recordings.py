@@ -6,8 +6,8 @@ import numpy as np
 
 from analysis.diagnosis.errors.coloured_measure import ColouredMeasure
 from analysis.diagnosis.errors.fit_score import rms_over
-from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together, without_claim
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, gather_evidence, sensitivity
+from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine, without_claim
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, gather_evidence, sensitivity
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.starting_hypotheses import candidates
 from analysis.diagnosis.types import Mapper
@@ -32,7 +32,9 @@ class ReferenceRecording:
     def gained(self, wanted: Hypothesis) -> FloatArray:
         """(c,): fall of the logarithm of the rms error by the hypothesis, both fitted."""
         measure, tuning = self.measure, self.tuning
-        starts = [evaluated(measure, tuning, self.base.deviations, hypothesis) for hypothesis in self._starts(wanted)]
+        starts = [
+            evaluate_fit(measure, tuning, self.base.deviations, hypothesis) for hypothesis in self._starts(wanted)
+        ]
         starts.sort(key=lambda fitted: fitted.cost)
         ends = [fit(measure, tuning, start, self.known, ROUNDS) for start in starts[:TRIED]]
         best = min([*ends, self.base], key=lambda fitted: fitted.cost)
@@ -44,7 +46,7 @@ class ReferenceRecording:
         last = wanted.claims[-1]
         own = [hypothesis for hypothesis in candidates([last.effect], self.evidence) if hypothesis.claims == (last,)]
         held = without_claim(wanted, len(wanted.claims) - 1)
-        return [wanted, *(together(held, hypothesis) for hypothesis in own)]
+        return [wanted, *(combine(held, hypothesis) for hypothesis in own)]
 
     def _left(self, fitted: Fitted) -> FloatArray:
         masks = [record.fit | record.choose for record in self.measure.records]
@@ -73,5 +75,5 @@ def reference_recording(
 ) -> ReferenceRecording:
     """deviations: of the model re-tuned to it."""
     known = sensitivity(measure, tuning, deviations, NOTHING, map_)
-    base = fit(measure, tuning, evaluated(measure, tuning, deviations, NOTHING), known, ROUNDS)
+    base = fit(measure, tuning, evaluate_fit(measure, tuning, deviations, NOTHING), known, ROUNDS)
     return ReferenceRecording(measure, tuning, base, known, gather_evidence(measure, tuning, base)[0])

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.hypothesis import Hypothesis, together
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, bounded_step, fitting
+from analysis.diagnosis.errors.hypothesis import Hypothesis, combine
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, bounded_step, residuals_to_fit
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.settings import RETUNING_BOUND, STRONGEST_START, WEAKEST_START
 from analysis.diagnosis.types import Mapper
@@ -30,13 +30,13 @@ def screen(
     map_: Mapper,
 ) -> tuple[Screened, ...]:
     """The best first."""
-    model = tuning.tuned(base.deviations)
-    errors = fitting(measure, base.residuals)
+    model = tuning.tune(base.deviations)
+    errors = residuals_to_fit(measure, base.residuals)
 
     def foreseen(hypothesis: Hypothesis) -> Screened:
-        whole = together(base.hypothesis, hypothesis)
+        whole = combine(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
-            there = fitting(measure, measure.residuals(model, whole.placed()))
+            there = residuals_to_fit(measure, measure.residuals(model, whole.placed_effects()))
         return Screened(whole, _reached(base, known, errors, errors - there))
 
     found: list[Screened] = list(map_(foreseen, suggested))  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import FitScore, fit_score
 from analysis.diagnosis.errors.hypothesis import Hypothesis, without_claim
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, sensitivity
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
@@ -75,7 +75,7 @@ class SearchContext:
 
     def confirmed(self, candidate: FittedCandidate) -> FittedCandidate:
         """With the sealed samples."""
-        fitted = evaluated(self.whole, self.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
+        fitted = evaluate_fit(self.whole, self.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
         return self._scored(fitted, self.whole)
 
     def _scored(self, fitted: Fitted, measure: ErrorMeasure) -> FittedCandidate:
@@ -91,7 +91,9 @@ def first_fits(context: SearchContext, base: Fitted, known: Sensitivity, screene
     measure, tuning = context.measure, context.tuning
 
     def first(entry: Screened) -> Fitted:
-        return fit(measure, tuning, evaluated(measure, tuning, base.deviations, entry.hypothesis), known, FIRST_ROUNDS)
+        return fit(
+            measure, tuning, evaluate_fit(measure, tuning, base.deviations, entry.hypothesis), known, FIRST_ROUNDS
+        )
 
     each = context.guard.over(context.map_, FITTING)
     fits: list[Fitted] = list(each(first, _worth_fitting(base, screened)))  # type: ignore[arg-type]
@@ -138,8 +140,10 @@ def sensitive_parameters(
 ) -> list[int]:
     """Numbers whose sensitivity changes with the hypothesis's forces: those that move the axes at which these act.
     plain: sensitivity without motion-dependent forces."""
-    forces = [effect for effect in hypothesis.placed() if isinstance(effect.effect.acts, (AxisForce, JointForce))]
-    model = tuning.tuned(np.zeros(len(tuning.names)))
+    forces = [
+        effect for effect in hypothesis.placed_effects() if isinstance(effect.effect.acts, (AxisForce, JointForce))
+    ]
+    model = tuning.tune(np.zeros(len(tuning.names)))
     if not forces or any(isinstance(force.effect.acts, JointForce) for force in forces):
         return list(range(len(tuning.names)))
     reached = np.abs(model.output @ np.linalg.solve(model.mass, model.input))

@@ -84,7 +84,7 @@ def short_recordings_of(context: SearchContext, held: Hypothesis) -> ShortRecord
     measure = context.measure
     if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
         return None
-    if any(placed.effect.of_time for placed in (*measure.known, *held.placed())):
+    if any(placed.effect.of_time for placed in (*measure.known, *held.placed_effects())):
         return None
     around = _around(measure, context.tuning.model)
     cut = [_cut(record, around) for record in measure.records]

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, claimed
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, hypothesis_of_claim
 from analysis.diagnosis.settings import CLOCK_LEAST_SHARE, CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS, STARTS_PER_CLAIM
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.clock_drift import LARGEST_PPM
@@ -33,7 +33,11 @@ def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = m
         starts = [effect.starts(evidence, site)[:STARTS_PER_CLAIM] for site in sites]
         found: list[Hypothesis] = []
         if "one" in effect.sites or len(sites) == 1:
-            found += [claimed(Claim(effect, "one", (site,)), [values]) for site in sites for values in starts[site]]
+            found += [
+                hypothesis_of_claim(Claim(effect, "one", (site,)), [values])
+                for site in sites
+                for values in starts[site]
+            ]
         if len(sites) > 1:
             found += _each(effect, tuple(sites), starts)
             found += _all(effect, tuple(sites), evidence)
@@ -59,7 +63,7 @@ def within_data(hypothesis: Hypothesis, evidence: Evidence) -> bool:
 
 def _all(effect: Effect, sites: tuple[int, ...], evidence: Evidence) -> list[Hypothesis]:
     starts = effect.starts(evidence, ALL_SITES)[:STARTS_PER_CLAIM] if "all" in effect.sites else ()
-    return [claimed(Claim(effect, "all", sites), [values]) for values in starts]
+    return [hypothesis_of_claim(Claim(effect, "all", sites), [values]) for values in starts]
 
 
 def _each(effect: Effect, sites: tuple[int, ...], starts: Sequence[tuple[Values, ...]]) -> list[Hypothesis]:
@@ -67,7 +71,7 @@ def _each(effect: Effect, sites: tuple[int, ...], starts: Sequence[tuple[Values,
     if "each" not in effect.sites or not first:
         return []
     whole = [values[0] if values else _faint(effect, first[0]) for values in starts]
-    return [claimed(Claim(effect, "each", sites), whole)]
+    return [hypothesis_of_claim(Claim(effect, "each", sites), whole)]
 
 
 def _faint(effect: Effect, values: Values) -> Values:
@@ -86,7 +90,7 @@ def clock_drift_by_trial(catalogue: Sequence[Effect], evidence: Evidence) -> tup
     p = evidence.response.shape[1]
     claim = Claim(effect, "all" if p > 1 else "one", tuple(range(p)))
     return tuple(
-        claimed(claim, [{"ppm": ppm, "interpolated": straight, "with_position": 1.0}])
+        hypothesis_of_claim(claim, [{"ppm": ppm, "interpolated": straight, "with_position": 1.0}])
         for straight in (0.0, 1.0)
         if ppm != 0
     )

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from analysis.diagnosis.errors.hypothesis import Hypothesis, without_claim
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
@@ -24,4 +24,4 @@ def without_effect(context: SearchContext, found: Explanation, number: int) -> E
 
 def _without(context: SearchContext, candidate: FittedCandidate, number: int) -> FittedCandidate:
     fewer: Hypothesis = without_claim(candidate.fitted.hypothesis, number)
-    return context.candidate(evaluated(context.measure, context.tuning, candidate.fitted.deviations, fewer))
+    return context.candidate(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, fewer))

@@ -10,7 +10,7 @@ from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.errors.played_errors import PlayedError, played_error
+from analysis.diagnosis.errors.prediction_error import PredictionError, prediction_error
 from analysis.diagnosis.first_model.fitted_first import FirstModel
 from analysis.diagnosis.first_model.plain_form import plain_form
 from analysis.diagnosis.prepare_recordings import prepared, same_position
@@ -190,7 +190,9 @@ def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherT
         recording = import_real_recording(test)
         if _is_plain(wanted):
             (recording,) = all_as_force_driven(plain_form((recording,), turns=False)[0])
-        retuned, after = (played_error(recording, model, "all") for model in (_require_retuned(found), found.improved))
+        retuned, after = (
+            prediction_error(recording, model, "all") for model in (_require_retuned(found), found.improved)
+        )
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         said = problem.happened if isinstance(problem, StudyError) else f"{problem}."
         return FurtherTest(test.name, title, "", None, None, problem=said)
@@ -200,7 +202,9 @@ def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherT
     return FurtherTest(test.name, title, said, without, with_it, stretches)
 
 
-def _whole(name: str, recording: Recording, retuned: PlayedError, after: PlayedError) -> tuple[HeldOutStretch, ...]:
+def _whole(
+    name: str, recording: Recording, retuned: PredictionError, after: PredictionError
+) -> tuple[HeldOutStretch, ...]:
     seconds = len(recording) / recording.sample_rate_hz
     return tuple(
         HeldOutStretch(name, channel.name, channel.unit, 0.0, seconds, channel.signal, channel.left, two.left)
@@ -215,8 +219,8 @@ def _require_retuned(found: Findings) -> MechanicalModel:
 
 def _pair(wanted: RealRecording, read: _Read, found: Findings) -> PairOutcome:
     assert wanted.before is not None and read.before is not None
-    given = played_error(read.recording, read.model, "test")
-    missed = played_error(read.before, read.model, "test")
+    given = prediction_error(read.recording, read.model, "test")
+    missed = prediction_error(read.before, read.model, "test")
     errors = found.diagnosis.fit.test
     return PairOutcome(
         changed=wanted.changed,

@@ -111,7 +111,7 @@ def standing_at() -> Callable[..., Any]:
     """A candidate with invented errors, in units of the noise; names: effects of the catalogue, the last is the new
     one."""
     from analysis.diagnosis.errors.fit_score import FitScore
-    from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed, together
+    from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, combine, hypothesis_of_claim
     from analysis.diagnosis.errors.output_error import Fitted
     from analysis.diagnosis.search.search_context import FittedCandidate
     from equalizer.effects.catalogue import EFFECTS
@@ -121,7 +121,7 @@ def standing_at() -> Callable[..., Any]:
         for name in names:
             effect = EFFECTS[name]
             values = {p.name: min(max(1.0, p.lower), p.upper) for p in effect.parameters}
-            whole = together(whole, claimed(Claim(effect, "one", sites), [values]))
+            whole = combine(whole, hypothesis_of_claim(Claim(effect, "one", sites), [values]))
         errors = np.atleast_1d(np.asarray(seen, dtype=float))
         sealed = errors if test is None else np.atleast_1d(np.asarray(test, dtype=float))
         return FittedCandidate(Fitted(whole, np.zeros(0), (), 0.0), FitScore(errors, errors, sealed))

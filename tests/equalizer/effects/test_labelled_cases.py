@@ -9,7 +9,7 @@ import pytest
 from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated, fit, gather_evidence, sensitivity
+from analysis.diagnosis.errors.output_error import evaluate_fit, fit, gather_evidence, sensitivity
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search.starting_hypotheses import candidates
 from equalizer.effects.catalogue import EFFECTS
@@ -39,20 +39,20 @@ def test_with_the_effect_that_it_names_a_case_is_explained_to_the_noise(shared, 
     record = observe(recording, model.outputs)
     measure = FreeSimulation((record,), NOISE, NOISE)
     tuning = tuning_of(model, recording.command.channels)
-    nominal = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+    nominal = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
     known = sensitivity(measure, tuning, nominal.deviations, NOTHING)
     retuned = fit(measure, tuning, nominal, known, 2)
     spread = "one" if truth["axis"] else "all"
     suggested = candidates([effect], gather_evidence(measure, tuning, retuned)[0])
     hypothesis = next(each for each in suggested if each.claims[0].spread == spread)
     # From the calibration on: the re-tuned numbers have already bent themselves to what the effect does.
-    found = evaluated(measure, tuning, nominal.deviations, hypothesis)
+    found = evaluate_fit(measure, tuning, nominal.deviations, hypothesis)
     for _ in range(2):
         found = fit(measure, tuning, found, known, 5)
         known = sensitivity(measure, tuning, found.deviations, found.hypothesis)
     left = np.sqrt(np.mean(found.residuals[0][record.test] ** 2, axis=0))
     assert np.all(left < 1.08)
-    (placed,) = found.hypothesis.placed()
+    (placed,) = found.hypothesis.placed_effects()
     ((name, value),) = truth["values"].items()
     assert effect.report(placed.values)[name] == pytest.approx(value, rel=WITHIN)
     assert placed.sites == (("xyz".index(truth["axis"]),) if truth["axis"] else (0, 1, 2))

@@ -144,7 +144,10 @@ def test_an_offset_alone_is_no_drift(bench, command):
 
 
 def test_a_drift_is_one_over_the_whole_recording_also_where_its_beginning_alone_is_played(bench, command):
-    model, drift = bench.three_axes(), bench.placed("sensor_drift", {"total": 1.0, "bend": 0.4, "start": 0.1}, 0)
+    model, drift = (
+        bench.three_axes(),
+        bench.placed("sensor_drift", {"total": 1.0, "bend": 0.4, "start": 0.1}, 0),
+    )
     whole = simulate_mechanism(model, command, 1000.0, drift).response
     n = len(command) // 3
     seen = Measurement(whole[:n], np.ones(3), whole=len(command))

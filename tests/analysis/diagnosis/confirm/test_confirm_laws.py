@@ -14,7 +14,7 @@ from analysis.diagnosis.confirm.confirm_laws import (
     unconfirmed_beside_motion,
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
-from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
+from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search import Searched
 from analysis.diagnosis.search.search_context import FittedCandidate
@@ -29,9 +29,9 @@ RIPPLE = ("cogging", {"amplitude": 0.5, "pitch": 0.01, "phase": 0.0})
 
 
 def explained(*laws):
-    whole = claimed(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 1.0}])
+    whole = hypothesis_of_claim(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 1.0}])
     for name, values in laws:
-        whole = together(whole, claimed(Claim(EFFECTS[name], "one", (0,)), [values]))
+        whole = combine(whole, hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values]))
     return SimpleNamespace(steps=(SimpleNamespace(fitted=SimpleNamespace(hypothesis=whole)),))
 
 

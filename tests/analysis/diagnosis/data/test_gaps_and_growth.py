@@ -9,7 +9,7 @@ import pytest
 from analysis.diagnosis.data.growth import growth_rate, is_unstable_within
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated, fit, sensitivity
+from analysis.diagnosis.errors.output_error import evaluate_fit, fit, sensitivity
 from analysis.diagnosis.errors.tuning import tuning_of
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import Tolerance
@@ -71,12 +71,12 @@ def test_a_fit_with_wide_tolerances_stays_with_models_that_hold_themselves(made)
     )
     measure = measure_of([recording], given).measure
     tuning = tuning_of(given, ("fx",))
-    start = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+    start = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
     found = start
     for _ in range(4):
         found = fit(measure, tuning, found, sensitivity(measure, tuning, found.deviations, NOTHING), 4)
     assert found.cost < start.cost / 10
-    assert not is_unstable_within(tuning.tuned(found.deviations), 12.0)
+    assert not is_unstable_within(tuning.tune(found.deviations), 12.0)
     # Where a number is moved to see what it does, it may run away: that way is not looked.
     at = np.array([0.0, -0.02 - given.damping[0, 0] / 4.0, 0.0])
     assert np.isfinite(sensitivity(measure, tuning, at, NOTHING).columns).all()

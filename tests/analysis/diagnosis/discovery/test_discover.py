@@ -17,7 +17,7 @@ from analysis.diagnosis.discovery.proof import SAME_KIND
 from analysis.diagnosis.discovery.screen_terms import products_of
 from analysis.diagnosis.discovery.snap_exponents import simplify_powers
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.search.search import Searched
 from analysis.diagnosis.search.verdict import judge
@@ -117,7 +117,7 @@ def test_a_shuffled_force_holds_no_law(seed=9):
     context, known = arena_of(recorded((DRAG,), seed))
     fitted = known.retuned.fitted
     view = views_of(
-        context.measure, context.tuning, evaluated(context.measure, context.tuning, fitted.deviations, NOTHING)
+        context.measure, context.tuning, evaluate_fit(context.measure, context.tuning, fitted.deviations, NOTHING)
     )[0]
     seen = view.records[0]
     axis = axes_of(seen.columns, 1)

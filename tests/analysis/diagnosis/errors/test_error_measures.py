@@ -10,7 +10,7 @@ from analysis.diagnosis.data.force_driven import as_force_driven
 from analysis.diagnosis.data.observed_parts import names_of_parts, observed_parts
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.choose_measure import measure_of
-from analysis.diagnosis.errors.measure_rule import choose_measure, holds_itself
+from analysis.diagnosis.errors.measure_rule import choose_measure, is_self_stable
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -215,9 +215,9 @@ def test_the_rule_takes_windows_under_a_controller_where_accelerations_alone_wer
 
 
 def test_what_holds_itself_comes_to_rest_within_a_third_of_the_recording() -> None:
-    assert holds_itself(model(400.0), 10.0)
-    assert not holds_itself(model(400.0), 0.5)
-    assert not holds_itself(model(0.0), 10.0)
+    assert is_self_stable(model(400.0), 10.0)
+    assert not is_self_stable(model(400.0), 0.5)
+    assert not is_self_stable(model(0.0), 10.0)
 
 
 def test_feedback_is_seen_by_the_excitation_beside_the_command(held: Recording) -> None:

@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, alike, claimed, together, without_claim
-from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
+from analysis.diagnosis.errors.hypothesis import (
+    NOTHING,
+    Claim,
+    combine,
+    hypothesis_of_claim,
+    similar_hypotheses,
+    without_claim,
+)
+from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.search.starting_hypotheses import candidates
 from analysis.diagnosis.settings import STARTS_PER_CLAIM
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
@@ -19,49 +26,49 @@ def some_values(effect):
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 def test_what_is_claimed_is_what_is_placed(effect):
     values = some_values(effect)
-    (placed,) = claimed(Claim(effect, "one", (1,)), [values]).placed()
+    (placed,) = hypothesis_of_claim(Claim(effect, "one", (1,)), [values]).placed_effects()
     assert (placed.effect, placed.sites) == (effect, (1,))
     assert dict(placed.values) == pytest.approx(values)
 
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 def test_a_step_never_leaves_what_is_allowed(effect):
-    whole = claimed(Claim(effect, "one", (0,)), [some_values(effect)])
+    whole = hypothesis_of_claim(Claim(effect, "one", (0,)), [some_values(effect)])
     for far in (-1e9, 1e9):
-        (placed,) = whole.placed(np.full(len(whole.point), far))
+        (placed,) = whole.placed_effects(np.full(len(whole.point), far))
         for p in effect.parameters:
             assert p.lower <= placed.values[p.name] <= p.upper
 
 
 def test_every_axis_has_numbers_of_its_own_where_each_is_claimed():
     drag = EFFECTS["viscous_damping"]
-    each = claimed(Claim(drag, "each", (0, 1)), [{p.name: v for p in drag.parameters} for v in (0.5, 0.25)])
-    assert [item.sites for item in each.placed()] == [(0,), (1,)]
+    each = hypothesis_of_claim(Claim(drag, "each", (0, 1)), [{p.name: v for p in drag.parameters} for v in (0.5, 0.25)])
+    assert [item.sites for item in each.placed_effects()] == [(0,), (1,)]
     assert len(each.numbers) == 2 * sum(not p.fixed for p in drag.parameters)
 
 
 def test_claims_are_put_together_and_taken_away_again():
     parts = [
-        claimed(Claim(EFFECTS[name], "one", (k,)), [some_values(EFFECTS[name])])
+        hypothesis_of_claim(Claim(EFFECTS[name], "one", (k,)), [some_values(EFFECTS[name])])
         for k, name in enumerate(("coulomb_friction", "extra_mode", "sensor_lag"))
     ]
-    whole = together(together(parts[0], parts[1]), parts[2])
+    whole = combine(combine(parts[0], parts[1]), parts[2])
     assert [key[0] for key in whole.key] == ["coulomb_friction", "extra_mode", "sensor_lag"]
     less = without_claim(whole, 1)
-    expected = together(parts[0], parts[2])
+    expected = combine(parts[0], parts[2])
     assert less.key == expected.key and np.array_equal(less.point, expected.point)
-    assert less.placed() == expected.placed()
+    assert less.placed_effects() == expected.placed_effects()
     assert [each.effect.name for each in whole.of_claim(1)] == ["extra_mode"]
 
 
 def test_nothing_is_the_beginning_of_all_claims():
-    part = claimed(Claim(EFFECTS["sensor_lag"], "one", (0,)), [some_values(EFFECTS["sensor_lag"])])
-    assert together(NOTHING, part).placed() == part.placed()
-    assert NOTHING.placed() == ()
+    part = hypothesis_of_claim(Claim(EFFECTS["sensor_lag"], "one", (0,)), [some_values(EFFECTS["sensor_lag"])])
+    assert combine(NOTHING, part).placed_effects() == part.placed_effects()
+    assert NOTHING.placed_effects() == ()
 
 
 def evidence_of(context):
-    base = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    base = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     return gather_evidence(context.measure, context.tuning, base)[0]
 
 
@@ -69,7 +76,7 @@ def test_friction_in_the_data_suggests_friction_near_its_level(arena_of):
     rubs = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.2}),)
     found = candidates([EFFECTS["coulomb_friction"]], evidence_of(arena_of(rubs)))
     assert 1 <= len(found) <= STARTS_PER_CLAIM
-    assert found[0].placed()[0].values["level"] == pytest.approx(0.2, rel=0.3)
+    assert found[0].placed_effects()[0].values["level"] == pytest.approx(0.2, rel=0.3)
 
 
 def test_every_effect_is_suggested_at_every_axis_or_not_at_all(arena_of):
@@ -91,16 +98,16 @@ def test_every_effect_is_suggested_at_every_axis_or_not_at_all(arena_of):
 
 def test_numbers_that_do_almost_the_same_are_tried_in_place_of_an_effects_own():
     parts = [
-        claimed(Claim(EFFECTS["sensor_lag"], "one", (0,)), [{"bandwidth": 60.0}]),
-        claimed(Claim(EFFECTS["force_deadband"], "one", (1,)), [{"width": 0.02, "jump": 0.25}]),
-        claimed(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}]),
+        hypothesis_of_claim(Claim(EFFECTS["sensor_lag"], "one", (0,)), [{"bandwidth": 60.0}]),
+        hypothesis_of_claim(Claim(EFFECTS["force_deadband"], "one", (1,)), [{"width": 0.02, "jump": 0.25}]),
+        hypothesis_of_claim(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}]),
     ]
-    (other,) = alike(together(together(parts[0], parts[1]), parts[2]))
-    lag, band, force = other.placed()
+    (other,) = similar_hypotheses(combine(combine(parts[0], parts[1]), parts[2]))
+    lag, band, force = other.placed_effects()
     assert band.values == pytest.approx({"width": 0.015, "jump": 0.0})
     assert (lag.values["bandwidth"], force.values["force"]) == pytest.approx((60.0, 0.1))
 
 
 def test_plain_numbers_have_nothing_else_to_try():
-    plain = claimed(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": 0.02, "jump": 0.0}])
-    assert not list(alike(plain))
+    plain = hypothesis_of_claim(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": 0.02, "jump": 0.0}])
+    assert not list(similar_hypotheses(plain))

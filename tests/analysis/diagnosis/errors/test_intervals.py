@@ -10,9 +10,9 @@ import pytest
 from scipy.signal import lfilter
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.hypothesis import Claim, claimed
+from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.intervals import standard_errors
-from analysis.diagnosis.errors.output_error import evaluated, fit, sensitivity
+from analysis.diagnosis.errors.output_error import evaluate_fit, fit, sensitivity
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -45,7 +45,7 @@ MODEL = MechanicalModel("line", "position", ONE, ONE, [[100.0]], ONE, ONE)
 TUNING = Tuning(
     MODEL, ("stiffness x",), np.ones(1), ("N/m",), lambda at: replace(MODEL, stiffness=np.array([[100.0 + at[0]]]))
 )
-PUSHED = claimed(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}])
+PUSHED = hypothesis_of_claim(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}])
 
 
 def rows(seed):
@@ -71,7 +71,7 @@ def measured(seed, colour, strength):
 
 def fitted_and_errors(seed, colour, strength):
     measure, own = measured(seed, colour, strength)
-    start = evaluated(measure, TUNING, np.zeros(1), PUSHED)
+    start = evaluate_fit(measure, TUNING, np.zeros(1), PUSHED)
     known = sensitivity(measure, TUNING, np.zeros(1), PUSHED)
     found = fit(measure, TUNING, start, known, 4)
     return found, standard_errors(measure, TUNING, found, known), own

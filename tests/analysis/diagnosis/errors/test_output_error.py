@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed, together
-from analysis.diagnosis.errors.output_error import bounded_step, evaluated, fit, fitting, sensitivity
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import bounded_step, evaluate_fit, fit, residuals_to_fit, sensitivity
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.catalogue import EFFECTS
@@ -14,12 +14,12 @@ FRICTION_N, LAG_S = 0.2, 1.5e-3
 
 
 def alone(name, values):
-    return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
+    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 def recovered(context, hypothesis):
     zero = np.zeros(len(context.tuning.names))
-    start = evaluated(context.measure, context.tuning, zero, hypothesis)
+    start = evaluate_fit(context.measure, context.tuning, zero, hypothesis)
     known = sensitivity(context.measure, context.tuning, zero, NOTHING)
     return refine(context, fit(context.measure, context.tuning, start, known, 4))
 
@@ -39,7 +39,7 @@ def off(tuning, **deviations):
 def test_the_model_s_own_numbers_are_found(arena_of):
     truth = arena_of()
     wrong = off(truth.tuning, mass_fx=-2.0, damping_fx=1.5, stiffness_fx=-1.0)
-    context = arena_of(given=truth.tuning.tuned(wrong))
+    context = arena_of(given=truth.tuning.tune(wrong))
     found = recovered(context, NOTHING)
     assert found.deviations == pytest.approx(-wrong, abs=0.15)
     assert context.candidate(found).score.worst_channel < 1.03
@@ -53,7 +53,7 @@ def test_a_number_that_fits_as_it_is_stays(arena_of):
 @pytest.mark.parametrize("start", [0.05, 0.6])
 def test_friction_is_found_from_far_away(rubbing_arena, start):
     found = recovered(rubbing_arena, alone("coulomb_friction", {"level": start}))
-    assert found.hypothesis.placed()[0].values["level"] == pytest.approx(FRICTION_N, rel=2e-3)
+    assert found.hypothesis.placed_effects()[0].values["level"] == pytest.approx(FRICTION_N, rel=2e-3)
     assert rubbing_arena.candidate(found).score.worst_channel < 1.03
 
 
@@ -62,8 +62,8 @@ def test_two_effects_are_found_at_once(arena_of):
         PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": FRICTION_N}),
         PlacedEffect(EFFECTS["amplifier_lag"], (0,), {"time_constant": LAG_S}),
     )
-    both = together(alone("coulomb_friction", {"level": 0.1}), alone("amplifier_lag", {"time_constant": 1e-3}))
-    rubs, lags = recovered(arena_of(truth), both).hypothesis.placed()
+    both = combine(alone("coulomb_friction", {"level": 0.1}), alone("amplifier_lag", {"time_constant": 1e-3}))
+    rubs, lags = recovered(arena_of(truth), both).hypothesis.placed_effects()
     assert rubs.values["level"] == pytest.approx(FRICTION_N, rel=5e-3)
     assert lags.values["time_constant"] == pytest.approx(LAG_S, rel=5e-3)
 
@@ -77,7 +77,7 @@ def test_a_fit_is_never_worse_than_its_start(rubbing_arena):
     zero = np.zeros(len(rubbing_arena.tuning.names))
     known = sensitivity(rubbing_arena.measure, rubbing_arena.tuning, zero, NOTHING)
     for level in (1e-3, 0.2, 3.0):
-        start = evaluated(
+        start = evaluate_fit(
             rubbing_arena.measure, rubbing_arena.tuning, zero, alone("coulomb_friction", {"level": level})
         )
         assert fit(rubbing_arena.measure, rubbing_arena.tuning, start, known, 3).cost <= start.cost
@@ -91,15 +91,15 @@ def test_the_same_start_gives_the_same_fit(rubbing_arena):
 def test_numbers_stay_within_what_calibration_and_physics_allow(arena_of):
     truth = arena_of()
     far = off(truth.tuning, mass_fx=-9.0)
-    found = recovered(arena_of(given=truth.tuning.tuned(far)), NOTHING)
+    found = recovered(arena_of(given=truth.tuning.tune(far)), NOTHING)
     assert found.deviations[0] == pytest.approx(RETUNING_BOUND)
     assert np.abs(found.deviations).max() <= RETUNING_BOUND
 
 
 def test_sealed_samples_are_not_fitted_to(rubbing_arena):
-    left = evaluated(rubbing_arena.measure, rubbing_arena.tuning, np.zeros(3), NOTHING).residuals
+    left = evaluate_fit(rubbing_arena.measure, rubbing_arena.tuning, np.zeros(3), NOTHING).residuals
     (record,) = rubbing_arena.measure.records
-    assert len(fitting(rubbing_arena.measure, left)) == record.fit.sum() * record.measured.shape[1]
+    assert len(residuals_to_fit(rubbing_arena.measure, left)) == record.fit.sum() * record.measured.shape[1]
     assert not record.test.any()
 
 
@@ -109,7 +109,7 @@ def test_a_sensitivity_foretells_what_a_small_change_does(arena_of):
     known = sensitivity(context.measure, context.tuning, zero, NOTHING)
     step = off(context.tuning, damping_fx=0.05)
     base, there = (
-        fitting(context.measure, context.measure.residuals(context.tuning.tuned(at), ())) for at in (zero, step)
+        residuals_to_fit(context.measure, context.measure.residuals(context.tuning.tune(at), ())) for at in (zero, step)
     )
     assert base - there == pytest.approx(step @ known.columns, abs=0.02 * np.abs(base - there).max())
     assert known.squares == pytest.approx(known.columns @ known.columns.T)
@@ -149,7 +149,7 @@ def test_a_simulation_that_ran_away_is_the_worst_of_fits(rubbing_arena, size):
     zero = np.zeros(len(rubbing_arena.tuning.names))
     known = sensitivity(rubbing_arena.measure, rubbing_arena.tuning, zero, NOTHING)
     measure = RanAway(rubbing_arena.measure, size)
-    start = evaluated(measure, rubbing_arena.tuning, zero, alone("coulomb_friction", {"level": 0.1}))
+    start = evaluate_fit(measure, rubbing_arena.tuning, zero, alone("coulomb_friction", {"level": 0.1}))
     assert start.cost == np.inf
     assert fit(measure, rubbing_arena.tuning, start, known, 2) is start
     assert not sensitivity(measure, rubbing_arena.tuning, zero, NOTHING).columns.any()

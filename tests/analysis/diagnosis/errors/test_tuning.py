@@ -39,7 +39,7 @@ def moved(model, **deviations):
     at = np.zeros(len(tuning.names))
     for name, value in deviations.items():
         at[tuning.names.index(name.replace("_", " "))] = value
-    return tuning.tuned(at)
+    return tuning.tune(at)
 
 
 def held_frequencies_hz(model):
@@ -153,6 +153,6 @@ def test_small_deviations_move_the_response_in_a_straight_line():
     for number in range(len(tuning.names)):
         at = np.zeros(len(tuning.names))
         at[number] = 1e-3
-        up, down = (linear_steps(tuning.tuned(sign * at), 1e-3).advance - bare for sign in (1.0, -1.0))
+        up, down = (linear_steps(tuning.tune(sign * at), 1e-3).advance - bare for sign in (1.0, -1.0))
         assert np.abs(up).max() > 0
         assert up == pytest.approx(-down, abs=1e-2 * np.abs(up).max())

@@ -16,7 +16,7 @@ def ringing(seed: int, samples: int = 8000) -> np.ndarray:
 
 
 def test_what_is_foreseen_from_the_past_is_taken_off():
-    left = whitening_filter([ringing(1)], LEAST).whitened(ringing(2))
+    left = whitening_filter([ringing(1)], LEAST).apply(ringing(2))
     assert left.std() == pytest.approx(1.0, rel=0.05)
     after = np.corrcoef(left[100:-1, 0], left[101:, 0])[0, 1]
     assert abs(after) < 0.1
@@ -24,14 +24,14 @@ def test_what_is_foreseen_from_the_past_is_taken_off():
 
 def test_white_noise_stays_what_it_is():
     white = np.random.default_rng(3).normal(size=(8000, 1))
-    assert np.std(whitening_filter([white], LEAST).whitened(white) - white) < 0.15
+    assert np.std(whitening_filter([white], LEAST).apply(white) - white) < 0.15
 
 
 def test_a_tone_that_the_colour_lacks_stands_out():
     colour = whitening_filter([ringing(1)], LEAST)
     tone = 2.0 * np.sin(2 * np.pi * 0.3 * np.arange(8000))[:, None]
     before = np.var(ringing(2) + tone) / np.var(ringing(2))
-    after = np.var(colour.whitened(ringing(2) + tone)) / np.var(colour.whitened(ringing(2)))
+    after = np.var(colour.apply(ringing(2) + tone)) / np.var(colour.apply(ringing(2)))
     assert before < 1.1
     assert after > 10
 
@@ -40,7 +40,7 @@ def test_a_sample_hangs_on_nothing_that_comes_later():
     colour, course = whitening_filter([ringing(1)], LEAST), ringing(2)
     changed = course.copy()
     changed[5000:] += 7.0
-    assert np.allclose(colour.whitened(changed)[:5000], colour.whitened(course)[:5000])
+    assert np.allclose(colour.apply(changed)[:5000], colour.apply(course)[:5000])
 
 
 def test_only_samples_after_enough_known_ones_count():
@@ -49,5 +49,5 @@ def test_only_samples_after_enough_known_ones_count():
     warm = colour.warm(course)
     assert not warm[: 300 + colour.lags].any()
     assert warm[300 + colour.lags :].all()
-    assert np.isnan(colour.whitened(course)[:300]).all()
-    assert np.isfinite(colour.whitened(course)[300:]).all()
+    assert np.isnan(colour.apply(course)[:300]).all()
+    assert np.isfinite(colour.apply(course)[300:]).all()

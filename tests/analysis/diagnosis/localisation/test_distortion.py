@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.detection_lines import detection_lines, hold_length
-from analysis.diagnosis.localisation.distortion import distortion
+from analysis.diagnosis.localisation.distortion import find_distortions
 from analysis.diagnosis.localisation.level_trends import level_trends
 from analysis.diagnosis.noise.noise_floor import noise_floor
 from analysis.diagnosis.settings import DISTORTION_P
@@ -14,7 +14,7 @@ CASES = Path(__file__).parents[4].parent / "shared" / "cases"
 
 
 def found_in(recording):
-    return distortion(recording, noise_floor(recording))
+    return find_distortions(recording, noise_floor(recording))
 
 
 def whole(trends, output, input):

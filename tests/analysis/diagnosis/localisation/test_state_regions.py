@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.localisation.block_permutation import SMALLEST, correlation_time, shuffled
+from analysis.diagnosis.localisation.block_permutation import SMALLEST, correlation_time, shuffle_blocks
 from analysis.diagnosis.localisation.state_regions import Disturbance, State, state_regions
 
 
@@ -119,7 +119,7 @@ def test_a_state_of_another_length_is_refused():
 
 def test_a_shuffle_keeps_each_sample_and_its_stratum():
     strata = np.repeat([0, 1, 4], [100, 57, 300])
-    order = shuffled(strata, 9, np.random.default_rng(1))
+    order = shuffle_blocks(strata, 9, np.random.default_rng(1))
     assert sorted(order) == list(range(457))
     assert (strata[order] == strata).all()
 

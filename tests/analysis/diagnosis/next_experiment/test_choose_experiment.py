@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.carried_weight import add_mass
-from analysis.diagnosis.errors.hypothesis import Claim, claimed
+from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.next_experiment.choose_experiment import Bench, as_document, predict_gains
@@ -34,7 +34,7 @@ def bench_of(tolerance=KNOWN):
 
 def said(bench, name, values):
     effect = EFFECTS[name]
-    whole = claimed(Claim(effect, "one", (0,)), [values])
+    whole = hypothesis_of_claim(Claim(effect, "one", (0,)), [values])
     return Fitted(whole, np.zeros(len(bench.tuning.names)), (), 0.0)
 
 
@@ -73,7 +73,8 @@ def test_dry_friction_and_presliding_are_told_apart_by_the_proposed_recording(fr
     assert proposed is not None and proposed.splits == NAMES
     command = menu[0].experiment.commands
     played = [
-        simulate_mechanism(bench.tuning.model, command, RATE_HZ, each.hypothesis.placed()) for each in (named, rival)
+        simulate_mechanism(bench.tuning.model, command, RATE_HZ, each.hypothesis.placed_effects())
+        for each in (named, rival)
     ]
     truth, other = (np.hstack([each.response, each.position]) for each in played)
     measured = truth + NOISE * np.random.default_rng(1).standard_normal(truth.shape)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.reference.learn_model_error import (
     NothingLearned,
@@ -83,7 +83,9 @@ def test_a_hum_below_what_a_sound_device_differs_by_is_named(diagnosed, clean):
 
 def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, clean):
     learned = learn_model_error(clean, diagnosed.device(1), (diagnosed.recorded(1, (LAG,), seed=4),), map, quiet)
-    lag, rubbing = (claimed(Claim(placed.effect, "one", (0,)), [{**placed.values}]) for placed in (LAG, RUBBING))
+    lag, rubbing = (
+        hypothesis_of_claim(Claim(placed.effect, "one", (0,)), [{**placed.values}]) for placed in (LAG, RUBBING)
+    )
     assert learned.references.gained(lag).mean() > 0.2
     assert learned.references.gained(rubbing).mean() < 0.01
     assert not learned.references.gained(NOTHING).any()

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
-from analysis.diagnosis.errors.output_error import evaluated, fit, sensitivity
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit, fit, sensitivity
 from analysis.diagnosis.result.black_box import black_box
 from analysis.diagnosis.result.error_table import errors_of
 from analysis.diagnosis.search.compare_candidates import refine
@@ -26,10 +26,10 @@ def bent(arena_of):
 def compared(context, name, values):
     """The black box beside one effect, fitted to the end."""
     zero = np.zeros(len(context.tuning.names))
-    whole = claimed(Claim(EFFECTS[name], "one", (0,)), [values])
-    bare = evaluated(context.measure, context.tuning, zero, NOTHING)
+    whole = hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+    bare = evaluate_fit(context.measure, context.tuning, zero, NOTHING)
     known = sensitivity(context.measure, context.tuning, zero, NOTHING)
-    start = evaluated(context.measure, context.tuning, zero, whole)
+    start = evaluate_fit(context.measure, context.tuning, zero, whole)
     after = refine(context, fit(context.measure, context.tuning, start, known, 4))
     retuned, ended = (context.confirmed(context.candidate(each)) for each in (bare, after))
     found = Explanation(retuned, retuned, ended, (), ())
@@ -61,7 +61,7 @@ def test_the_black_box_has_as_many_numbers_per_channel_as_physics(bent):
 
 def test_where_nothing_is_missing_the_black_box_finds_nothing(arena_of):
     context = arena_of()
-    bare = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    bare = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     retuned = context.confirmed(context.candidate(bare))
     error = errors_of(context.whole, Explanation(retuned, retuned, retuned, (), ())).test.after
     assert black_box(context.whole, retuned, 3, error).test == pytest.approx(error, rel=0.01)
@@ -69,7 +69,7 @@ def test_where_nothing_is_missing_the_black_box_finds_nothing(arena_of):
 
 def test_without_sealed_samples_there_is_nothing_to_compare_on(arena_of):
     context = arena_of()
-    bare = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    bare = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     retuned = context.candidate(bare)
     assert black_box(context.measure, retuned, 3, 0.1) is None
     assert black_box(context.whole, replace(retuned), 3, None) is None
@@ -84,6 +84,6 @@ def test_beyond_what_it_was_fitted_to_the_black_box_is_no_easy_prey(bent):
     masks[0][quiet.start : quiet.stop] = masks[1][loud.start : loud.stop] = True
     whole = context.whole.with_records((replace(record, fit=masks[0], test=masks[1]),))
     context = replace(context, measure=whole, whole=whole)
-    retuned = context.candidate(evaluated(whole, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
+    retuned = context.candidate(evaluate_fit(whole, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
     alone = black_box(whole, retuned, 0, 0.0)
     assert black_box(whole, retuned, 4, 0.0).test < 1.5 * alone.test

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.result.black_box import black_box
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -15,7 +15,7 @@ def test_commands_that_are_never_played_together_where_it_is_fitted_do_not_break
     command = record.command.copy()
     command[record.test] += 1.0
     whole = context.whole.with_records((replace(record, command=command),))
-    bare = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    bare = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     box = black_box(whole, context.confirmed(context.candidate(bare)), 2, 0.02)
     assert np.isfinite(box.test)
     assert box.test < 10

@@ -4,7 +4,7 @@ import pytest
 from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
+from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.signature_curves import Names, signature_of
 from equalizer.effects.catalogue import CATALOGUE
@@ -24,7 +24,7 @@ def signature(diagnosed):
         seen = observe(recording, axes)
         noise = np.repeat(diagnosed.NOISE, axes)
         measure, tuning = FreeSimulation((seen,), noise, noise), tuning_of(model, recording.command.channels)
-        without = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+        without = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
         names = Names(tuple("xyz"[:axes]), recording.response.channels, "m/s^2")
         return signature_of(gather_evidence(measure, tuning, without)[0], placed, (), names, Hold.ZERO_ORDER)
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retuned_alone
 from analysis.diagnosis.search.identifiability import final_errors, identified, told_from_none
@@ -20,12 +20,12 @@ FRICTION_N = 0.15
 
 
 def claim(name, **values):
-    return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
+    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 def candidate(context, base, *claims):
-    whole = claims[0] if len(claims) == 1 else together(*claims)
-    return context.candidate(evaluated(context.measure, context.tuning, base.fitted.deviations, whole))
+    whole = claims[0] if len(claims) == 1 else combine(*claims)
+    return context.candidate(evaluate_fit(context.measure, context.tuning, base.fitted.deviations, whole))
 
 
 def explained_by(context, *rivals):
@@ -100,7 +100,9 @@ def fitted(context, *claims):
     base = context.candidate(retuned_alone(context))
     steps, at = [], base
     for newest in claims:
-        start = evaluated(context.measure, context.tuning, at.fitted.deviations, together(at.fitted.hypothesis, newest))
+        start = evaluate_fit(
+            context.measure, context.tuning, at.fitted.deviations, combine(at.fitted.hypothesis, newest)
+        )
         at = context.candidate(refine(context, start))
         steps.append(at)
     ends = [context.confirmed(each) for each in (base, base, at)]
@@ -115,7 +117,7 @@ def test_a_profile_tells_a_number_from_none_where_it_is_there_and_not_where_it_i
 
 def test_an_interval_that_holds_none_is_judged_by_the_profile_and_then_does_not(rubbing, monkeypatch):
     found = fitted(rubbing, FRICTION)
-    place, level = len(rubbing.tuning.names), found.after.fitted.hypothesis.placed()[0].values["level"]
+    place, level = len(rubbing.tuning.names), found.after.fitted.hypothesis.placed_effects()[0].values["level"]
     plain = final_errors(rubbing, found)
     wide = plain.copy()
     wide[place] = np.log1p(2 / (1.96 * INTERVAL_FACTOR))

@@ -11,7 +11,7 @@ from analysis.diagnosis.errors.band_power import BandPower
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.assemble_findings import impact_remainder
 from analysis.diagnosis.result.wording import summary_lines
@@ -40,7 +40,9 @@ def searched(real, effects, repeats=True):
         recording = replace(recording, segments=tuple(replace(segment, period=0) for segment in recording.segments))
     chosen = measure_of([recording], real.device(2))
     context = SearchContext(chosen.measure.shorten(), chosen.measure, tuning_of(real.device(2), ("fx", "fy")), map)
-    given = context.candidate(evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
+    given = context.candidate(
+        evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    )
     whole = context.confirmed(given)  # as a search hands it over: with the sealed samples
     return context, Explanation(whole, whole, whole, (), ()), chosen.floors
 
@@ -58,7 +60,7 @@ def told(loose):
 def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
     (claim,) = told.after.fitted.hypothesis.claims
     assert (claim.effect.name, claim.sites) == ("backlash", (AXIS,))
-    values = told.after.fitted.hypothesis.placed()[0].values
+    values = told.after.fitted.hypothesis.placed_effects()[0].values
     assert values["gap"] == pytest.approx(GAP_M, rel=0.1)
 
 
@@ -79,7 +81,7 @@ def test_two_courses_of_one_play_agree_in_their_band_powers_but_not_sample_by_sa
     apart = tuple(replace(each, values={**each.values, "gap": GAP_M * (1 + 1e-9)}) for each in LOOSE)
     courses = [context.whole.residuals(context.tuning.model, effects) for effects in (LOOSE, apart)]
     power = BandPower(context.whole)
-    off = power.misfits(power.predicted(courses[0]) - power.predicted(courses[1]))
+    off = power.misfits(power.predict(courses[0]) - power.predict(courses[1]))
     assert max(off.fit.max(), off.choose.max(), off.test.max()) < 0.2
     assert np.std(courses[0][0] - courses[1][0], axis=0)[AXIS] > 10
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.fit_score import fit_score
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.no_prediction import is_without_prediction, predicts_nothing
 from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.effects.catalogue import CATALOGUE
@@ -18,7 +18,7 @@ GAIN = next(effect for effect in CATALOGUE if effect.name == "force_gain")
 @pytest.mark.parametrize(("gain", "nothing"), [(0.7, False), (1e-6, True)])
 def test_a_force_that_never_reaches_the_device_foresees_nothing(arena_of, gain, nothing):
     context = arena_of()
-    held = claimed(Claim(GAIN, "one", (0,)), [{"gain": gain}])
+    held = hypothesis_of_claim(Claim(GAIN, "one", (0,)), [{"gain": gain}])
     assert is_without_prediction(context.whole, _contender(context, held)) is nothing
 
 
@@ -28,7 +28,7 @@ def test_a_model_as_it_is_foresees_something(arena_of):
 
 
 def _contender(context, hypothesis):
-    fitted = evaluated(context.whole, context.tuning, np.zeros(len(context.tuning.names)), hypothesis)
+    fitted = evaluate_fit(context.whole, context.tuning, np.zeros(len(context.tuning.names)), hypothesis)
     return FittedCandidate(fitted, fit_score(context.whole, fitted.residuals))
 
 
@@ -37,7 +37,7 @@ def test_where_noise_is_as_large_as_the_signal_a_foreseen_course_is_asked_for_al
     record = context.whole.records[0]
     shuffled = replace(record, measured=np.random.default_rng(1).permutation(record.measured))
     measure = replace(context.whole, records=(shuffled,), noise=shuffled.measured.std(axis=0))
-    held = claimed(Claim(GAIN, "one", (0,)), [{"gain": 1e-6}])
+    held = hypothesis_of_claim(Claim(GAIN, "one", (0,)), [{"gain": 1e-6}])
     assert is_without_prediction(measure, _contender(replace(context, whole=measure), held))
 
 
@@ -52,7 +52,9 @@ def test_a_low_pass_that_lets_nothing_through_silences_its_channel(arena_of):
 def test_a_silenced_channel_is_no_answer_though_another_gains_more_by_it(arena_of):
     context = arena_of()
     none = np.zeros(len(context.tuning.names))
-    lag = evaluated(context.whole, context.tuning, none, claimed(Claim(LAG, "one", (0,)), [{"bandwidth": 0.01}]))
+    lag = evaluate_fit(
+        context.whole, context.tuning, none, hypothesis_of_claim(Claim(LAG, "one", (0,)), [{"bandwidth": 0.01}])
+    )
     wrenched = replace(lag, residuals=tuple(residual * [1.1, 1e6] for residual in lag.residuals))
     assert predicts_nothing(context.whole, wrenched, lag)
 
@@ -63,7 +65,7 @@ def test_a_low_pass_that_is_there_silences_nothing(arena_of):
 
 
 def _silences(measure, tuning, bandwidth):
-    lag = claimed(Claim(LAG, "one", (0,)), [{"bandwidth": bandwidth}])
+    lag = hypothesis_of_claim(Claim(LAG, "one", (0,)), [{"bandwidth": bandwidth}])
     return predicts_nothing(
-        measure, *(evaluated(measure, tuning, np.zeros(len(tuning.names)), each) for each in (NOTHING, lag))
+        measure, *(evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), each) for each in (NOTHING, lag))
     )

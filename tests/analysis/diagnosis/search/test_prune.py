@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
-from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
+from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.search.explain import Explanation, retuned_alone
 from analysis.diagnosis.search.search import pruned, searched
 from analysis.diagnosis.search.starting_hypotheses import candidates
@@ -23,15 +23,15 @@ def placed(name, **values):
 
 
 def claim(name, **values):
-    return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
+    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 def one_after_the_other(context, *claims):
     """An explanation as a search leaves it that added these in this order."""
     base, steps, whole = context.candidate(retuned_alone(context)), [], None
     for each in claims:
-        whole = each if whole is None else together(whole, each)
-        steps.append(context.candidate(evaluated(context.measure, context.tuning, base.fitted.deviations, whole)))
+        whole = each if whole is None else combine(whole, each)
+        steps.append(context.candidate(evaluate_fit(context.measure, context.tuning, base.fitted.deviations, whole)))
     ends = (context.confirmed(item) for item in (base, base, steps[-1]))
     return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
 
@@ -138,7 +138,7 @@ def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(arena_of, d
     context = arena_of((placed("transport_delay", delay=late),))
     base = retuned_alone(context)
     starts = [
-        candidate.placed()[-1].values["delay"]
+        candidate.placed_effects()[-1].values["delay"]
         for candidate in candidates(
             [EFFECTS["transport_delay"]], gather_evidence(context.measure, context.tuning, base)[0]
         )
@@ -147,5 +147,5 @@ def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(arena_of, d
     assert any(start > 1 / diagnosed.RATE_HZ for start in starts)
     found = searched(context, CATALOGUE, lambda what, share: None).found
     assert names(found) == ["transport_delay"]
-    assert found.after.fitted.hypothesis.placed()[-1].values["delay"] == pytest.approx(late, rel=0.01)
+    assert found.after.fitted.hypothesis.placed_effects()[-1].values["delay"] == pytest.approx(late, rel=0.01)
     assert np.nanmax(found.after.score.test) < 1.1

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import Claim, claimed
+from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.intervals import standard_errors
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.search_context import sensitivity_at
 from equalizer.effects.catalogue import EFFECTS
@@ -24,13 +24,13 @@ def context(arena_of):
 
 
 def refined_from(context, width, jump):
-    start = claimed(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": width, "jump": jump}])
-    here = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), start)
+    start = hypothesis_of_claim(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": width, "jump": jump}])
+    here = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), start)
     return refine(context, here)
 
 
 def test_a_wider_band_with_a_jump_is_found_to_be_a_plain_one(context):
-    (placed,) = refined_from(context, TRUE_N / 0.65, 0.35).hypothesis.placed()
+    (placed,) = refined_from(context, TRUE_N / 0.65, 0.35).hypothesis.placed_effects()
     assert placed.values["width"] == pytest.approx(TRUE_N, rel=0.02)
     assert placed.values["jump"] == 0.0
 
@@ -45,5 +45,5 @@ def test_a_number_at_the_end_of_its_range_is_held_there_and_leaves_the_others_su
 
 def test_a_band_that_does_jump_keeps_its_jump(arena_of):
     jumping = arena_of(dead(width=0.1, jump=0.6))
-    (placed,) = refined_from(jumping, 0.1, 0.6).hypothesis.placed()
+    (placed,) = refined_from(jumping, 0.1, 0.6).hypothesis.placed_effects()
     assert placed.values["jump"] == pytest.approx(0.6, abs=0.1)

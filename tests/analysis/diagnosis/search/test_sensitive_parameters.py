@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import sensitivity
 from analysis.diagnosis.search.search_context import sensitive_parameters, sensitivity_at
 from equalizer.effects.catalogue import EFFECTS
@@ -20,7 +20,7 @@ def at(context):
 
 
 def rubbing(*sites):
-    return claimed(Claim(EFFECTS["coulomb_friction"], "one", sites), [{"level": 0.1}])
+    return hypothesis_of_claim(Claim(EFFECTS["coulomb_friction"], "one", sites), [{"level": 0.1}])
 
 
 def names_felt(context, at, hypothesis):

@@ -7,8 +7,8 @@ import pytest
 
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.choose_measure import measure_by_force
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
-from analysis.diagnosis.errors.output_error import evaluated, sensitivity
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit, sensitivity
 from analysis.diagnosis.search import short_recordings
 from analysis.diagnosis.search.short_recordings import short_recordings_of
 from equalizer.effects.catalogue import EFFECTS
@@ -18,7 +18,7 @@ LAG = {"time_constant": 0.002}
 
 
 def claim(name, **values):
-    return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
+    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def lagging(arena_of):
 
 
 def error(context, hypothesis):
-    return evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), hypothesis).cost
+    return evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), hypothesis).cost
 
 
 def test_it_holds_one_period_of_each_segment_and_a_run_in(lagging):
@@ -54,7 +54,7 @@ def test_without_a_run_in_the_true_law_would_leave_more_than_noise(lagging, monk
 
 def test_evidence_is_cut_like_the_samples(lagging):
     short = short_recordings_of(lagging, NOTHING)
-    base = evaluated(lagging.measure, lagging.tuning, np.zeros(len(lagging.tuning.names)), NOTHING)
+    base = evaluate_fit(lagging.measure, lagging.tuning, np.zeros(len(lagging.tuning.names)), NOTHING)
     (whole,) = lagging.measure.evidence(lagging.tuning.model, (), base.residuals)
     cut = short.of(whole)
     assert np.array_equal(cut.axis_force, whole.axis_force[short.kept[0]])

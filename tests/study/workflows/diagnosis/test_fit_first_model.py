@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.played_errors import played_error
+from analysis.diagnosis.errors.prediction_error import prediction_error
 from analysis.diagnosis.first_model.choose_structure import first_structure
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -161,8 +161,8 @@ def test_the_file_says_which_way_a_command_is_counted(tmp_path):
     model = read_mechanical_model(done.plan.out)
     assert model.input[0, 0] == -1
     assert any("counted against the motion" in remark for remark in done.remarks)
-    assert played_error(against, model, "test").as_it_is < 0.02
-    assert played_error(plain, model, "test").as_it_is > 1
+    assert prediction_error(against, model, "test").as_it_is < 0.02
+    assert prediction_error(plain, model, "test").as_it_is > 1
 
 
 def test_the_file_is_accepted_for_a_diagnosis(tmp_path):

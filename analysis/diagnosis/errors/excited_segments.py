@@ -1,4 +1,4 @@
-"""The segments that excite one axis: enough to identify its drive, and quick to simulate."""
+"""Selects the segments that excite one axis: enough to identify its drive, and quick to simulate."""
 
 from dataclasses import replace
 
@@ -9,27 +9,27 @@ from analysis.diagnosis.data.observed_parts import part_of
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from equalizer.signals.recording import Segment
 
-SHAKEN = 0.5
-"""Share of the strongest axis's command that the axis must have in a segment."""
+EXCITED_SHARE = 0.5
+"""Command of the axis over the strongest axis's in a segment, at least."""
 LONGEST_S = 6.0
-"""Of a segment."""
+"""Length of a segment that is used, at most."""
 
 
-def shaken_along(measure: FreeSimulation, axis: int) -> FreeSimulation:
-    """Its segments, each from rest; all where there are no segments, or none that is driven along the axis."""
+def select_excited_segments(measure: FreeSimulation, axis: int) -> FreeSimulation:
+    """The measure on the segments that excite an axis, each from rest; unchanged where there are none."""
     parts = tuple(
         _cut(record, segment)
         for record in measure.records
         for segment in record.recording.segments
-        if segment.kind != "rest" and segment.stop <= len(record.command) and _is_shaken(record, segment, axis)
+        if segment.kind != "rest" and segment.stop <= len(record.command) and _is_excited(record, segment, axis)
     )
     kept = tuple(part for part in parts if (part.fit | part.choose).any())
     return replace(measure, records=kept) if kept else measure
 
 
-def _is_shaken(record: Observed, segment: Segment, axis: int) -> bool:
+def _is_excited(record: Observed, segment: Segment, axis: int) -> bool:
     power = np.sum(record.command[segment.start : segment.stop] ** 2, axis=0)
-    return bool(power[axis] >= SHAKEN**2 * power.max() > 0)
+    return bool(power[axis] >= EXCITED_SHARE**2 * power.max() > 0)
 
 
 def _cut(record: Observed, segment: Segment) -> Observed:

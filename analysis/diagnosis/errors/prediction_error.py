@@ -26,20 +26,20 @@ class ChannelRms:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PlayedError:
+class PredictionError:
     """Shares of the signal, root mean square over the channels; None where no number comes out."""
 
     error: str
     """How it was measured."""
     as_it_is: float | None
     with_gain: float | None
-    """With one factor for the prediction of all channels; fitted to what is not tested, or to all where all is."""
+    """The error with one gain factor for all channels, fitted to samples that are not tested, or to all."""
     channels: tuple[ChannelRms, ...]
-    """As it is; none where it is no number."""
+    """Errors by channel, without the gain factor; empty where they are not finite."""
 
 
-def played_error(recording: Recording, model: MechanicalModel, part: Part) -> PlayedError:
-    """model: with its own effects. part: which samples the error is of."""
+def prediction_error(recording: Recording, model: MechanicalModel, part: Part) -> PredictionError:
+    """Error of a finished model on a recording. model: with its own effects. part: which samples count."""
     measure = measure_of((recording,), model).measure
     measured, predicted, tested, fitted = [], [], [], []
     for record, left in zip(measure.records, measure.residuals(model, ()), strict=True):
@@ -51,7 +51,7 @@ def played_error(recording: Recording, model: MechanicalModel, part: Part) -> Pl
     y, f = np.vstack(measured), np.vstack(predicted)
     test, fit = np.concatenate(tested), np.concatenate(fitted)
     gain = _gain(y, f, fit if part == "test" and fit.any() else test)
-    return PlayedError(
+    return PredictionError(
         measure.name,
         _share(y, f, test),
         None if gain is None else _share(y, gain * f, test),

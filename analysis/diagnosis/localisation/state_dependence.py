@@ -1,4 +1,4 @@
-"""Which states a mismatch depends on, for the missing force along each axis or a sensor's error."""
+"""Tests which states a mismatch depends on, for the missing force along each axis or a sensor's error."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,14 +20,14 @@ from equalizer.signals.unit_system import UnitSystem
 
 _SEED = 20
 _DRIVEN = 0.02
-"""Of the loudest segment's rms, from which on an axis counts as driven."""
+"""Rms of an axis's command over the loudest segment's, from which on it counts as driven."""
 
 
-def tied_forces(
+def force_states(
     evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], system: UnitSystem
 ) -> tuple[StateMismatch, ...]:
-    """Of the missing force along each driven axis that has a cell beyond noise. p-values are corrected for all regions
-    that were looked at."""
+    """State dependences of the missing force along each driven axis with a cell beyond noise. p-values are corrected
+    for all regions tested."""
     found = []
     for k, channel in enumerate(recording.command.channels):
         mine = [cell for cell in cells if cell.beyond_noise and channel in cell.input.split("+")]
@@ -47,13 +47,13 @@ def tied_forces(
         worst = max(mine, key=lambda cell: cell.in_noise)
         seen = state_regions(Disturbance(evidence.axis_force[:, k], strata, command), states, _SEED)
         found.append([StateMismatch(worst.output, channel, _band(mine), region) for region in seen])
-    return _corrected(found, looked_at=6)
+    return _correct_p_values(found, looked_at=6)
 
 
-def tied_errors(
+def error_states(
     evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], channels: Sequence[str]
 ) -> tuple[StateMismatch, ...]:
-    """Of the error of each response channel among `channels` that has a cell beyond noise."""
+    """State dependences of the error of each response channel among `channels` with a cell beyond noise."""
     found = []
     for k, channel in enumerate(recording.response.channels):
         own = recording.response.quantities[k]
@@ -71,11 +71,11 @@ def tied_errors(
         )
         seen = state_regions(Disturbance(reading - evidence.predicted[:, k], strata, reading), states, _SEED)
         found.append([StateMismatch(channel, inputs, _band(mine), region) for region in seen])
-    return _corrected(found, looked_at=2)
+    return _correct_p_values(found, looked_at=2)
 
 
-def _corrected(found: Sequence[Sequence[StateMismatch]], looked_at: int) -> tuple[StateMismatch, ...]:
-    """Bonferroni, over all axes or channels and the regions of each."""
+def _correct_p_values(found: Sequence[Sequence[StateMismatch]], looked_at: int) -> tuple[StateMismatch, ...]:
+    """Bonferroni correction over all axes or channels and the regions of each; only significant ones are kept."""
     tests = looked_at * len(found)
     kept = []
     for group in found:
@@ -84,13 +84,13 @@ def _corrected(found: Sequence[Sequence[StateMismatch]], looked_at: int) -> tupl
             for state in group
         ]
         significant = [
-            state for state in raised if state.region.p_value <= FALSE_DISCOVERY_RATE and _says_something(state.region)
+            state for state in raised if state.region.p_value <= FALSE_DISCOVERY_RATE and _is_informative(state.region)
         ]
         kept += sorted(significant, key=lambda state: -state.region.share)[:STATES_NAMED]
     return tuple(kept)
 
 
-def _says_something(region: StateRegion) -> bool:
+def _is_informative(region: StateRegion) -> bool:
     if region.words.startswith("at middling"):
         return False
     return region.by == "sign" or region.share > STATE_CROWDED * region.occupied

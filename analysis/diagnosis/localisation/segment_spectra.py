@@ -24,8 +24,8 @@ _INTERPOLATED = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DrivenLook:
-    """One segment as one signal answers it. Lines first, channels second."""
+class SegmentSpectrum:
+    """Mean spectrum of one signal in one segment, with its errors. Arrays are (lines, channels)."""
 
     input: str
     """Driven inputs, joined by "+"."""
@@ -33,42 +33,42 @@ class DrivenLook:
     lines: DetectionLines
     frequency_hz: FloatArray
     mean: ComplexArray
-    """Over looks; on silent lines without what the command brings."""
+    """Mean over the periods; on silent lines without the command's own contribution."""
     error: FloatArray
     """Expected |error|² of the mean."""
     spread: FloatArray
-    """|error|² of one look, as seen between looks; the floor's, where there is one look."""
+    """|error|² of one period, from the differences between periods; the floor's where there is one period."""
     floor: FloatArray
-    """|error|² of one look from noise alone."""
-    looks: int
+    """|error|² of one period from noise alone."""
+    count: int
     floor_freedom: FloatArray
     """(channels,)"""
 
 
-def driven_looks(
+def segment_spectra(
     recording: Recording,
     signal: Signal,
     noise: ChannelNoise,
     floor_hz: FloatArray,
     periods: Sequence[tuple[Periods, DetectionLines]],
-) -> list[DrivenLook]:
-    """noise: of the signal, on the lines floor_hz."""
+) -> list[SegmentSpectrum]:
+    """One spectrum per periodic segment. noise: of the signal, on the lines floor_hz."""
     found = []
     for length in dict.fromkeys(period.length for period, _ in periods):
         alike = [(period, lines) for period, lines in periods if period.length == length]
         commands = [period_spectra(recording.command.samples, period).mean(axis=0) for period, _ in alike]
         answers = [period_spectra(signal.samples, period) for period, _ in alike]
         driven = [np.where(lines.driven[:, None], u, 0) for (_, lines), u in zip(alike, commands, strict=True)]
-        linear = _needed(driven, commands, answers)
+        linear = _linear_response(driven, commands, answers)
         lines_hz = alike[0][0].frequency_hz(recording.sample_rate_hz)
-        floor = _on_lines(noise, floor_hz, lines_hz) / length
+        floor = _noise_on_lines(noise, floor_hz, lines_hz) / length
         for (period, lines), command, answer in zip(alike, commands, answers, strict=True):
-            mean, error, spread = _errors(answer, floor, noise.rounding / length)
+            mean, error, spread = _mean_and_errors(answer, floor, noise.rounding / length)
             if linear is not None:
-                brought, doubt = commanded(linear, np.where(lines.driven[:, None], 0, command))
+                brought, doubt = command_contribution(linear, np.where(lines.driven[:, None], 0, command))
                 mean, error = mean - brought, error + doubt
             look = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
-            found.append(DrivenLook(inputs_of(recording, period), period.segment.amplitude, *look))
+            found.append(SegmentSpectrum(inputs_of(recording, period), period.segment.amplitude, *look))
     return found
 
 
@@ -77,12 +77,12 @@ def inputs_of(recording: Recording, periods: Periods) -> str:
     return "+".join(find_driven_inputs(instrument_of(recording)[there].var(axis=0), recording.command.channels))
 
 
-def _on_lines(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatArray) -> FloatArray:
-    """What differs between looks: the density without what repeats of rounding."""
+def _noise_on_lines(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatArray) -> FloatArray:
+    """Density of what differs between periods: the noise without the repeating part of rounding."""
     return np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1) - noise.rounding
 
 
-def _errors(
+def _mean_and_errors(
     answer: ComplexArray, floor: FloatArray, rounding: FloatArray
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     looks = len(answer)
@@ -91,19 +91,19 @@ def _errors(
     return answer.mean(axis=0), larger / looks + rounding, spread
 
 
-def _needed(
+def _linear_response(
     driven: Sequence[ComplexArray], commands: Sequence[ComplexArray], answers: Sequence[ComplexArray]
 ) -> ComplexArray | None:
-    """The linear response at all lines, where commands have anything on silent lines; else None."""
+    """The linear frequency response at all lines; None where the commands are zero on silent lines."""
     clean = all(
         np.abs(whole - lines).max(initial=0.0) <= _CLEAN * np.abs(whole).max(initial=0.0)
         for lines, whole in zip(driven, commands, strict=True)
     )
-    return None if clean else between_lines(line_responses(driven, [answer.mean(axis=0) for answer in answers]))
+    return None if clean else interpolate_response(line_responses(driven, [answer.mean(axis=0) for answer in answers]))
 
 
-# What the command itself brings to the silent lines: where a feedback adds to the excitation, the device's distortion
-# returns through it, and a linear device answers that, too.
+# The command's own contribution on silent lines: under feedback the device's distortion returns through the command,
+# and a linear device responds to that, too.
 def line_responses(commands: Sequence[ComplexArray], responses: Sequence[ComplexArray]) -> ComplexArray:
     """(lines, outputs, inputs): the linear response at lines where the experiments drive every direction; NaN
     elsewhere. commands: each (lines, inputs), zero where not driven; responses: each (lines, outputs)."""
@@ -117,8 +117,8 @@ def line_responses(commands: Sequence[ComplexArray], responses: Sequence[Complex
     return found
 
 
-def between_lines(response: ComplexArray) -> ComplexArray | None:
-    """The same at all lines, from the nearest known ones; None where there are none. response: (lines, ...)"""
+def interpolate_response(response: ComplexArray) -> ComplexArray | None:
+    """The response at all lines, interpolated between known ones; None with fewer than two. response: (lines, ...)"""
     known = np.flatnonzero(np.isfinite(response).all(axis=(1, 2)))
     if len(known) < 2:
         return None
@@ -129,7 +129,7 @@ def between_lines(response: ComplexArray) -> ComplexArray | None:
     return np.asarray((np.array(real) + 1j * np.array(imaginary)).T.reshape(response.shape), dtype=np.complex128)
 
 
-def commanded(response: ComplexArray, command: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-    """What the command's lines bring, and the variance of its error: both (lines, outputs)."""
+def command_contribution(response: ComplexArray, command: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """Linear response to the command's lines, and the variance of its error: both (lines, outputs)."""
     brought = np.einsum("lij,lj->li", response, command)
     return brought, _INTERPOLATED**2 * np.abs(brought) ** 2
