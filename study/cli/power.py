@@ -4,13 +4,17 @@ import json
 import re
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from study.cli.results import JsonOption
 from study.cli.seed import check_seed
 from study.errors import WrongUseError
+
+if TYPE_CHECKING:
+    from analysis.psychophysics.power.simulated_study import Crowd
+    from protocols.definition.study_protocol import StudyProtocol
 
 
 def power(
@@ -22,38 +26,50 @@ def power(
     threshold_n: Annotated[float, typer.Option(min=0.01, max=100, help="Median threshold at the others, in N.")] = 0.7,
     studies: Annotated[int, typer.Option(min=10, max=100_000, help="Simulated studies of each size.")] = 200,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Of a dask scheduler, instead of --workers."),
+    ] = None,
     protocol: Annotated[str, typer.Option(help="Protocol with staircase and frequencies.")] = "direction_threshold",
     out: Annotated[Path, typer.Option(help="Folder of the results; a broken run goes on there.")] = Path("power"),
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of all draws.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate whole studies and count how often each analysis finds the difference. Run again, it goes on."""
-    from analysis.psychophysics.power.simulated_study import Crowd
     from study.cli.progress import bar
     from study.store.formats.protocol_files import read_study_protocol
+    from study.workflows.cluster import cluster_workers
     from study.workflows.planning.simulate_power import PowerPlan, power_lines, simulate_power
     from study.workflows.worker_processes import worker_processes
 
     chosen = read_study_protocol(protocol, Path()).protocol
-    frequencies = tuple(sorted(chosen.stimulus.frequencies_hz))
-    if len(frequencies) < 2:
-        raise WrongUseError(
-            "There is nothing to compare",
-            f"{chosen.name} plays fewer than two frequencies.",
-            "Choose a protocol with two or more in stimulus.frequencies_hz.",
-        )
-    raised_n = threshold_n * 10.0 ** (effect_db / 20.0)
-    crowd = Crowd(frequencies, (*[threshold_n] * (len(frequencies) - 1), raised_n))
+    crowd = _crowd(chosen, threshold_n, effect_db)
     sizes = sample_sizes(subjects)
     plan = PowerPlan(crowd, chosen.staircase, sizes, studies, seed)
     title = f"{studies} studies of each of {len(sizes)} sizes"
-    with worker_processes(workers) as pool, bar(title, total=studies * len(sizes)) as advance:
+    executor = worker_processes(workers) if scheduler is None else cluster_workers(scheduler)
+    with executor as pool, bar(title, total=studies * len(sizes)) as advance:
         points = simulate_power(plan, out, pool, advance)
     if as_json:
         typer.echo(json.dumps([asdict(point) for point in points], indent=2))
         return
     for line in power_lines(points):
         typer.echo(line)
+
+
+def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":
+    """People whose median threshold is the same at all frequencies but the highest."""
+    from analysis.psychophysics.power.simulated_study import Crowd
+
+    frequencies_hz = tuple(sorted(protocol.stimulus.frequencies_hz))
+    if len(frequencies_hz) < 2:
+        raise WrongUseError(
+            "There is nothing to compare",
+            f"{protocol.name} plays fewer than two frequencies.",
+            "Choose a protocol with two or more in stimulus.frequencies_hz.",
+        )
+    raised_n = threshold_n * 10.0 ** (effect_db / 20.0)
+    return Crowd(frequencies_hz, (*[threshold_n] * (len(frequencies_hz) - 1), raised_n))
 
 
 def sample_sizes(text: str) -> tuple[int, ...]:

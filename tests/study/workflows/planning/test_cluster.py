@@ -1,0 +1,99 @@
+"""A dask scheduler with two workers on this computer: the same numbers, also where a worker dies."""
+
+import os
+import signal
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import pytest
+
+from protocols.definition.staircase_rule import StaircaseRule, StepPhase
+from study.cli.main import main
+from study.errors import StudyError
+from study.workflows import cluster
+from study.workflows.cluster import cluster_workers
+from study.workflows.planning.simulate_power import PowerPlan, simulate_power
+
+pytestmark = pytest.mark.real_time
+distributed = pytest.importorskip("distributed")
+
+RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
+
+
+@pytest.fixture(scope="module")
+def plan():
+    from analysis.psychophysics.power.simulated_study import Crowd
+
+    return PowerPlan(Crowd((5.0, 45.0), (0.7, 1.4)), RULE, (3, 5), 30, 3)
+
+
+@pytest.fixture(scope="module")
+def local():
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0"
+    ) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def here(plan, tmp_path_factory):
+    with ThreadPoolExecutor(1) as pool:
+        return simulate_power(plan, tmp_path_factory.mktemp("here") / "power", pool, lambda _: None)
+
+
+@pytest.mark.timeout(300)
+def test_a_cluster_gives_the_same_numbers_to_the_bit(plan, local, here, tmp_path):
+    finished = []
+    with cluster_workers(local.scheduler_address) as pool:
+        assert simulate_power(plan, tmp_path / "power", pool, finished.append) == here
+    assert finished[-1] == 60
+
+
+@pytest.mark.timeout(300)
+def test_a_worker_that_dies_loses_no_study(plan, local, here, tmp_path):
+    killed = []
+
+    def kill(finished):
+        if finished and not killed:
+            killed.append(next(iter(local.workers.values())).pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    with cluster_workers(local.scheduler_address) as pool:
+        assert simulate_power(plan, tmp_path / "power", pool, kill) == here
+    assert killed
+
+
+@pytest.mark.timeout(300)
+def test_workers_of_another_version_are_refused(plan, local, monkeypatch):
+    monkeypatch.setattr(cluster, "version", lambda _: "0.0.0")  # of this process: workers import their own
+    with pytest.raises(StudyError, match="same version"), cluster_workers(local.scheduler_address):
+        pass
+
+
+@pytest.mark.timeout(120)
+def test_a_scheduler_without_workers_is_refused():
+    alone = distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0")
+    with alone, pytest.raises(StudyError, match="has no workers"), cluster_workers(alone.scheduler_address):
+        pass
+
+
+def test_no_scheduler_is_said_and_nothing_is_begun(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(cluster, "PATIENCE_S", 1.0)
+    code = main(["power", "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "power"), "--subjects", "5"])
+    assert code == 1
+    assert "The scheduler does not answer" in capsys.readouterr().err
+    assert not (tmp_path / "power").exists()
+
+
+def test_without_the_package_it_is_said_what_to_install(monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(StudyError, match=r"hapteq\[cluster\]"), cluster_workers("tcp://127.0.0.1:9"):
+        pass
+
+
+def test_the_numbers_depend_on_the_seed(plan, here, tmp_path):
+    with ThreadPoolExecutor(1) as pool:
+        other = simulate_power(replace(plan, seed=4), tmp_path / "power", pool, lambda _: None)
+    assert other != here
