@@ -18,6 +18,7 @@ import typer
 
 from study.cli import (
     analyze,
+    contact,
     diagnose,
     doctor,
     effect,
@@ -118,6 +119,9 @@ app.command("identify", short_help="Fit a stable state-space model to a band, an
     identify.identify
 )
 app.command("equalize", short_help="Turn wanted accelerations into forces", rich_help_panel="Device")(equalize.equalize)
+app.command("contact", short_help="A transient at a contact, turned to its normal, played", rich_help_panel="Device")(
+    contact.contact
+)
 app.command(
     "export-controller", short_help="A model's controller as C11, for loops of your own", rich_help_panel="Device"
 )(export_controller.export_controller)

@@ -32,7 +32,9 @@ class TableKind:
 
 TRAJECTORY = TableKind("trajectory", ("time_s", "ax", "ay", "az"), "acceleration", "m/s^2")
 FORCES = TableKind("forces", ("time_s", "fx", "fy", "fz"), "force", "N")
-TABLE_KINDS = (TRAJECTORY, FORCES)
+TRANSIENT = TableKind("transient", ("time_s", "a"), "acceleration", "m/s^2")
+"""Acceleration along one direction, which is decided when it is played."""
+TABLE_KINDS = (TRAJECTORY, FORCES, TRANSIENT)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,13 +42,15 @@ class Trajectory:
     """Samples at a constant rate. What happens before the first and after the last is not part of it."""
 
     signal: Signal
-    """(n, 3): acceleration (m/s²) wanted, or force (N) commanded."""
+    """(n, 3): acceleration (m/s²) wanted, or force (N) commanded; (n, 1) for a transient."""
     start_s: float = 0.0
     """Time of the first row, so that forces can keep the times of what they play."""
 
     @property
     def kind(self) -> TableKind:
-        return FORCES if self.signal.quantity == FORCES.quantity else TRAJECTORY
+        if self.signal.quantity == FORCES.quantity:
+            return FORCES
+        return TRANSIENT if self.signal.channels == TRANSIENT.header[1:] else TRAJECTORY
 
     def __post_init__(self) -> None:
         kind = self.kind

@@ -7,9 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.band_part import band_part
-from equalizer.tracking.feedforward.trajectory import FORCES
 from equalizer.tracking.learning.iteration import IterationState, Repetition, Verdict, begin, next_forces, noise_of_rest
 from equalizer.tracking.learning.model_inverse import under_spring
 from equalizer.tracking.lqr.padding import CAUSAL
@@ -19,6 +17,7 @@ from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
 from study.store.formats.repeats_file import repeats_path
+from study.workflows.equalizer.play_forces import measured_acceleration, play_forces
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, make_result, write_repeated
 
 REST_S = 2.0
@@ -82,13 +81,14 @@ def _play_all(
     on_progress: OnProgress,
 ) -> None:
     begun = _start_iteration(plan, device)
-    rest = _usable_response(_play(device, np.zeros((round(REST_S * device.info.sample_rate_hz), 3)), lambda _: None))
+    silence = np.zeros((round(REST_S * device.info.sample_rate_hz), 3))
+    rest = measured_acceleration(play_forces(device, silence, lambda _: None))
     repetition = replace(begun.repetition, noise_floor=noise_of_rest(rest, begun.repetition))
     states.append(replace(begun, repetition=repetition, noise_floor=repetition.noise_floor))
     while states[-1].verdict is Verdict.CONTINUE and len(played) <= plan.repeats:
         number = len(played)
-        last = _play(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
-        measured = _usable_response(last)
+        last = play_forces(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
+        measured = measured_acceleration(last)
         played.append(last)
         states.append(next_forces(states[-1], measured))
 
@@ -125,33 +125,6 @@ def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
         raise _refusal(
             f"{str(error)[:1].upper()}{str(error)[1:]}.", "Make the trajectory smaller, or correct it."
         ) from error
-
-
-def _play(device: Device, forces: FloatArray, on_progress: Callable[[float], None]) -> Played:
-    commands = Signal(forces, device.info.sample_rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
-    return device.play(commands, on_progress)
-
-
-def _usable_response(played: Played) -> FloatArray:
-    """The accelerometer's samples. Raises DeviceError where corrections from them would be wrong."""
-    health = played.health
-    if played.recording is None or health.fault is not Fault.NONE:
-        raise DeviceError("The device let go", f"While repeating: {health.fault.value}.", "Check the device.")
-    spoilt = {
-        "the accelerometer clipped": health.sensor_clipped,
-        "the force was limited": health.stimulus_clipped
-        + health.feedback_clipped
-        + health.total_clipped
-        + health.slew_limited,
-        "ticks were missed": health.missed_ticks,
-    }
-    if found := [f"{what} ({count} samples)" for what, count in spoilt.items() if count]:
-        raise DeviceError(
-            "A play cannot be learnt from",
-            f"In it {' and '.join(found)}: what was measured does not say what the forces do.",
-            "Make the trajectory smaller, or the limits wider if they are meant to be.",
-        )
-    return played.recording.response.samples
 
 
 def _write_best(plan: RepeatPlan, states: list[IterationState], played: list[Played]) -> str:

@@ -1,6 +1,5 @@
 """Forces for a table, corrected on the device: solve by the model, check convergence, play, improve."""
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,7 @@ from equalizer.tracking.learning.iteration import LOWEST_GAIN, Verdict, fitting_
 from equalizer.tracking.learning.model_inverse import under_spring
 from equalizer.tracking.workspace.convergence_at_place import convergence_at
 from equalizer.tracking.workspace.feedforward_at_place import inverse_at
-from study.devices.device import DeviceSettings
 from study.errors import StudyError
-from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
 from study.store.formats.repeats_file import repeats_path
 from study.workflows.equalizer.equalize_trajectory import (
     EqualizedTrajectory,
@@ -27,14 +24,10 @@ from study.workflows.equalizer.equalize_trajectory import (
 )
 from study.workflows.equalizer.equalized_summary import summary, summary_lines
 from study.workflows.equalizer.models_for_playing import ModelsForPlaying
+from study.workflows.equalizer.play_forces import acting_spring, playback_settings, require_device_alone
 from study.workflows.equalizer.repeat_playback import OnProgress, repeat_playback
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, earlier_forces
-from study.workflows.equalizer.spring_beside_model import spring_outside_model
 
-SPRING_HZ = 3.5
-"""As in the shipped recordings, for a model that does not state its spring."""
-SPRING_ROOM_N = 1.5
-HAND_CAP_N = 3.0
 SAFE_SHARE = 0.9
 """Fraction of the largest gain with which every error shrinks."""
 
@@ -68,7 +61,7 @@ def repeat_trajectory(plan: EqualizePlan, order: RepeatOrder, on_progress: OnPro
             "The forces are at the cap already, so that there is no room to correct them.",
             "Scale the accelerations, or leave out --constrain or --repeat.",
         )
-    spring = _acting_spring(solved.models)
+    spring = acting_spring(solved.models)
     tested = convergence_at(solved.models.at, plan.weight, spring)
     gain = _gain(tested)
     repeat_plan = RepeatPlan(
@@ -76,7 +69,7 @@ def repeat_trajectory(plan: EqualizePlan, order: RepeatOrder, on_progress: OnPro
         inverse=inverse_at(solved.models.at, plan.weight),
         band_hz=solved.models.band_hz,
         model_sha256=solved.models.sha256,
-        settings=_settings(plan, solved.models),
+        settings=playback_settings(plan.cap_n, solved.models),
         device=order.device,
         repeats=order.repeats,
         first_gain=gain,
@@ -146,30 +139,7 @@ def _require_repeatable(models: ModelsForPlaying) -> None:
             "Two bands of one place were given, and what is felt of the upper one is no waveform to be corrected.",
             "Give the one model whose band shall be repeated.",
         )
-    if any("held" in model.provenance.get("hand", ()) for model in models.given):
-        raise _refusal(
-            "The model was recorded with a hand on the handle. Repeats learn what one hand did in one play, and play "
-            "it to the next.",
-            "Take a model of the device alone, and leave the handle alone.",
-        )
-
-
-def _acting_spring(models: ModelsForPlaying) -> VirtualSpring:
-    """Spring under which the device is played and which is not in the model."""
-    feedback = _feedback(models)
-    acting = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
-    if not feedback:
-        raise _refusal(
-            "The model does not say under which spring it was recorded, so the spring's share of the forces is not "
-            "known.",
-            "Identify it from recordings that hapteq record made.",
-        )
-    return spring_outside_model(models.nearest, acting)
-
-
-def _feedback(models: ModelsForPlaying) -> dict[str, Any]:
-    found = models.nearest.provenance.get("feedback")
-    return found if isinstance(found, dict) else {}
+    require_device_alone(models)
 
 
 def _gain(tested: Convergence | None) -> float:
@@ -183,29 +153,6 @@ def _gain(tested: Convergence | None) -> float:
             "Record and identify at the place itself, or with more sweeps.",
         )
     return gain
-
-
-def _settings(plan: EqualizePlan, models: ModelsForPlaying) -> DeviceSettings:
-    """Device settings: the spring of the recordings; slew limit for the upper end of the band at the cap."""
-    feedback = _feedback(models)
-    steepest = 2 * math.pi * models.band_hz[1] * plan.cap_n
-    return DeviceSettings(
-        limits=Limits(
-            stimulus_cap_n=plan.cap_n,
-            total_cap_n=plan.cap_n + SPRING_ROOM_N,
-            slew_n_per_s=2 * steepest + SPRING_SLEW_N_PER_S,
-            longest_hold_s=600.0,
-            watchdog_s=0.5,
-            release_s=0.05,
-            feedback_cap_n=plan.cap_n + SPRING_ROOM_N,  # no hand is there; beyond its cap the spring stretches further
-        ),
-        spring_frequency_hz=float(feedback.get("natural_frequency_hz", SPRING_HZ)),
-        spring_damping_n_s_per_m=float(feedback.get("damping_n_s_per_m", 0.0)),
-        keep_s=1.0,
-        hand_on_handle=False,
-        place_m=models.at.place_m,
-        beyond_hand_ceiling=plan.cap_n > HAND_CAP_N,
-    )
 
 
 def _first(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring) -> FloatArray | None:

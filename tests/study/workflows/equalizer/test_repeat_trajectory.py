@@ -6,25 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
-from equalizer.identification.state_space.identify import identify
-from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.trajectory import Trajectory
-from protocols.definition.apparatus import SafetySettings
-from protocols.definition.recording_protocol import RecordingProtocol
-from protocols.definition.recording_segments import SweepSegment
 from study.errors import DeviceError, LeftError, StudyError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.formats.mechanical_model_file import write_mechanical_model
-from study.store.formats.recording_file import read_recording
 from study.store.formats.repeats_file import read_repeats, repeats_path
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan
 from study.workflows.equalizer.repeat_trajectory import RepeatOrder, repeat_lines, repeat_summary, repeat_trajectory
-from study.workflows.recording.record_device import RecordingPlan, record_device
 
 BAND_HZ = (5.0, 35.0)
 ORDER = RepeatOrder(repeats=4, device="simulated")
@@ -42,19 +34,9 @@ def table(level=1.8, rows=2000) -> Trajectory:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory, lab_model) -> Path:
     folder = tmp_path_factory.mktemp("repeat")
-    sweeps = tuple(SweepSegment("sweep", 4.5, 37.0, 2.0, axis, duration_s=15.0, periods=2) for axis in ("x", "y", "z"))
-    safety = SafetySettings(stimulus_cap_n=3.0, total_cap_n=4.5)
-    protocol = RecordingProtocol(
-        name="band", kind="recording", title="Band", segments=sweeps, safety=safety, rest_s=0.5
-    )
-    record_device(RecordingPlan(protocol, "simulated", (0.0, 0.0, 0.0), 3, folder / "band.h5"), lambda _: None)
-    recording = read_recording(folder / "band.h5")
-    settings = IdentificationSettings(draws=3, longer_horizons=(0,), record_horizons=())
-    model = identify(transfer_estimate([recording]), settings).model
-    facts = {"input": "command", "feedback": recording.meta["feedback"], "hand": ["none"], "amplitude_n": 2.0}
-    write_identified_model(folder / "model.h5", replace(model, place_m=(0.0, 0.0, 0.0), provenance=facts))
+    write_identified_model(folder / "model.h5", lab_model)
     write_trajectory(folder / "wanted.csv", table())
     return folder
 

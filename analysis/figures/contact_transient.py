@@ -1,0 +1,48 @@
+"""A transient at a contact: what was wanted, what came along the normal and across it, and the forces that did it."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, new_figure, plain_axes
+from equalizer.signals.signal import FloatArray
+
+Play = tuple[str, FloatArray, FloatArray]
+"""Name, forces (N, 3) in N, and measured acceleration (N, 3) in m/s^2."""
+
+
+def contact_picture(normal: FloatArray, sample_rate_hz: float, wanted: FloatArray, *plays: Play) -> Picture:
+    """normal: (3,), of length 1. wanted: (N, 3), m/s^2."""
+    words = ", ".join(f"{part:.2g}" for part in normal)
+    return Picture(
+        name="contact",
+        title=f"A transient along the normal ({words})",
+        caption="Columns: ways to play it. Above: acceleration along the normal, wanted (grey) and measured. Middle: "
+        "length of what was measured across the normal, which nothing wants. Below: the forces.",
+        figure=_draw(normal, sample_rate_hz, wanted, plays),
+        alternative="Acceleration along and across the normal, and forces, over time, for "
+        + " and ".join(name for name, _, _ in plays),
+    )
+
+
+def _draw(normal: FloatArray, rate_hz: float, wanted: FloatArray, plays: tuple[Play, ...]) -> Figure:
+    figure = new_figure(4.3 * len(plays), 5.6)
+    grid = figure.subplots(3, len(plays), sharex=True, sharey="row", squeeze=False)
+    time_ms = 1000 * np.arange(len(wanted)) / rate_hz
+    for column, (name, forces, measured) in zip(grid.T, plays, strict=True):
+        along = measured @ normal
+        across = np.linalg.norm(measured - np.outer(along, normal), axis=1)
+        column[0].plot(time_ms, wanted @ normal, color=GREY, linewidth=2.2, label="wanted")
+        column[0].plot(time_ms, along, color=BLUE, linewidth=1.0, label="measured")
+        column[1].plot(time_ms, across, color=VERMILLION, linewidth=1.0)
+        for each, axis, colour in zip(forces.T, "xyz", (BLUE, VERMILLION, GREEN), strict=True):
+            column[2].plot(time_ms, each, color=colour, linewidth=1.0, label=f"f{axis}")
+        column[0].set_title(name, fontsize=10)
+        column[2].set_xlabel("Time after the contact (ms)")
+        for axes in column:
+            plain_axes(axes)
+    for axes, label in zip(grid[:, 0], ("Along (m/s²)", "Across (m/s²)", "Force (N)"), strict=True):
+        axes.set_ylabel(label, fontsize=9)
+    for axes in (grid[0, 0], grid[2, 0]):
+        axes.legend(fontsize=8, frameon=False)
+    return figure

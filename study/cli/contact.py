@@ -1,0 +1,38 @@
+"""`hapteq contact`: a recorded transient, turned to the normal of a contact, played on the device."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+from study.cli.seed import check_seed
+from study.cli.study import DeviceOption
+
+
+def contact(
+    model: Annotated[Path, typer.Argument(metavar="MODEL.h5", help="Of the device alone, from hapteq identify.")],
+    transient: Annotated[
+        Path, typer.Argument(metavar="TRANSIENT.csv", help="time_s,a: acceleration from the contact on, m/s^2.")
+    ],
+    normal: Annotated[tuple[float, float, float], typer.Option(help="Of the surface that is touched: x y z.")],
+    out: Annotated[Path, typer.Option(help="Folder to write; it must not be there yet, or be empty.")],
+    device: DeviceOption = "simulated",
+    scale: Annotated[float, typer.Option(min=1e-6, max=1e6, help="Factor on the recording.")] = 1.0,
+    weight: Annotated[float, typer.Option(min=0.0, help="Weight of |force|² against |error|², (m/s² per N)².")] = 1e-3,
+    cap: Annotated[float, typer.Option(min=0.001, help="Highest force, in newtons.")] = 3.0,
+    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Play a transient that begins when a contact is felt: nothing may act before it. No person may hold the handle.
+
+    Writes forces.csv, wanted.csv, measured.csv, contact.json and a picture beside the same as a force with one gain.
+    """
+    from study.cli.progress import late_bar
+    from study.workflows.equalizer.play_contact import ContactPlan, contact_lines, contact_summary, play_contact
+
+    plan = ContactPlan(model, transient, normal, out, device, scale, weight, cap, seed)
+    with late_bar("Plays (%)", total=100) as show:
+        done = play_contact(plan, lambda share: show(round(100 * share)))
+    typer.echo(json.dumps(contact_summary(done), indent=2) if as_json else "\n".join((str(out), *contact_lines(done))))

@@ -1,0 +1,281 @@
+"""A recorded transient, turned to the normal of a contact, played on the device: `hapteq contact`.
+
+All that depends on the recording is computed before the contact: three solutions of the causal tracking problem, one
+per axis. At the contact the normal is known, and the forces are their combination. Beside them the recording is played
+as a force along the normal with one gain, as it would be without a model.
+"""
+
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.baselines import static_gain
+from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY, TRANSIENT, Trajectory, require_rate
+from equalizer.tracking.learning.model_inverse import under_spring
+from equalizer.tracking.lqr.contact import CausalStart, causal_start
+from equalizer.tracking.lqr.limits import ForceLimitError, require_within
+from equalizer.tracking.lqr.padding import Padding, band_error
+from equalizer.tracking.lqr.tracking_problem import TrackingWeights, augmented
+from study.devices.clock import RealClock, VirtualClock
+from study.devices.device import Device, DeviceSettings
+from study.devices.opening import needs_real_time, open_device
+from study.errors import StudyError, WrongUseError
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
+from study.store.disk.json_document import write_json
+from study.store.disk.new_folder import new_folder, require_new_folder
+from study.store.disk.provenance import gather_provenance
+from study.store.formats.trajectory_file import read_trajectory, write_trajectory
+from study.workflows.equalizer.models_for_playing import ModelsForPlaying, Vector, models_for_playing
+from study.workflows.equalizer.play_forces import (
+    acting_spring,
+    measured_acceleration,
+    play_forces,
+    playback_settings,
+    require_device_alone,
+)
+
+GAIN_LINES = 100
+"""Of the band, over which the one gain of the comparison is right in the mean."""
+REST = Padding(after_s=0.5)
+"""Played after the recording, to come to rest."""
+FADE_S = 0.2
+"""At its end: what a solution with a free end does in its last ticks serves nothing, and would end with a step."""
+SETTLE_S = 1.0
+"""Between two plays, and before the first."""
+
+
+@dataclass(frozen=True, slots=True)
+class ContactPlan:
+    model: Path
+    transient: Path
+    normal: Vector
+    """Of any length above zero."""
+    out: Path
+    device: str = "simulated"
+    scale: float = 1.0
+    """Of the recording."""
+    weight: float = 1e-3
+    cap_n: float = 3.0
+    seed: int = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Played:
+    """One way to play the transient."""
+
+    forces: FloatArray
+    """(N, 3), N, as they go to the device."""
+    measured: FloatArray
+    """(N, 3), m/s^2: the part in the model's band."""
+    error: float
+    """Relative, in the band, as measured; noise included."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactPlay:
+    plan: ContactPlan
+    normal: FloatArray
+    """(3,), of length 1."""
+    sample_rate_hz: float
+    band_hz: tuple[float, float]
+    wanted: FloatArray
+    """(N, 3), m/s^2: the part in the model's band, with the time to come to rest."""
+    start: CausalStart
+    equalized: Played
+    plain: Played
+    """The recording as a force along the normal, with one gain."""
+
+
+def play_contact(plan: ContactPlan, on_progress: Callable[[float], None]) -> ContactPlay:
+    """Reads, solves, plays and writes. on_progress: told the share that is played. Raises StudyError, before anything
+    moves for what cannot be played; nothing is written then."""
+    require_new_folder(plan.out)
+    normal = _unit(plan.normal)
+    transient = _transient(plan)
+    models = models_for_playing((plan.model,), None, plan.weight)
+    require_device_alone(models)
+    model, rate_hz = models.nearest, models.nearest.sample_rate_hz
+    try:
+        require_rate(transient, rate_hz)
+        recording = plan.scale * transient.signal.samples[:, 0]
+        start = causal_start(augmented(model, TrackingWeights(plan.weight)), recording, REST)
+    except ValueError as problem:
+        raise _refused(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
+    wanted = _along(recording, normal, len(start.basis.forces(normal)))
+    forces = (
+        _within_cap(_faded(_beside_spring(start.basis.forces(normal), wanted, models), rate_hz), plan, rate_hz),
+        _within_cap(_plain_forces(model, wanted), plan, rate_hz),
+    )
+    measured = _play_both(plan, models, forces, on_progress)
+    in_band = band_part(wanted, rate_hz, models.band_hz)
+    equalized, plain = (
+        Played(sent, band_part(came, rate_hz, models.band_hz), band_error(wanted, came, rate_hz, models.band_hz))
+        for sent, came in zip(forces, measured, strict=True)
+    )
+    done = ContactPlay(plan, normal, rate_hz, models.band_hz, in_band, start, equalized, plain)
+    _write(done, models)
+    return done
+
+
+def _unit(normal: Vector) -> FloatArray:
+    length = float(np.linalg.norm(normal))
+    if not (np.isfinite(length) and length > 0):
+        raise WrongUseError(
+            "This is no normal", f"--normal is {' '.join(f'{part:g}' for part in normal)}.", "Such as --normal 0 0 1."
+        )
+    return np.asarray(normal, dtype=np.float64) / length
+
+
+def _transient(plan: ContactPlan) -> Trajectory:
+    found = read_trajectory(plan.transient)
+    if found.kind is not TRANSIENT:
+        raise WrongUseError(
+            "This is no table of a transient",
+            f"{plan.transient.name} holds {found.kind.name}; its header must be {','.join(TRANSIENT.header)}.",
+            "Give the recorded acceleration along the normal, in m/s^2, from the moment of contact on.",
+            saved="Nothing moved.",
+        )
+    return found
+
+
+def _along(recording: FloatArray, normal: FloatArray, rows: int) -> FloatArray:
+    return np.outer(np.pad(recording, (0, rows - len(recording))), normal)
+
+
+def _beside_spring(forces: FloatArray, wanted: FloatArray, models: ModelsForPlaying) -> FloatArray:
+    """Commands that leave to the spring what it does along the wanted motion."""
+    commands = under_spring(lambda _: forces, acting_spring(models), models.nearest.sample_rate_hz, models.band_hz)
+    return commands(wanted)
+
+
+def _faded(forces: FloatArray, rate_hz: float) -> FloatArray:
+    left_s = np.arange(len(forces))[::-1] / rate_hz
+    share = np.clip(left_s / FADE_S, 0.0, 1.0)
+    return np.asarray(forces * (0.5 - 0.5 * np.cos(np.pi * share))[:, np.newaxis])
+
+
+def _plain_forces(model: IdentifiedModel, wanted: FloatArray) -> FloatArray:
+    lines_hz = np.geomspace(*model.band_hz, GAIN_LINES)
+    return np.asarray(static_gain(model, lines_hz).response[0, 0, 0].real * wanted)
+
+
+def _within_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatArray:
+    try:
+        require_within(forces, plan.cap_n, rate_hz)
+    except ForceLimitError as limit:
+        fits = np.floor(1e3 * plan.scale * limit.peaks.largest_scale) / 1e3
+        raise _refused(
+            f"The forces would reach {limit.peaks.peak_n:.3g} N, above the cap of {plan.cap_n:g} N.",
+            f"Give --scale {fits:g} or less, or raise --cap for a device that no hand holds.",
+        ) from limit
+    return forces
+
+
+def _play_both(
+    plan: ContactPlan,
+    models: ModelsForPlaying,
+    forces: tuple[FloatArray, FloatArray],
+    on_progress: Callable[[float], None],
+) -> list[FloatArray]:
+    """(N, 3) each, measured."""
+    clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
+    settings = _settings(plan, models, forces)
+    measured: list[FloatArray] = []
+
+    def advance(share: float) -> None:
+        on_progress((len(measured) + share) / len(forces))
+
+    with contextlib.closing(open_device(plan.device, settings, clock, plan.seed)) as device:
+        if device.info.sample_rate_hz != models.nearest.sample_rate_hz:
+            raise _refused(
+                f"The model is at {models.nearest.sample_rate_hz:g} Hz, the device runs at "
+                f"{device.info.sample_rate_hz:g} Hz.",
+                "Identify a model from recordings of this device.",
+            )
+        for each in forces:
+            measured.append(_play(device, each, advance))
+    return measured
+
+
+def _settings(plan: ContactPlan, models: ModelsForPlaying, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
+    """A force that begins with the contact begins with a step."""
+    settings, rate_hz = playback_settings(plan.cap_n, models), models.nearest.sample_rate_hz
+    steps = [np.linalg.norm(np.diff(each, axis=0, prepend=0, append=0), axis=1).max() for each in forces]
+    slew_n_per_s = max(settings.limits.slew_n_per_s, float(max(steps)) * rate_hz + SPRING_SLEW_N_PER_S)
+    return replace(settings, limits=replace(settings.limits, slew_n_per_s=slew_n_per_s))
+
+
+def _play(device: Device, forces: FloatArray, on_share: Callable[[float], None]) -> FloatArray:
+    """(N, 3), m/s^2, of the rows of the forces."""
+    settle = round(SETTLE_S * device.info.sample_rate_hz)
+    padded = np.pad(forces, ((settle, settle), (0, 0)))
+    return measured_acceleration(play_forces(device, padded, on_share))[settle : settle + len(forces)]
+
+
+def _write(done: ContactPlay, models: ModelsForPlaying) -> None:
+    from analysis.figures.contact_transient import contact_picture
+    from study.workflows.picture_files import write_pictures
+
+    rate_hz = done.sample_rate_hz
+    with new_folder(done.plan.out) as folder:
+        for name, samples, kind in (
+            ("forces.csv", done.equalized.forces, FORCES),
+            ("wanted.csv", done.wanted, TRAJECTORY),
+            ("measured.csv", done.equalized.measured, TRAJECTORY),
+        ):
+            signal = Signal(samples, rate_hz, kind.quantity, kind.unit, kind.header[1:])
+            write_trajectory(folder / name, Trajectory(signal))
+        write_pictures(folder, [contact_picture(done.normal, rate_hz, done.wanted, *_plays(done))])
+        provenance = gather_provenance(seeds={"device": done.plan.seed}).as_dict()
+        document = {**contact_summary(done), "model_sha256": models.sha256, "provenance": provenance}
+        write_json(folder / "contact.json", "hapteq-contact", 1, document, overwrite=False)
+
+
+def _plays(done: ContactPlay) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
+    return (
+        ("through the model", done.equalized.forces, done.equalized.measured),
+        ("one gain", done.plain.forces, done.plain.measured),
+    )
+
+
+def contact_summary(done: ContactPlay) -> dict[str, Any]:
+    return {
+        "out": str(done.plan.out),
+        "normal": done.normal.tolist(),
+        "band_hz": list(done.band_hz),
+        "predicted_error": done.start.error(done.normal),
+        "early_error": done.start.early_error(done.normal),
+        "worst_error": done.start.worst_error,
+        "measured_error": done.equalized.error,
+        "plain_error": done.plain.error,
+        "peak_n": float(np.linalg.norm(done.equalized.forces, axis=1).max()),
+    }
+
+
+def contact_lines(done: ContactPlay) -> tuple[str, ...]:
+    """For the terminal."""
+    found = contact_summary(done)
+    low, high = done.band_hz
+    return (
+        f"By the model: error {_percent(found['predicted_error'])} between {low:g} and {high:g} Hz, "
+        f"{_percent(found['worst_error'])} at most for any normal; {_percent(found['early_error'])} if forces might "
+        "begin before the contact.",
+        f"As measured: error {_percent(found['measured_error'])}; as a force along the normal with one gain "
+        f"{_percent(found['plain_error'])}.",
+        f"The highest force is {found['peak_n']:.3g} N.",
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %"
+
+
+def _refused(happened: str, do_now: str) -> StudyError:
+    return StudyError("The transient was not played", happened, do_now, saved="Nothing moved.")

@@ -1,0 +1,101 @@
+"""Forces played on a device that no person holds: under which spring and limits, and what the accelerometer says."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.feedforward.trajectory import FORCES
+from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
+from study.devices.device import Device, DeviceSettings, Fault, Played
+from study.errors import DeviceError, StudyError
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
+from study.workflows.equalizer.models_for_playing import ModelsForPlaying
+from study.workflows.equalizer.spring_beside_model import spring_outside_model
+
+SPRING_HZ = 3.5
+"""As in the shipped recordings, for a model that does not say under which spring it was recorded."""
+SPRING_ROOM_N = 1.5
+HAND_CAP_N = 3.0
+
+
+def require_device_alone(models: ModelsForPlaying) -> None:
+    """Raises StudyError for a model that holds a hand."""
+    if any("held" in model.provenance.get("hand", ()) for model in models.given):
+        raise _refused(
+            "The model was recorded with a hand on the handle: its forces are right for that hand in that moment.",
+            "Take a model of the device alone, and leave the handle alone.",
+        )
+
+
+def acting_spring(models: ModelsForPlaying) -> VirtualSpring:
+    """The spring that adds to the commands and is not in the model. Raises StudyError where it is not known."""
+    feedback = _feedback(models)
+    acting = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
+    if not feedback:
+        raise _refused(
+            "The model does not say under which spring it was recorded, so the spring's share of the forces is not "
+            "known.",
+            "Identify it from recordings that hapteq record made.",
+        )
+    return spring_outside_model(models.nearest, acting)
+
+
+def _feedback(models: ModelsForPlaying) -> dict[str, Any]:
+    found = models.nearest.provenance.get("feedback")
+    return found if isinstance(found, dict) else {}
+
+
+def playback_settings(cap_n: float, models: ModelsForPlaying) -> DeviceSettings:
+    """The spring of the recordings; steps up to what forces at the upper end of the band do at the cap."""
+    feedback = _feedback(models)
+    steepest = 2 * math.pi * models.band_hz[1] * cap_n
+    return DeviceSettings(
+        limits=Limits(
+            stimulus_cap_n=cap_n,
+            total_cap_n=cap_n + SPRING_ROOM_N,
+            slew_n_per_s=2 * steepest + SPRING_SLEW_N_PER_S,
+            longest_hold_s=600.0,
+            watchdog_s=0.5,
+            release_s=0.05,
+            feedback_cap_n=cap_n + SPRING_ROOM_N,  # no hand is there; beyond its cap the spring stretches further
+        ),
+        spring_frequency_hz=float(feedback.get("natural_frequency_hz", SPRING_HZ)),
+        spring_damping_n_s_per_m=float(feedback.get("damping_n_s_per_m", 0.0)),
+        keep_s=1.0,
+        hand_on_handle=False,
+        place_m=models.at.place_m,
+        beyond_hand_ceiling=cap_n > HAND_CAP_N,
+    )
+
+
+def play_forces(device: Device, forces: FloatArray, on_progress: Callable[[float], None]) -> Played:
+    """forces: (N, 3), N, at the device's rate. Raises DeviceError."""
+    commands = Signal(forces, device.info.sample_rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
+    return device.play(commands, on_progress)
+
+
+def measured_acceleration(played: Played) -> FloatArray:
+    """(N, 3), m/s²: the accelerometer's own rows. Raises DeviceError where they do not show what the forces do."""
+    health = played.health
+    if played.recording is None or health.fault is not Fault.NONE:
+        raise DeviceError("The device let go", f"While playing: {health.fault.value}.", "Check the device.")
+    spoilt = {
+        "the accelerometer clipped": health.sensor_clipped,
+        "the force was limited": health.stimulus_clipped
+        + health.feedback_clipped
+        + health.total_clipped
+        + health.slew_limited,
+        "ticks were missed": health.missed_ticks,
+    }
+    if found := [f"{what} ({count} samples)" for what, count in spoilt.items() if count]:
+        raise DeviceError(
+            "A play tells nothing about its forces",
+            f"In it {' and '.join(found)}: what was measured does not say what the forces do.",
+            "Make the trajectory smaller, or the limits wider if they are meant to be.",
+        )
+    return played.recording.response.samples
+
+
+def _refused(happened: str, do_now: str) -> StudyError:
+    return StudyError("Nothing was played", happened, do_now, saved="Nothing moved.")
