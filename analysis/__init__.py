@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from analysis.diagnosis.diagnose import DiagnosisSettings as DiagnosisSettings
     from analysis.diagnosis.diagnose_values import diagnose_values as diagnose
-    from analysis.diagnosis.first_model.choose_structure import first_structure as first_structure
+    from analysis.diagnosis.first_model.choose_structure import choose_structure as first_structure
     from analysis.diagnosis.result.findings import Findings as Findings
     from analysis.figures.diagnosis_pictures import diagnosis_pictures as diagnosis_pictures
     from analysis.figures.study_pictures import study_pictures as study_pictures

@@ -6,7 +6,7 @@ from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.search.explain import Explanation, retuned_alone
+from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.search_context import SearchContext
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
@@ -71,5 +71,5 @@ def arena_of(recording: Recording, model: MechanicalModel | None = None) -> tupl
     tuning = tuning_of(given, recording.command.channels)
     context = SearchContext(measure.shorten(), measure, tuning, map)
     before = evaluate_fit(context.measure, tuning, np.zeros(len(tuning.names)), NOTHING)
-    given_, retuned = (context.confirmed(context.candidate(fitted)) for fitted in (before, retuned_alone(context)))
+    given_, retuned = (context.with_test_score(context.candidate(fitted)) for fitted in (before, retune_alone(context)))
     return context, Explanation(given_, retuned, retuned, (), ())

@@ -9,13 +9,13 @@ import numpy as np
 from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.confirm.confirm_laws import (
-    borne_out,
     leaves_open,
-    searched_by_balance,
-    unconfirmed_beside_motion,
+    require_enough_gain,
+    search_by_balance,
+    unname_doubtful_effects,
 )
-from analysis.diagnosis.confirm.fitting_measures import Look, look_of, looks_of
-from analysis.diagnosis.confirm.laws_beside_model import Beside, weighed_beside
+from analysis.diagnosis.confirm.fitting_measures import FittingMeasure, choose_fitting_measure, list_fitting_measures
+from analysis.diagnosis.confirm.laws_beside_model import ResultBesideModel, judge_beside_model
 from analysis.diagnosis.contrast.decide import BEYOND
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.data.observed_parts import names_of_parts
@@ -44,9 +44,9 @@ from analysis.diagnosis.result.state_maps import StateMaps, state_maps
 from analysis.diagnosis.result.unconfirmed import unconfirmed_candidates
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Guard
-from analysis.diagnosis.search.identifiability import identified
-from analysis.diagnosis.search.impacts import rattling
-from analysis.diagnosis.search.search import Searched, searched
+from analysis.diagnosis.search.identifiability import keep_identifiable
+from analysis.diagnosis.search.impacts import explain_impacts
+from analysis.diagnosis.search.search import SearchResult, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import Judgement, judge
@@ -59,7 +59,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
 from equalizer.signals.recording import Recording
 
 BALANCE = "the force balance"
-WEIGHED = ("force_deadband", "force_saturation", "force_nonlinearity")
+TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
 """Laws of the command that a balance has weighed: what it does not name is not there."""
 GAINS = ("force_gain", "sensor_gain")
 """A model that was fitted to the recordings holds them: only against a calibrated one can a gain be wrong."""
@@ -105,27 +105,27 @@ def diagnose(
         progress("weighing laws in the force balance", 0.0)
         known = settings.balances
         balances = known if known is not None else _balances(recordings, settings)
-        for number, look in enumerate(looks_of(recordings, model, balances, settings.compared)):
+        for number, look in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
             progress("fitting the named laws", 0.2 + 0.3 * number)
             context = _search_context(recordings[0], look, settings, map_)
             repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
-            weigh = partial(searched_by_balance, context, balances, repeats)
+            weigh = partial(search_by_balance, context, balances, repeats)
             found = settings.guard.part(BALANCE, "the fit of its laws", weigh, None)
             if found is not None and not (look.narrow and leaves_open(found)):
-                return _assembled(recordings, settings, look, _Seen(found, CleanFloor()), balances)
+                return _assemble(recordings, settings, look, _Result(found, CleanFloor()), balances)
     progress("measuring the noise", 0.3 if balances else 0.0)
-    if settings.clean and (beside := _beside_clean(recordings, model, settings, map_, progress)) is not None:
+    if settings.clean and (beside := _compare_with_clean(recordings, model, settings, map_, progress)) is not None:
         return beside
-    look = look_of(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
+    look = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     seen = _by_search(recordings, look, settings, map_, progress, balances)
     if not settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.9)
-        seen, balances = _weighed(recordings, look, seen, settings)
+        seen, balances = _judge_beside_model(recordings, look, seen, settings)
     progress("writing down what was found", 0.95)
-    return _assembled(recordings, settings, look, seen, balances)
+    return _assemble(recordings, settings, look, seen, balances)
 
 
-def _beside_clean(
+def _compare_with_clean(
     recordings: Sequence[Recording],
     model: MechanicalModel,
     settings: DiagnosisSettings,
@@ -135,26 +135,26 @@ def _beside_clean(
     """None where a given model foresees the clean recordings so well that a fault is told by it, or where repeats say
     that noise is small. What no fault of the comparison explains is looked for with the given model, among effects that
     the comparison cannot undo."""
-    look = Look(model, measure_of(recordings, model))
+    look = FittingMeasure(model, measure_of(recordings, model))
     if not settings.fitted and (noise_is_from_repeats(look.chosen) or foresees(model, settings.clean)):
         return None
     progress("comparing with the clean recordings", 0.1)
     contrast = contrast_of(recordings, settings.clean, frozenset(settings.without), settings.time_left)
     if not settings.fitted and contrast.left_open:
-        unweighed = _by_given_model(recordings, model, settings, contrast.tested_effects, map_, progress)
+        unweighed = _search_beside_clean(recordings, model, settings, contrast.tested_effects, map_, progress)
         if unweighed is not None:
             return unweighed
     context = _search_context(recordings[0], look, settings, map_)
     given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
-    stands = context.confirmed(context.candidate(given))
-    found = Searched(context, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
+    stands = context.with_test_score(context.candidate(given))
+    found = SearchResult(context, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
     progress("writing down what was found", 0.95)
     floor = CleanFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
-    whole = _assembled(recordings, settings, look, _Seen(found, floor), ())
+    whole = _assemble(recordings, settings, look, _Result(found, floor), ())
     return add_contrast(whole, contrast, recordings[0], BEYOND)
 
 
-def _by_given_model(
+def _search_beside_clean(
     recordings: Sequence[Recording],
     model: MechanicalModel,
     settings: DiagnosisSettings,
@@ -164,18 +164,18 @@ def _by_given_model(
 ) -> Findings | None:
     """weighed: effects that a comparison weighed, and did not find. None where the search beside clean recordings names
     nothing else, or cannot be done."""
-    look = look_of(recordings, model, settings.clean, settings.compared)
+    look = choose_fitting_measure(recordings, model, settings.clean, settings.compared)
     rest = replace(settings, without=(*settings.without, *weighed))
     try:
         seen = _by_search(recordings, look, rest, map_, progress, ())
     except (NothingLearned, np.linalg.LinAlgError):
         return None
     context = seen.searched.context
-    found = identified(context, seen.searched.found, settings.time_left)
-    searched = borne_out(replace(seen.searched, found=found, errors=None), False)
+    found = keep_identifiable(context, seen.searched.found, settings.time_left)
+    searched = require_enough_gain(replace(seen.searched, found=found, errors=None), False)
     if not (searched.judged.named and searched.found.steps):
         return None
-    return _assembled(recordings, settings, look, replace(seen, searched=searched), ())
+    return _assemble(recordings, settings, look, replace(seen, searched=searched), ())
 
 
 def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings) -> tuple[Balance, ...]:
@@ -184,20 +184,22 @@ def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings) -> t
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Seen:
-    searched: Searched
+class _Result:
+    searched: SearchResult
     floor: CleanFloor
 
 
-def _weighed(
-    recordings: Sequence[Recording], look: Look, seen: _Seen, settings: DiagnosisSettings
-) -> tuple[_Seen, tuple[Balance, ...]]:
-    weigh = partial(weighed_beside, recordings, look, seen.searched, settings.time_left)
-    beside = settings.guard.part(BALANCE, "its weighing", weigh, Beside(seen.searched))
+def _judge_beside_model(
+    recordings: Sequence[Recording], look: FittingMeasure, seen: _Result, settings: DiagnosisSettings
+) -> tuple[_Result, tuple[Balance, ...]]:
+    weigh = partial(judge_beside_model, recordings, look, seen.searched, settings.time_left)
+    beside = settings.guard.part(BALANCE, "its weighing", weigh, ResultBesideModel(seen.searched))
     return replace(seen, searched=beside.searched), beside.balances
 
 
-def _search_context(recording: Recording, look: Look, settings: DiagnosisSettings, map_: Mapper) -> SearchContext:
+def _search_context(
+    recording: Recording, look: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
+) -> SearchContext:
     """recording: as it was given; where forces are compared, the measure's own have forces for responses."""
     measure = look.chosen.measure
     model = with_units_of(look.model, recording.command.units, recording.response.units, time_unit(recording))
@@ -207,12 +209,12 @@ def _search_context(recording: Recording, look: Look, settings: DiagnosisSetting
 
 def _by_search(
     recordings: Sequence[Recording],
-    look: Look,
+    look: FittingMeasure,
     settings: DiagnosisSettings,
     map_: Mapper,
     progress: Progress,
     balances: Sequence[Balance],
-) -> _Seen:
+) -> _Result:
     """balances: where they name a law of the motion, nothing else is looked for; where they were weighed and name none,
     effects of actuator and sensor are."""
     chosen, context = look.chosen, _search_context(recordings[0], look, settings, map_)
@@ -228,33 +230,33 @@ def _by_search(
         told = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
         context = replace(context, certain=find_sensor_faults(recordings, settings.clean, told))
         beside = search_beside_reference(context, learned, catalogue, progress, settings.time_left)
-        found = _Seen(beside, learned.floor)
+        found = _Result(beside, learned.floor)
     else:
-        found = _searched(context, catalogue, settings, progress)
+        found = _search(context, catalogue, settings, progress)
         if hums_low(found.searched.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
-            found = _searched(context, catalogue, settings, progress)
+            found = _search(context, catalogue, settings, progress)
     if balances and found.searched.judged.named:
         repeats = all(floor.how == "repeats" for floor in chosen.floors)
-        found = replace(found, searched=unconfirmed_beside_motion(borne_out(found.searched, repeats)))
+        found = replace(found, searched=unname_doubtful_effects(require_enough_gain(found.searched, repeats)))
     seen = found.searched
     left = seen.judged.verdict in ("unexplained", "partly_explained") and not has_law(seen)
     if left and not context.certain and settings.time_left():
         progress("looking for play that rattles", 0.9)
-        rattled = rattling(seen.context, seen.found, chosen.floors, may_be_named)
+        rattled = explain_impacts(seen.context, seen.found, chosen.floors, may_be_named)
         if rattled is not None:
-            return replace(found, searched=Searched(seen.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
+            return replace(found, searched=SearchResult(seen.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
     return found
 
 
-def _searched(
+def _search(
     context: SearchContext, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
-) -> _Seen:
-    def beyond(seen: Searched) -> Searched:
+) -> _Result:
+    def beyond(seen: SearchResult) -> SearchResult:
         wanted = settings.discovery and not settings.fitted
         return add_laws(seen, progress, settings.time_left) if wanted else seen
 
-    return _Seen(searched(context, catalogue, progress, settings.time_left, beyond), CleanFloor())
+    return _Result(search_effects(context, catalogue, progress, settings.time_left, beyond), CleanFloor())
 
 
 def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozenset[str]) -> list[Effect]:
@@ -268,15 +270,15 @@ def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozen
 
 def _beside_motion(name: str, place: str, imposed: bool) -> bool:
     """An effect of the actuator or sensor, of which a force balance tells nothing."""
-    told = name == "body_on_actuator" or (name in WEIGHED and not imposed)
+    told = name == "body_on_actuator" or (name in TESTED_BY_BALANCE and not imposed)
     return place in ("actuator", "sensor") and not told
 
 
-def _assembled(
+def _assemble(
     recordings: Sequence[Recording],
     settings: DiagnosisSettings,
-    look: Look,
-    seen: _Seen,
+    look: FittingMeasure,
+    seen: _Result,
     balances: Sequence[Balance],
 ) -> Findings:
     searched, names = seen.searched, names_of_parts(recordings, settings.names)

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from analysis.diagnosis.data.input_checks import require_alike, require_model_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.first_model.fitted_first import FirstModel, first_model_of, fitted_model
-from analysis.diagnosis.prepare_recordings import prepared, same_position
+from analysis.diagnosis.first_model.fitted_first import FirstModel, first_model_of, fit_first_linear_model
+from analysis.diagnosis.prepare_recordings import keep_common_position, prepare
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -36,9 +36,9 @@ def diagnose_values(
     names = settings.names or tuple(f"recording {number}" for number in range(1, len(given) + 1))
     clean_names = tuple(f"clean recording {number}" for number in range(1, len(settings.clean) + 1))
     require_alike((*given, *settings.clean), (*names, *clean_names))
-    ready = prepared(given, names, model is None and not settings.clean)
-    clean = prepared(settings.clean, clean_names, False).recordings if settings.clean else ()
-    every = same_position((*ready.recordings, *clean))
+    ready = prepare(given, names, model is None and not settings.clean)
+    clean = prepare(settings.clean, clean_names, False).recordings if settings.clean else ()
+    every = keep_common_position((*ready.recordings, *clean))
     found, remarks = every.recordings[: len(given)], (*ready.remarks, *every.remarks)
     settings = replace(settings, names=names, clean=every.recordings[len(given) :])
     if model is None:
@@ -55,4 +55,6 @@ def _first_model(recordings: Sequence[Recording], settings: DiagnosisSettings, p
     if not settings.clean:
         return first_model_of(recordings, settings.without, settings.time_left, progress)
     what = "fitting a linear model, as none was given"
-    return FirstModel(*fitted_model(settings.clean, lambda share: progress(what, share), "the clean recordings"))
+    return FirstModel(
+        *fit_first_linear_model(settings.clean, lambda share: progress(what, share), "the clean recordings")
+    )

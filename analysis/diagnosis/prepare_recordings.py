@@ -29,7 +29,7 @@ class PreparedRecordings:
     """What must be known of them: one sentence each."""
 
 
-def prepared(
+def prepare(
     recordings: Sequence[Recording], names: Sequence[str], plain: bool, short: bool | None = None
 ) -> PreparedRecordings:
     """recordings: alike, in the order of names. plain: one motion for each force, as a force balance needs it. short:
@@ -54,12 +54,12 @@ def comparable(recordings: Sequence[Recording], names: Sequence[str], short: boo
         if not short or not all(FEW_CYCLES in problem for problem in refusal.problems):
             raise
         few = tuple(f"{begun(problem)}." for problem in refusal.problems)
-    alike = same_position(recordings)
-    moving = _moving_position(alike.recordings)
+    alike = keep_common_position(recordings)
+    moving = _drop_constant_position(alike.recordings)
     return PreparedRecordings(moving.recordings, (*few, *alike.remarks, *moving.remarks))
 
 
-def same_position(recordings: Sequence[Recording]) -> PreparedRecordings:
+def keep_common_position(recordings: Sequence[Recording]) -> PreparedRecordings:
     """Compared where every recording has it in the same channels; where not, it is left out, and that is said."""
     kinds = {None if each.position is None else (each.position.channels, each.position.units) for each in recordings}
     if len(kinds) < 2:
@@ -67,7 +67,7 @@ def same_position(recordings: Sequence[Recording]) -> PreparedRecordings:
     return _without_position(recordings, "Only some recordings hold the same position channels")
 
 
-def _moving_position(recordings: Sequence[Recording]) -> PreparedRecordings:
+def _drop_constant_position(recordings: Sequence[Recording]) -> PreparedRecordings:
     """What stands still throughout says nothing, and its errors cannot be counted in units of anything."""
     positions = [each.position for each in recordings if each.position is not None]
     if not positions:

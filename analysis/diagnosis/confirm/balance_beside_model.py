@@ -36,7 +36,7 @@ MOVED = 0.1
 """Step of the finite differences, in standard deviations of the calibration."""
 
 
-def balances_beside(
+def find_balances_beside_model(
     recordings: Sequence[Recording], model: MechanicalModel, without: frozenset[str], time_left: TimeBudget
 ) -> tuple[Balance, ...]:
     """One per command; none where not each drives a measured position or velocity."""
@@ -47,13 +47,13 @@ def balances_beside(
         found = motions_of(records)
         if len(found[0].channels) < model.inputs or found[0].order == 2 or not np.isfinite(found[0].band_hz):
             return ()
-        seen = [_seen(record, motion, model) for record, motion in zip(records, found, strict=True)]
+        seen = [_balance_data(record, motion, model) for record, motion in zip(records, found, strict=True)]
         axes = driven_axes(model)
         mass = np.einsum("nm,nk,km->m", axes, model.mass, axes)
         return tuple(
             judge_laws(
                 search_structures(
-                    [_along(each.motion, axis) for each in seen], axis, model.rotational, without, time_left,
+                    [_select_axis(each.motion, axis) for each in seen], axis, model.rotational, without, time_left,
                     GivenBase(tuple(each.columns[axis] for each in seen), float(mass[axis]), OF_SIGNAL),
                 )
             )
@@ -63,21 +63,21 @@ def balances_beside(
         return ()
 
 
-def _along(motion: Motion, axis: int) -> Motion:
+def _select_axis(motion: Motion, axis: int) -> Motion:
     """Of one axis alone: laws of another one's motion are no physics of the catalogue."""
     courses = {name: getattr(motion, name)[:, [axis]] for name in ("position", "velocity", "acceleration")}
     return replace(motion, channels=motion.channels[axis : axis + 1], **courses)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Seen:
+class _BalanceData:
     motion: Motion
     """Of the driven axes, and the force that entered there."""
     columns: tuple[FloatArray, ...]
     """As `GivenBase.columns`, per axis."""
 
 
-def _seen(record: Observed, motion: Motion, model: MechanicalModel) -> _Seen:
+def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _BalanceData:
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
     known = place_effects(model, recording.command.channels, recording.response.channels)
     at = _structure(add_carried_weight(model, recording), known)
@@ -93,12 +93,12 @@ def _seen(record: Observed, motion: Motion, model: MechanicalModel) -> _Seen:
         force=motion.band_pass(entered + added)[::every], condition=motion.condition[::every],
         fit=motion.fit[::every], test=motion.test[::every],
     )  # fmt: skip
-    changes = [*_grounded(thin, model, recording), *_of_modes(thin, model, recording, known)]
+    changes = [*_grounded_columns(thin, model, recording), *_mode_columns(thin, model, recording, known)]
     columns = np.stack([whole.force[::every], *changes], axis=1)
-    return _Seen(thin, tuple(columns[:, :, axis] for axis in range(m)))
+    return _BalanceData(thin, tuple(columns[:, :, axis] for axis in range(m)))
 
 
-def _grounded(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
+def _grounded_columns(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
     """(n, m) each: what one standard deviation of mass, damping and stiffness at the driven axes adds, as `Tuning`
     counts them."""
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
@@ -112,7 +112,7 @@ def _grounded(motion: Motion, model: MechanicalModel, recording: Recording) -> I
             yield tuning.deviation[number] * added / length
 
 
-def _of_modes(
+def _mode_columns(
     motion: Motion, model: MechanicalModel, recording: Recording, known: Sequence[PlacedEffect]
 ) -> Iterator[FloatArray]:
     """(n, m) each: the same of the modes' numbers."""

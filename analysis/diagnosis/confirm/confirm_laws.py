@@ -15,18 +15,18 @@ from analysis.diagnosis.balance.plainest_structure import NOTABLE
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.confirm.laws_to_play import (
     CONSTANT,
-    as_claim,
     can_be_played,
     constants_of,
-    refitted,
-    released_numbers,
+    hypothesis_of_law,
+    numbers_beside_laws,
+    refit_laws,
 )
 from analysis.diagnosis.errors.hypothesis import combine
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import final_errors
-from analysis.diagnosis.search.search import Searched, Unconfirmed
+from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
 from analysis.diagnosis.search.without_effect import without_effect
@@ -48,7 +48,7 @@ HELD_BY_SIMULATION = 0.9
 """
 
 
-def searched_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> Searched | None:
+def search_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> SearchResult | None:
     """repeats: the noise is known from what repeats; else nothing counts as explained. None where nothing is named, or
     where simulations do not bear it out."""
     named = [
@@ -61,27 +61,27 @@ def searched_by_balance(context: SearchContext, balances: Sequence[Balance], rep
         return None
     constant = constants_of(balances)
     given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), constant)
-    before, retuned = context.confirmed(context.candidate(given)), context.candidate(refine(context, given))
-    confirmed = context.confirmed(retuned)
-    named, plain = refitted(balances, named), Explanation(before, confirmed, confirmed, (), ()).plain
+    before, retuned = context.with_test_score(context.candidate(given)), context.candidate(refine(context, given))
+    confirmed = context.with_test_score(retuned)
+    named, plain = refit_laws(balances, named), Explanation(before, confirmed, confirmed, (), ()).plain
     while named:
         steps, after = _from_starts(context, balances, (retuned, plain), named)
         explained = Explanation(before, confirmed, after, tuple((step,) for step in steps), tuple(steps))
         vague: int | None = len(named) - 1
         errors: FloatArray | None = None
-        if _borne_out(plain, after):
+        if _is_borne_out(plain, after):
             errors = final_errors(context, explained)
-            vague = _vague(explained, errors[len(context.tuning.names) :], len(constant.claims))
+            vague = _find_vague_law(explained, errors[len(context.tuning.names) :], len(constant.claims))
         if vague is None:
             sealed = float(np.nanmax(after.score.test, initial=0.0))
             whole = repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
             judged = Judgement("explained" if whole else "partly_explained", True)
-            return Searched(context, explained, judged, errors=errors)
-        named = refitted(balances, [law for number, law in enumerate(named) if number != vague])
+            return SearchResult(context, explained, judged, errors=errors)
+        named = refit_laws(balances, [law for number, law in enumerate(named) if number != vague])
     return None
 
 
-def borne_out(seen: Searched, repeats: bool) -> Searched:
+def require_enough_gain(seen: SearchResult, repeats: bool) -> SearchResult:
     """Of what a search beside balances named, the name only where it takes as much of the held-out error power as a
     law of a balance must, and `explained` only where repeats show the noise; what is a number of the model needs no
     name, and no proof."""
@@ -98,14 +98,14 @@ def borne_out(seen: Searched, repeats: bool) -> Searched:
     return replace(seen, judged=replace(seen.judged, verdict="partly_explained"))
 
 
-def unconfirmed_beside_motion(seen: Searched) -> Searched:
+def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
     """Effects of actuator and sensor that a search beside balances named become candidates, except where the signal
     itself shows them: the model was fitted to these very recordings, so that its numbers give way to whatever bends,
     and a law of the motion that no catalogue holds looks like a bent or late sensor."""
     found, told = seen.found, []
     doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
     for place in reversed(doubtful):
-        gain = held_out_gain(seen.context.whole, found.plain, seen.context.confirmed(found.steps[place]))
+        gain = held_out_gain(seen.context.whole, found.plain, seen.context.with_test_score(found.steps[place]))
         if gain is not None and gain.gain > 0:
             told.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, ONLY_BESIDE_CALIBRATION))
         if len(found.steps) > 1:
@@ -120,7 +120,7 @@ def unconfirmed_beside_motion(seen: Searched) -> Searched:
 
 def _takes_enough(context: SearchContext, found: Explanation) -> bool:
     """Whether the last effect takes a notable share of the held-out error power beside those before it."""
-    before = context.confirmed(found.steps[-2]) if len(found.steps) > 1 else found.plain
+    before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
     return not found.after.held_out > before.held_out + np.log(1 - NOTABLE) / 2
 
 
@@ -133,12 +133,12 @@ def _from_starts(
     """The steps, and the last of them on all samples. without: the re-tuned model, and what there is without new
     physics on all samples. From the balance's linear numbers; where that ends beside the law, from the model's own."""
     retuned, plain = without
-    released = released_numbers(context.tuning, balances, [law.place for _, law in named])
+    released = numbers_beside_laws(context.tuning, balances, [law.place for _, law in named])
     steps = _steps(context, retuned, named, released)
-    after = context.confirmed(steps[-1])
-    if np.any(released) and not _borne_out(plain, after):
+    after = context.with_test_score(steps[-1])
+    if np.any(released) and not _is_borne_out(plain, after):
         again = _steps(context, retuned, named, np.zeros(len(released)))
-        other = context.confirmed(again[-1])
+        other = context.with_test_score(again[-1])
         if other.held_out < after.held_out:
             return again, other
     return steps, after
@@ -151,14 +151,14 @@ def _steps(
     whole = retuned.fitted.hypothesis
     steps = [retuned for _ in whole.claims]
     for axis, law in named:
-        start = evaluate_fit(context.measure, context.tuning, deviations, combine(whole, as_claim(axis, law)))
+        start = evaluate_fit(context.measure, context.tuning, deviations, combine(whole, hypothesis_of_law(axis, law)))
         found = refine(context, start)
         steps.append(context.candidate(found))
         whole, deviations = found.hypothesis, found.deviations
     return steps
 
 
-def _vague(explained: Explanation, errors: FloatArray, constants: int) -> int | None:
+def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) -> int | None:
     """The place among the named laws of a law whose main number's interval holds zero, or any number's, where the law
     only refines another of its family; None where there is none."""
     begin, hypothesis = 0, explained.steps[-1].fitted.hypothesis
@@ -174,7 +174,7 @@ def _vague(explained: Explanation, errors: FloatArray, constants: int) -> int | 
     return None
 
 
-def leaves_open(searched: Searched) -> bool:
+def leaves_open(searched: SearchResult) -> bool:
     """Whether the interval of any positive number of a law reaches zero: a stiffness before sliding, say."""
     assert searched.errors is not None
     numbers = searched.found.steps[-1].fitted.hypothesis.numbers
@@ -184,5 +184,5 @@ def leaves_open(searched: Searched) -> bool:
     )
 
 
-def _borne_out(plain: FittedCandidate, after: FittedCandidate) -> bool:
+def _is_borne_out(plain: FittedCandidate, after: FittedCandidate) -> bool:
     return not np.isfinite(plain.held_out) or after.held_out <= plain.held_out + np.log(HELD_BY_SIMULATION)

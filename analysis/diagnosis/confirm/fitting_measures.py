@@ -14,7 +14,7 @@ from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.first_model.model_of_balance import first_model, share_within
-from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduced_recordings
+from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.settings import LAWS_WITHIN
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
@@ -30,7 +30,7 @@ ABOUT_MEAN = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class FittingMeasure:
     """A model, and how its errors are measured."""
 
     model: MechanicalModel
@@ -39,25 +39,27 @@ class Look:
     """Only up to where noise is small in the force, which may leave numbers of laws open."""
 
 
-def look_of(
+def choose_fitting_measure(
     recordings: Sequence[Recording],
     model: MechanicalModel,
     clean: Sequence[Recording],
     compared: Compared,
     about_mean: bool = False,
-) -> Look:
+) -> FittingMeasure:
     """about_mean: the model was fitted to what changes, and is played about the mean where that leaves less."""
-    look = Look(model, measure_of(recordings, model, clean, compared))
+    look = FittingMeasure(model, measure_of(recordings, model, clean, compared))
     moved = about_operating_point(recordings, model) if about_mean and not clean else None
     if moved is None or look.chosen.measure.name != "free simulation":
         return look
     other = measure_of(moved, model, clean, compared)
-    if other.measure.name != "free simulation" or _left(model, other) > MENDED * _left(model, look.chosen):
+    if other.measure.name != "free simulation" or _error_over_noise(model, other) > MENDED * _error_over_noise(
+        model, look.chosen
+    ):
         return look
-    return Look(model, replace(other, remarks=(*other.remarks, ABOUT_MEAN)))
+    return FittingMeasure(model, replace(other, remarks=(*other.remarks, ABOUT_MEAN)))
 
 
-def _left(model: MechanicalModel, chosen: Chosen) -> float:
+def _error_over_noise(model: MechanicalModel, chosen: Chosen) -> float:
     """As the model is, on what may be fitted to: the error over the noise."""
     measure = chosen.measure
     tuning = tuning_of(model, measure.records[0].recording.command.channels)
@@ -65,9 +67,9 @@ def _left(model: MechanicalModel, chosen: Chosen) -> float:
     return fit_score(measure, given.residuals).worst_channel
 
 
-def looks_of(
+def list_fitting_measures(
     recordings: Sequence[Recording], model: MechanicalModel, balances: Sequence[Balance], compared: Compared
-) -> Iterator[Look]:
+) -> Iterator[FittingMeasure]:
     """In a free simulation, the strictest, where the fitted model bears one; else along the measured motion, with the
     balance's own linear numbers: up to where noise is small, where that holds what the laws push, or else as far as the
     balance looked."""
@@ -75,20 +77,22 @@ def looks_of(
         return
     chosen = measure_of(recordings, model)
     if time_unit(recordings[0]) != "s":
-        yield Look(model, chosen)
+        yield FittingMeasure(model, chosen)
         return
     if chosen.measure.name == "free simulation" and compared != "force":
-        yield Look(model, chosen)
+        yield FittingMeasure(model, chosen)
     if compared == "motion":
         return
     try:
-        reduced = reduced_recordings(recordings, balances) if is_reduced(balances) else recordings
+        reduced = reduce_recordings(recordings, balances) if is_reduced(balances) else recordings
         rigid = first_model(balances, reduced[0], model.name)
         if rigid is not None:
             narrow = measure_by_force(reduced, rigid, None)
             held = share_within(balances, narrow.measure.band_hz) if isinstance(narrow.measure, PredictedForce) else 0.0
             if held >= LAWS_WITHIN:
-                yield Look(rigid, narrow, narrow=True)
-            yield Look(rigid, measure_by_force(reduced, rigid, balances[0].search.regression.motions[0].band_hz))
+                yield FittingMeasure(rigid, narrow, narrow=True)
+            yield FittingMeasure(
+                rigid, measure_by_force(reduced, rigid, balances[0].search.regression.motions[0].band_hz)
+            )
     except (MechanicalModelError, np.linalg.LinAlgError):
         return

@@ -13,13 +13,13 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import CEILING, PLAYED_AS, Balance
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
-from analysis.diagnosis.confirm.balance_beside_model import balances_beside
-from analysis.diagnosis.confirm.confirm_laws import searched_by_balance
-from analysis.diagnosis.confirm.fitting_measures import Look
+from analysis.diagnosis.confirm.balance_beside_model import find_balances_beside_model
+from analysis.diagnosis.confirm.confirm_laws import search_by_balance
+from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, held_out_gain
 from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.search.parsimony import only_refines
-from analysis.diagnosis.search.search import Searched, Unconfirmed
+from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import NAMED_ERROR, RETUNING_BOUND
@@ -33,41 +33,47 @@ SHOWN = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Beside:
-    searched: Searched
+class ResultBesideModel:
+    searched: SearchResult
     balances: tuple[Balance, ...] = ()
     """Empty where nothing is missing, or no motion was measured."""
 
 
-def weighed_beside(recordings: Sequence[Recording], look: Look, seen: Searched, time_left: TimeBudget) -> Beside:
+def judge_beside_model(
+    recordings: Sequence[Recording], look: FittingMeasure, seen: SearchResult, time_left: TimeBudget
+) -> ResultBesideModel:
     """seen: by simulation."""
     if seen.judged.verdict not in ("unexplained", "partly_explained") or seen.found.statistic is not None:
-        return Beside(seen)
+        return ResultBesideModel(seen)
     known_noise = all(floor.how == "repeats" for floor in look.chosen.floors)
-    balances = balances_beside(recordings, look.model, seen.context.barred, time_left)
+    balances = find_balances_beside_model(recordings, look.model, seen.context.barred, time_left)
     near = float(np.nanmax(seen.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
     if seen.judged.named or seen.found.barred:
-        return Beside(seen, balances)
+        return ResultBesideModel(seen, balances)
     if known_noise and near:
         why_not = "the noise is known here, and what it leaves is more than noise"
-        return Beside(replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed(seen, why_not))), balances)
+        return ResultBesideModel(
+            replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed_candidates(seen, why_not))), balances
+        )
     why_not = objection(seen, balances)
     if seen.found.steps and not why_not:
-        return Beside(replace(seen, judged=Judgement("partly_explained", True)), balances)
-    found = searched_by_balance(seen.context, balances, known_noise) if balances else None
+        return ResultBesideModel(replace(seen, judged=Judgement("partly_explained", True)), balances)
+    found = search_by_balance(seen.context, balances, known_noise) if balances else None
     if found is not None and not objection(found, balances):
         judged = replace(found.judged, verdict="partly_explained")
-        return Beside(replace(found, judged=judged, remarks=seen.remarks), balances)
-    return Beside(replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed(seen, why_not))), balances)
+        return ResultBesideModel(replace(found, judged=judged, remarks=seen.remarks), balances)
+    return ResultBesideModel(
+        replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed_candidates(seen, why_not))), balances
+    )
 
 
-def objection(seen: Searched, balances: Sequence[Balance]) -> str:
+def objection(seen: SearchResult, balances: Sequence[Balance]) -> str:
     """Why what was found is not named, as a sentence; empty where it is to be."""
     context, found = seen.context, seen.found
     if not found.steps:
         return "it takes too little of the error to be added"
     whole = held_out_gain(context.whole, found.plain, found.after)
-    before = context.confirmed(found.steps[-2]) if len(found.steps) > 1 else found.plain
+    before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
     last = held_out_gain(context.whole, before, found.after)
     if whole is None or last is None:
         return "too little was held out to confirm it"
@@ -81,7 +87,7 @@ def objection(seen: Searched, balances: Sequence[Balance]) -> str:
     if rival is not None and _not_better(context, rival, found.after):
         return f"these data cannot tell it from {rival.newest.replace('_', ' ')}"
     claims = found.after.fitted.hypothesis.claims
-    if whole.gain < CEILING and not all(_told_by_balance(claim, balances) for claim in claims):
+    if whole.gain < CEILING and not all(_is_named_by_balance(claim, balances) for claim in claims):
         return "it takes less than half of the error's power, and the force balance does not bear it out"
     return ""
 
@@ -91,7 +97,7 @@ def _not_better(context: SearchContext, rival: FittedCandidate, after: FittedCan
     return ahead is None or ahead.low <= 0
 
 
-def _best_rival(context: SearchContext, seen: Searched) -> FittedCandidate | None:
+def _best_rival(context: SearchContext, seen: SearchResult) -> FittedCandidate | None:
     """Of the last step that was added: the best other effect that is no refinement of it, with the sealed samples."""
     steps = seen.found.steps
     if len(seen.found.rounds) < len(steps):
@@ -102,10 +108,10 @@ def _best_rival(context: SearchContext, seen: Searched) -> FittedCandidate | Non
         for other in seen.found.rounds[len(steps) - 1]
         if other.newest != best.newest and not only_refines(other, best)
     ]
-    return context.confirmed(others[0]) if others else None
+    return context.with_test_score(others[0]) if others else None
 
 
-def _told_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
+def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
     if claim.spread != "one" or claim.sites[0] >= len(balances):
         return False
     names = {
@@ -116,7 +122,7 @@ def _told_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
     return claim.effect.name in names
 
 
-def _unconfirmed(seen: Searched, why_not: str) -> tuple[Unconfirmed, ...]:
+def _unconfirmed_candidates(seen: SearchResult, why_not: str) -> tuple[Unconfirmed, ...]:
     """The best candidates of the round in which the search ended, the largest gain first."""
     rounds = [fitted_candidates for fitted_candidates in seen.found.rounds if fitted_candidates]
     if not rounds:
@@ -127,13 +133,15 @@ def _unconfirmed(seen: Searched, why_not: str) -> tuple[Unconfirmed, ...]:
         first.setdefault(candidate.newest, candidate)
     found = []
     for place, candidate in enumerate([*first.values()][:SHOWN]):
-        gain = held_out_gain(seen.context.whole, seen.found.plain, seen.context.confirmed(candidate))
+        gain = held_out_gain(seen.context.whole, seen.found.plain, seen.context.with_test_score(candidate))
         if gain is not None and gain.gain > 0:
-            found.append(Unconfirmed(candidate.fitted.hypothesis, gain.gain, why_not if place == 0 else _behind(gain)))
+            found.append(
+                Unconfirmed(candidate.fitted.hypothesis, gain.gain, why_not if place == 0 else _why_behind(gain))
+            )
     return tuple(sorted(found, key=lambda each: -each.gain))
 
 
-def _behind(gain: HeldOutGain) -> str:
+def _why_behind(gain: HeldOutGain) -> str:
     if gain.low <= 0:
         return "its gain on held-out data is not larger than what varies between stretches"
     return "another leaves less of what was fitted to"

@@ -27,7 +27,7 @@ def can_be_played(own: int, judged: JudgedLaw) -> bool:
     )
 
 
-def refitted(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
+def refit_laws(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
     """With the numbers that the balances give these laws alone."""
     found = []
     for axis, law in named:
@@ -56,14 +56,14 @@ def constants_of(balances: Sequence[Balance]) -> Hypothesis:
     return whole
 
 
-def as_claim(axis: int, judged: JudgedLaw) -> Hypothesis:
+def hypothesis_of_law(axis: int, judged: JudgedLaw) -> Hypothesis:
     effect = EFFECTS[judged.law.effect]
     return hypothesis_of_claim(
         Claim(effect, "one", (axis,)), [{p.name: judged.values[p.name] for p in effect.parameters}]
     )
 
 
-def released_numbers(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
+def numbers_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
     """Mass, damping and stiffness as they are beside laws of the only balance, not as they were fitted without them."""
     start = np.zeros(len(tuning.names))
     if any(balance.search.regression.prior is not None for balance in balances):

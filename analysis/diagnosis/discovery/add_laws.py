@@ -10,15 +10,15 @@ from analysis.diagnosis.discovery.discover import Discovery, discover
 from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.discovery.proof import beats, proof_sentence, reasons_against
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.identifiability import identified
-from analysis.diagnosis.search.search import Searched, Unconfirmed
+from analysis.diagnosis.search.identifiability import keep_identifiable
+from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import judge
 from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, SEALED_ALONE_ERROR
 from analysis.diagnosis.types import Progress, TimeBudget
 
 
-def add_laws(searched: Searched, progress: Progress, time_left: TimeBudget) -> Searched:
+def add_laws(searched: SearchResult, progress: Progress, time_left: TimeBudget) -> SearchResult:
     """The search with the discovered law in place of its names. Unchanged where it needs no law or none is better; a
     law that fails a check of `proof` is added as an unconfirmed candidate only."""
     context, known = searched.context, searched.found
@@ -31,7 +31,7 @@ def add_laws(searched: Searched, progress: Progress, time_left: TimeBudget) -> S
     reasons = reasons_against(context, found, rivals)
     if not all(beats(found.found.after, rival) for rival in rivals):
         reasons = (*reasons, "what the catalogue names leaves hardly more")
-    checked = identified(context, found.found, time_left)
+    checked = keep_identifiable(context, found.found, time_left)
     if len(checked.steps) < len(found.found.steps):
         reasons = (*reasons, "these recordings leave its numbers as good as open")
     judged = judge(checked)
@@ -43,16 +43,16 @@ def add_laws(searched: Searched, progress: Progress, time_left: TimeBudget) -> S
     if reasons:
         return replace(searched, unconfirmed=(*searched.unconfirmed, *_candidates(context, found, reasons)))
     remarks = (proof_sentence(context, checked, rivals),)
-    return Searched(context, checked, judged, remarks, None if checked.errors is None else checked.errors[1])
+    return SearchResult(context, checked, judged, remarks, None if checked.errors is None else checked.errors[1])
 
 
-def has_law(searched: Searched) -> bool:
+def has_law(searched: SearchResult) -> bool:
     """Whether a discovered law is among what is named."""
     laws = laws_of(searched.found.after.fitted.hypothesis)
     return searched.judged.named and any(law is not None for law in laws)
 
 
-def _needs_law(searched: Searched) -> bool:
+def _needs_law(searched: SearchResult) -> bool:
     """Only whole simulations prove a law; where noise alone is left, there is none to be found."""
     context, found = searched.context, searched.found
     if (
@@ -81,7 +81,7 @@ def _rivals(context: SearchContext, known: Explanation) -> list[FittedCandidate]
     """What the catalogue offers instead: what is named, and the best candidate of the first round."""
     rivals = [known.after] if known.steps else []
     if known.rounds and known.rounds[0]:
-        rivals.append(context.confirmed(known.rounds[0][0]))
+        rivals.append(context.with_test_score(known.rounds[0][0]))
     return rivals
 
 

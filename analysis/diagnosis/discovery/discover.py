@@ -15,7 +15,7 @@ from analysis.diagnosis.discovery.snap_exponents import snap_exponents
 from analysis.diagnosis.errors.hypothesis import combine
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.explain import Explanation, worthwhile
+from analysis.diagnosis.search.explain import Explanation, is_worthwhile
 from analysis.diagnosis.search.same_within_errors import inseparable
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, FittedCandidate, SearchContext, sensitivity_at
 from analysis.diagnosis.settings import (
@@ -63,7 +63,7 @@ def discover(context: SearchContext, known: Explanation, progress: Progress, tim
     while len(rounds) < LAW_MOST_ROUNDS and time_left() and base.score.worst_channel > NOISE_ALONE:
         progress("looking for a law that has no name", 0.6 + 0.1 * len(rounds))
         found = _find_next_law(context, base.fitted, time_left)
-        if found is None or not worthwhile(base, found.fitted_candidates[0]):
+        if found is None or not is_worthwhile(base, found.fitted_candidates[0]):
             break
         base = found.fitted_candidates[0]
         rounds.append(found)
@@ -75,7 +75,7 @@ def discover(context: SearchContext, known: Explanation, progress: Progress, tim
     whole = Explanation(
         known.before,
         known.retuned,
-        context.confirmed(last),
+        context.with_test_score(last),
         tuple(each.fitted_candidates for each in rounds),
         tuple(steps),
     )

@@ -87,9 +87,9 @@ def _equally_good_laws(context: SearchContext, of: Discovery, number: int) -> It
     ]
     if not close:
         return
-    law = context.confirmed(best)
+    law = context.with_test_score(best)
     for candidate, each in close:
-        rival = context.confirmed(candidate)
+        rival = context.with_test_score(candidate)
         ahead = held_out_gain(context.whole, rival, law)
         parted = ahead is not None and ahead.low > 0
         if not parted and not _predict_the_same(of.found.retuned, law, rival):

@@ -9,15 +9,15 @@ from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.first_model.model_structures import (
-    GAINED,
-    Balanced,
+    LEAST_GAIN,
+    BalancedRecordings,
     Kind,
     StructureFit,
     StructureRefused,
-    balanced,
-    modal,
-    plainest,
-    structure_of,
+    balance_recordings,
+    choose_plainest,
+    fit_modal_structure,
+    fit_structure,
 )
 from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
 from equalizer.identification.mechanical.mechanical_lines import roles, segment_lines
@@ -37,7 +37,7 @@ SHAPES: dict[str, Callable[[Motion], FloatArray]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
+class TriedStructure:
     kind: Kind
     error: float | None
     """Root-mean-square over the signal's; None where it was refused."""
@@ -47,25 +47,27 @@ class Tried:
 @dataclass(frozen=True, slots=True, eq=False)
 class Choice:
     fit: StructureFit
-    tried: tuple[Tried, ...]
+    tried: tuple[TriedStructure, ...]
     reason: str
     remains: str
 
 
-def first_structure(
+def choose_structure(
     recordings: Sequence[Recording], wanted: Kind | None, on_progress: Callable[[float], None]
 ) -> Choice:
     """wanted: None = the best. Raises StructureRefused."""
     try:
-        given: Balanced | None = balanced(recordings)
+        given: BalancedRecordings | None = balance_recordings(recordings)
         why = ""
     except NoMotionError as problem:
         given, why = None, str(problem)
     if wanted is not None:
         by_force = given is not None and wanted != "two-mode"
-        fit = structure_of(given, wanted) if by_force and given else modal(recordings, wanted, on_progress)
-        return Choice(fit, (Tried(fit.kind, fit.error, ""),), "It was asked for.", remains(given, fit))
-    fits, tried = _all(given, recordings, on_progress)
+        fit = (
+            fit_structure(given, wanted) if by_force and given else fit_modal_structure(recordings, wanted, on_progress)
+        )
+        return Choice(fit, (TriedStructure(fit.kind, fit.error, ""),), "It was asked for.", remains(given, fit))
+    fits, tried = _fit_structures(given, recordings, on_progress)
     if not fits:
         raise StructureRefused("; ".join(f"{item.kind}: {item.why_not}" for item in tried))
     if given is None:
@@ -73,15 +75,15 @@ def first_structure(
         best = ordered[-1] if ordered[-1].error < (1 - MODES_GAIN) * ordered[0].error else ordered[0]
         said = f"Structures were compared by the held-out error of a free simulation, because {why}."
         return Choice(best, tried, said, remains(None, best))
-    best = plainest(fits)
+    best = choose_plainest(fits)
     reason = (
-        f"{best.kind} is the structure of fewest numbers from which no other takes {100 * GAINED:.0f} % of the error "
-        "power, fold by fold."
+        f"{best.kind} is the structure of fewest numbers from which no other takes {100 * LEAST_GAIN:.0f} % of the "
+        "error power, fold by fold."
     )
     return _with_modes(Choice(best, tried, reason, remains(given, best)), recordings, on_progress)
 
 
-def remains(given: Balanced | None, fit: StructureFit) -> str:
+def remains(given: BalancedRecordings | None, fit: StructureFit) -> str:
     """A sentence on what the model leaves."""
     left = f"{100 * fit.error:.3g} % of the {fit.compared}"
     if given is None or fit.joint is None or given.untimed:
@@ -106,19 +108,19 @@ def _share(columns: Sequence[FloatArray], left: Sequence[FloatArray]) -> float:
     return float(((x * y).sum(axis=0) ** 2 / size).max())
 
 
-def _all(
-    given: Balanced | None, recordings: Sequence[Recording], on_progress: Callable[[float], None]
-) -> tuple[list[StructureFit], tuple[Tried, ...]]:
+def _fit_structures(
+    given: BalancedRecordings | None, recordings: Sequence[Recording], on_progress: Callable[[float], None]
+) -> tuple[list[StructureFit], tuple[TriedStructure, ...]]:
     kinds: tuple[Kind, ...] = ("mass-spring", "two-mode") if given is None else ("massless", "motor", "mass-spring")
     fits, tried = [], []
     for kind in kinds:
         try:
-            fit = modal(recordings, kind, on_progress) if given is None else structure_of(given, kind)
+            fit = fit_modal_structure(recordings, kind, on_progress) if given is None else fit_structure(given, kind)
         except StructureRefused as refusal:
-            tried.append(Tried(kind, None, str(refusal)))
+            tried.append(TriedStructure(kind, None, str(refusal)))
             continue
         fits.append(fit)
-        tried.append(Tried(kind, fit.error, ""))
+        tried.append(TriedStructure(kind, fit.error, ""))
     return fits, tuple(tried)
 
 
@@ -128,11 +130,11 @@ def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Cal
         return plain
     if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
         why = "it is fitted to spectra, which a controller or an imposed motion bends"
-        return _tried(plain, Tried("two-mode", None, why))
+        return _with_tried(plain, TriedStructure("two-mode", None, why))
     try:
-        other = modal(recordings, "two-mode", on_progress)
+        other = fit_modal_structure(recordings, "two-mode", on_progress)
     except StructureRefused as refusal:
-        return _tried(plain, Tried("two-mode", None, str(refusal)))
+        return _with_tried(plain, TriedStructure("two-mode", None, str(refusal)))
     fit, test = roles(recordings)
     lines = [found for part in test or fit if (found := segment_lines(*part)) is not None]
     ends = [float(bound(line.frequency_hz[line.excited])) for line in lines for bound in (np.min, np.max)]
@@ -142,10 +144,10 @@ def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Cal
     ]
     said = f"In a free simulation mass-spring leaves {100 * errors[0]:.3g} %, two-mode {100 * errors[1]:.3g} %."
     if errors[1] < (1 - MODES_GAIN) * errors[0]:
-        tried = (*plain.tried, Tried("two-mode", other.error, ""))
+        tried = (*plain.tried, TriedStructure("two-mode", other.error, ""))
         return Choice(other, tried, said, remains(None, other))
-    return _tried(plain, Tried("two-mode", other.error, "modes take too little off"), said)
+    return _with_tried(plain, TriedStructure("two-mode", other.error, "modes take too little off"), said)
 
 
-def _tried(plain: Choice, tried: Tried, said: str = "") -> Choice:
+def _with_tried(plain: Choice, tried: TriedStructure, said: str = "") -> Choice:
     return Choice(plain.fit, (*plain.tried, tried), f"{plain.reason} {said}".rstrip(), plain.remains)

@@ -12,7 +12,7 @@ from analysis.diagnosis.data.carried_weight import has_carried_weight
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.first_model.model_of_balance import plain_model
-from analysis.diagnosis.first_model.model_structures import StructureRefused, balanced, structure_of
+from analysis.diagnosis.first_model.model_structures import StructureRefused, balance_recordings, fit_structure
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
@@ -56,37 +56,37 @@ def first_model_of(
     _require_no_weight(recordings)
     on_progress("weighing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(without), time_left)
-    if any(time_unit(each) != "s" for each in recordings) and (still := _massless(recordings)) is not None:
+    if any(time_unit(each) != "s" for each in recordings) and (still := _massless_model(recordings)) is not None:
         return FirstModel(still, (UNTIMED_SAID,), balances)
     model = plain_model(balances, recordings[0], "fitted to these recordings")
     if model is not None:
         return FirstModel(model, (BALANCE_SAID,), balances)
     on_progress("fitting a linear model, as none was given", 0.5)
-    model, remarks = fitted_model(
+    model, remarks = fit_first_linear_model(
         recordings, lambda share: on_progress("fitting a linear model, as none was given", 0.5 + share / 2)
     )
     return FirstModel(model, remarks, balances)
 
 
-def _massless(recordings: Sequence[Recording]) -> MechanicalModel | None:
+def _massless_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
     """None where no motion was measured along the commands."""
     try:
-        return structure_of(balanced(recordings), "massless").model
+        return fit_structure(balance_recordings(recordings), "massless").model
     except (StructureRefused, NoMotionError):
         return None
 
 
-def fitted_model(
+def fit_first_linear_model(
     recordings: Sequence[Recording], on_progress: Callable[[float], None], whose: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """A linear one, and what must be known of it. Raises NothingToDiagnose where the recordings do not carry one."""
     _require_no_weight(recordings)
-    if wants_rigid_model(recordings) and (rigid := _rigid(recordings, whose)) is not None:
+    if wants_rigid_model(recordings) and (rigid := _rigid_model(recordings, whose)) is not None:
         return rigid, (RIGID_SAID,)
     try:
         fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {whose}")
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
-        if (rigid := _rigid(recordings, whose)) is not None:
+        if (rigid := _rigid_model(recordings, whose)) is not None:
             return rigid, (RIGID_SAID,)
         raise NothingToDiagnose((f"no model was given, and none can be fitted: {refusal}",)) from refusal
     tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on what was kept for a test"
@@ -106,7 +106,7 @@ def _require_no_weight(recordings: Sequence[Recording]) -> None:
         )
 
 
-def _rigid(recordings: Sequence[Recording], whose: str) -> MechanicalModel | None:
+def _rigid_model(recordings: Sequence[Recording], whose: str) -> MechanicalModel | None:
     """None where the recordings do not carry one."""
     if not can_be_rigid(recordings):
         return None

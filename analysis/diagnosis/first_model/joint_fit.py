@@ -42,7 +42,7 @@ class JointFit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Shape:
+class _Parametrisation:
     """Which numbers are fitted, and where each stands in each axis's row of weights."""
 
     columns: list[int]
@@ -58,13 +58,13 @@ def regressions_of(motions: Sequence[Motion], turns: bool) -> tuple[Regression, 
 def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> JointFit:
     """parts: what the model has; a constant force is always fitted beside. Raises numpy.linalg.LinAlgError where the
     motion does not tell them apart."""
-    shape = _shape(regressions[0], parts)
+    shape = _parametrisation(regressions[0], parts)
     powers = [max(signal_power(regression.fit), 1e-300) for regression in regressions]
     own = _products([regression.fit for regression in regressions], shape, powers)
     whole = np.sum([each[0] for each in own], axis=0), np.sum([each[1] for each in own], axis=0)
-    found, spread = _solved(whole), _spread(own, whole)
+    found, spread = _solve(whole), _standard_errors(own, whole)
     fit = [regression.fit for regression in regressions]
-    crossed = [_solved((whole[0] - gram, whole[1] - pull)) for gram, pull in own]
+    crossed = [_solve((whole[0] - gram, whole[1] - pull)) for gram, pull in own]
     folds = _errors(fit, shape, crossed)
     test = [regression.test for regression in regressions]
     tested = len(test[0]) >= LEAST_BLOCKS
@@ -80,7 +80,7 @@ def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> Joint
     )  # fmt: skip
 
 
-def _shape(regression: Regression, parts: Sequence[Part]) -> _Shape:
+def _parametrisation(regression: Regression, parts: Sequence[Part]) -> _Parametrisation:
     axes = len(regression.motions[0].channels)
     columns = [PARTS.index(part) * axes + k for part in parts for k in range(axes)] + [regression.base - 1]
     entries = tuple((part, i, k) for part in parts for i in range(axes) for k in range(i, axes))
@@ -93,11 +93,11 @@ def _shape(regression: Regression, parts: Sequence[Part]) -> _Shape:
                 row[begin + (k if axis == i else i), number] = 1.0
         row[-1, len(entries) + axis] = 1.0
         rows.append(regression.scale[columns][:, None] * row)
-    return _Shape(columns, tuple(rows), entries)
+    return _Parametrisation(columns, tuple(rows), entries)
 
 
 def _products(
-    blocks: Sequence[Sequence[Block]], shape: _Shape, powers: Sequence[float]
+    blocks: Sequence[Sequence[Block]], shape: _Parametrisation, powers: Sequence[float]
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Per block, of the joint numbers."""
     found = []
@@ -111,14 +111,14 @@ def _products(
     return found
 
 
-def _solved(products: tuple[FloatArray, FloatArray]) -> FloatArray:
+def _solve(products: tuple[FloatArray, FloatArray]) -> FloatArray:
     size = np.sqrt(np.maximum(np.diagonal(products[0]), 1e-300))
     return np.asarray(np.linalg.solve(products[0] / np.outer(size, size), products[1] / size) / size)
 
 
-def _spread(own: Sequence[tuple[FloatArray, FloatArray]], whole: tuple[FloatArray, FloatArray]) -> FloatArray:
+def _standard_errors(own: Sequence[tuple[FloatArray, FloatArray]], whole: tuple[FloatArray, FloatArray]) -> FloatArray:
     """Standard errors of the numbers."""
-    found = _solved(whole)
+    found = _solve(whole)
     size = np.sqrt(np.maximum(np.diagonal(whole[0]), 1e-300))
     inverse = np.linalg.inv(whole[0] / np.outer(size, size)) / np.outer(size, size)
     scores = np.array([pull - gram @ found for gram, pull in own])
@@ -126,7 +126,7 @@ def _spread(own: Sequence[tuple[FloatArray, FloatArray]], whole: tuple[FloatArra
     return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ (wide * scores.T @ scores) @ inverse), 0.0)))
 
 
-def _errors(blocks: Sequence[Sequence[Block]], shape: _Shape, numbers: Sequence[FloatArray]) -> FloatArray:
+def _errors(blocks: Sequence[Sequence[Block]], shape: _Parametrisation, numbers: Sequence[FloatArray]) -> FloatArray:
     """(blocks, axes): sums of squares."""
     return np.array(
         [
@@ -139,7 +139,7 @@ def _errors(blocks: Sequence[Sequence[Block]], shape: _Shape, numbers: Sequence[
     )
 
 
-def _matrices(regression: Regression, shape: _Shape, values: FloatArray) -> dict[Part, FloatArray]:
+def _matrices(regression: Regression, shape: _Parametrisation, values: FloatArray) -> dict[Part, FloatArray]:
     axes = len(regression.motions[0].channels)
     found = {part: np.zeros((axes, axes)) for part in PARTS}
     for (part, i, k), value in zip(shape.entries, values, strict=False):
@@ -147,7 +147,9 @@ def _matrices(regression: Regression, shape: _Shape, values: FloatArray) -> dict
     return found
 
 
-def _remainders(regressions: Sequence[Regression], shape: _Shape, found: FloatArray) -> tuple[FloatArray, ...]:
+def _remainders(
+    regressions: Sequence[Regression], shape: _Parametrisation, found: FloatArray
+) -> tuple[FloatArray, ...]:
     weights = [row @ found / regressions[0].scale[shape.columns] for row in shape.rows]
     return tuple(
         np.column_stack(

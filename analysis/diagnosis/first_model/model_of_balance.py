@@ -17,7 +17,7 @@ OPEN = 0.1
 
 
 def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
-    """recording: what `reduced_recordings` makes of it, where the balances hold more than one body per command. None
+    """recording: what `reduce_recordings` makes of it, where the balances hold more than one body per command. None
     where not each command drives one measured motion. Raises MechanicalModelError."""
     regressions = [balance.search.regression for balance in balances]
     count = len(balances)

@@ -30,9 +30,9 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
     "mass-spring": PARTS,
     "gravity": PARTS,
 }
-STUCK = 1e-6
+HELD_FIXED = 1e-6
 """Of the least mass, and one standard deviation of what nothing tells, where no time is known."""
-GAINED = 0.02
+LEAST_GAIN = 0.02
 """Of the plainer structure's error power, and"""
 SURE = 2.0
 """standard errors over the folds, that a richer one must take off."""
@@ -74,7 +74,7 @@ class StructureFit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Balanced:
+class BalancedRecordings:
     """Recordings whose motion was measured along every command."""
 
     recording: Recording
@@ -84,7 +84,7 @@ class Balanced:
     rotational: bool
 
 
-def balanced(recordings: Sequence[Recording]) -> Balanced:
+def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
     """Raises NoMotionError where forces cannot be balanced along a measured motion."""
     first = recordings[0]
     motions = motions_of(observed_parts(recordings, len(first.response.channels)))
@@ -98,10 +98,10 @@ def balanced(recordings: Sequence[Recording]) -> Balanced:
     rotational = any(unit.startswith(("rad", "N m")) for unit in (*first.response.units, *first.command.units))
     turns = any(scales_of(motions, axis, rotational).turns for axis in range(count))
     untimed = not np.isfinite(motions[0].band_hz)
-    return Balanced(first, regressions_of(motions, turns), untimed, turns, rotational)
+    return BalancedRecordings(first, regressions_of(motions, turns), untimed, turns, rotational)
 
 
-def structure_of(given: Balanced, kind: Kind) -> StructureFit:
+def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
     """By the force balance. Raises StructureRefused."""
     _refuse(given, kind)
     parts = ("stiffness",) if given.untimed else PARTS_OF[kind]
@@ -125,7 +125,9 @@ def structure_of(given: Balanced, kind: Kind) -> StructureFit:
     )
 
 
-def modal(recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[float], None]) -> StructureFit:
+def fit_modal_structure(
+    recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[float], None]
+) -> StructureFit:
     """By spectra, for accelerations and for modes. Raises StructureRefused."""
     if kind not in ("mass-spring", "two-mode"):
         raise StructureRefused("it needs a measured position or velocity along every command")
@@ -154,7 +156,7 @@ def modal(recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[fl
     )
 
 
-def plainest(fits: Sequence[StructureFit]) -> StructureFit:
+def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
     """Of balanced fits, the one with fewest numbers from which no richer one takes a noticed part off, fold by fold; a
     part below which no model goes is not noticed."""
     ordered = sorted(fits, key=lambda fit: (len(fit.numbers), fit.error))
@@ -163,12 +165,12 @@ def plainest(fits: Sequence[StructureFit]) -> StructureFit:
         assert best.joint is not None and other.joint is not None
         gains = best.joint.folds - other.joint.folds
         spread = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
-        if gains.sum() > max(GAINED * float(best.joint.folds.sum()), SURE * spread, MODEL_FLOOR**2):
+        if gains.sum() > max(LEAST_GAIN * float(best.joint.folds.sum()), SURE * spread, MODEL_FLOOR**2):
             best = other
     return best
 
 
-def _refuse(given: Balanced, kind: Kind) -> None:
+def _refuse(given: BalancedRecordings, kind: Kind) -> None:
     if given.untimed and kind != "massless":
         raise StructureRefused("no time is known, so neither speeds nor accelerations are: only massless can be fitted")
     if kind == "two-mode":
@@ -179,11 +181,11 @@ def _refuse(given: Balanced, kind: Kind) -> None:
         raise StructureRefused("along a line a weight is a constant force, not a spring: gravity is of pendulums")
 
 
-def _model(given: Balanced, fit: JointFit, kind: Kind) -> MechanicalModel:
+def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalModel:
     """Raises MechanicalModelError."""
     mass, damping, stiffness = (fit.matrices[part] for part in PARTS)
     if kind == "massless":
-        mass = np.diag(_least_mass(given.regressions[0].motions)) * (STUCK if given.untimed else 1.0)
+        mass = np.diag(_least_mass(given.regressions[0].motions)) * (HELD_FIXED if given.untimed else 1.0)
     problems = tuple(
         f"the {name} is negative ({matrix.diagonal().min():.3g})"
         for name, matrix in (("mass", mass), ("damping", damping))
@@ -205,7 +207,7 @@ def _model(given: Balanced, fit: JointFit, kind: Kind) -> MechanicalModel:
     sizes = wide.tolerance
     stated = Tolerance(sizes.mass_kg, sizes.damping_n_s_per_m or None, sizes.stiffness_n_per_m or None, None)
     if given.untimed:
-        stated = Tolerance(STUCK, STUCK, sizes.stiffness_n_per_m, None)
+        stated = Tolerance(HELD_FIXED, HELD_FIXED, sizes.stiffness_n_per_m, None)
     units = recording.command.units, recording.response.units
     return with_units_of(replace(wide, tolerance=stated), *units, time_unit(recording))
 
@@ -217,7 +219,7 @@ def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np
     return np.asarray(MASSLESS_SHARE * force / np.maximum(moved, 1e-300))
 
 
-def _numbers(given: Balanced, fit: JointFit, said: tuple[UnitSystem, Sequence[Part]]) -> tuple[Number, ...]:
+def _numbers(given: BalancedRecordings, fit: JointFit, said: tuple[UnitSystem, Sequence[Part]]) -> tuple[Number, ...]:
     names, (system, parts) = given.recording.command.channels, said
     return tuple(
         Number(f"{part} {name}", matrix_unit(part, system), float(fit.matrices[part][k, k]),
@@ -243,7 +245,7 @@ def _modal_numbers(model: MechanicalModel, recording: Recording) -> tuple[Number
     return tuple(found)
 
 
-def _remarks(given: Balanced, kind: Kind) -> tuple[str, ...]:
+def _remarks(given: BalancedRecordings, kind: Kind) -> tuple[str, ...]:
     if kind == "gravity":
         return (
             "The weight is linearised: its stiffness is mass times lever times the acceleration of gravity at the mean "

@@ -12,9 +12,9 @@ from analysis.diagnosis.balance.friction_laws import SHARP
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.first_model.rectified import restored
-from analysis.diagnosis.first_model.turned_round import turned_round
-from analysis.diagnosis.first_model.unnamed_motion import with_named_motion
+from analysis.diagnosis.first_model.restore_sign import restore_sign
+from analysis.diagnosis.first_model.reversed_commands import reverse_commands
+from analysis.diagnosis.first_model.unnamed_motion import name_motion
 from analysis.wording import listed
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
@@ -36,16 +36,16 @@ def plain_form(recordings: Sequence[Recording], turns: bool = True) -> tuple[Rec
     against their motion are turned round; not where a model says already how they are counted."""
     found, said = tuple(recordings), []
     steps: tuple[Step, ...] = (
-        with_named_motion, _conditions, _moving_commands, _moving_responses, _pushing_responses,
-        restored, _still, _summed,
+        name_motion, _separate_conditions, _select_imposed_motion, _select_motions, _select_forces,
+        restore_sign, _drop_constant_commands, _merge_commands,
     )  # fmt: skip
-    for step in (*steps, turned_round) if turns else steps:
+    for step in (*steps, reverse_commands) if turns else steps:
         found, sentence = step(found)
         said.append(sentence)
     return found, tuple(filter(None, said))
 
 
-def _conditions(recordings: Recordings) -> tuple[Recordings, str]:
+def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
     """Temperatures and settings among the commands."""
     command = recordings[0].command
     others = [k for k, quantity in enumerate(command.quantities) if quantity not in DRIVES]
@@ -56,20 +56,20 @@ def _conditions(recordings: Recordings) -> tuple[Recordings, str]:
     return (
         tuple(
             replace(each, command=each.command.select_channels(kept),
-                    condition=_joined(each.condition, each.command, others),
-                    excitation=None if each.excitation is None else _same(each.excitation, each.command, kept))
+                    condition=_append_channels(each.condition, each.command, others),
+                    excitation=_select_excitation(each.excitation, each.command, kept))
             for each in recordings
         ),
         f"{names} among the commands is no force: it was taken as a condition that laws may depend on.",
     )  # fmt: skip
 
 
-def _moving_commands(recordings: Recordings) -> tuple[Recordings, str]:
+def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
     """An imposed motion whose position and speed were both written down."""
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
         return recordings, ""
-    kept = _lowest(command)
+    kept = _lowest_derivative_channels(command)
     if len(kept) == len(command.channels):
         return recordings, ""
     return tuple(replace(each, command=each.command.select_channels(kept), excitation=None) for each in recordings), (
@@ -77,13 +77,13 @@ def _moving_commands(recordings: Recordings) -> tuple[Recordings, str]:
     )
 
 
-def _moving_responses(recordings: Recordings) -> tuple[Recordings, str]:
+def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
     """Motions of one kind beside others, or beside what is no motion."""
     response = recordings[0].response
     quantities = set(response.quantities)
     if not quantities & MOTIONS or len({DERIVATIVE_OF_QUANTITY.get(quantity, -1) for quantity in quantities}) == 1:
         return recordings, ""
-    kept = _lowest(response)
+    kept = _lowest_derivative_channels(response)
     left = [name for k, name in enumerate(response.channels) if k not in kept]
     return tuple(replace(each, response=each.response.select_channels(kept)) for each in recordings), (
         f"Forces are balanced along {listed([response.channels[k] for k in kept])}; {listed(left)}, of another kind, "
@@ -91,7 +91,7 @@ def _moving_responses(recordings: Recordings) -> tuple[Recordings, str]:
     )
 
 
-def _pushing_responses(recordings: Recordings) -> tuple[Recordings, str]:
+def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
     """Several forces along fewer imposed motions."""
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
@@ -111,7 +111,7 @@ def _pushing_responses(recordings: Recordings) -> tuple[Recordings, str]:
     )
 
 
-def _still(recordings: Recordings) -> tuple[Recordings, str]:
+def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
     """Commands that never change: nothing of their axis can be known. The motion of an axis is left out with its
     command, where there is one for each."""
     command, response = recordings[0].command, recordings[0].response
@@ -139,7 +139,7 @@ def _with_axes(recording: Recording, kept: list[int], paired: bool) -> Recording
     return replace(
         recording,
         command=command.select_channels(kept),
-        excitation=None if excitation is None else _same(excitation, command, kept),
+        excitation=_select_excitation(excitation, command, kept),
         response=recording.response.select_channels(kept) if paired else recording.response,
         position=position.select_channels(kept) if paired and alike and position is not None else position,
     )
@@ -150,7 +150,7 @@ def _verb(names: Sequence[str], name: str) -> str:
     return name if len(names) == 1 else plural[name]
 
 
-def _summed(recordings: Recordings) -> tuple[Recordings, str]:
+def _merge_commands(recordings: Recordings) -> tuple[Recordings, str]:
     """More commands than motions: those that push the same motion become one, each with the gain that fits."""
     command, response = recordings[0].command, recordings[0].response
     if len(command.channels) < 2 or len(response.channels) != 1 or set(response.quantities) <= FORCES:
@@ -198,17 +198,20 @@ def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
     return np.asarray(own / own[main]), main
 
 
-def _lowest(signal: Signal) -> list[int]:
+def _lowest_derivative_channels(signal: Signal) -> list[int]:
     """Channels of the lowest derivative."""
     orders = [DERIVATIVE_OF_QUANTITY[quantity] if quantity in MOTIONS else 9 for quantity in signal.quantities]
     return [k for k, order in enumerate(orders) if order == min(orders)]
 
 
-def _same(excitation: Signal, command: Signal, kept: Sequence[int]) -> Signal | None:
-    return excitation.select_channels(kept) if len(excitation.channels) == len(command.channels) else None
+def _select_excitation(excitation: Signal | None, command: Signal, kept: Sequence[int]) -> Signal | None:
+    """None where there is no excitation, or none for each command."""
+    if excitation is None or len(excitation.channels) != len(command.channels):
+        return None
+    return excitation.select_channels(kept)
 
 
-def _joined(condition: Signal | None, command: Signal, places: Sequence[int]) -> Signal:
+def _append_channels(condition: Signal | None, command: Signal, places: Sequence[int]) -> Signal:
     more = command.select_channels(places)
     if condition is None:
         return more

@@ -34,17 +34,17 @@ def linear_laws(balance: Balance) -> tuple[Law, ...]:
     return (*balance.search.regression.beside.laws, *(each.law for each in balance.laws if each.law.linear))
 
 
-def reduced_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
+def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
     """recordings: those that the balances are of, part by part."""
     found, begin = [], 0
     for recording in recordings:
         parts = parts_of(recording)
-        found.append(_reduced(recording, parts, balances, begin))
+        found.append(_reduce(recording, parts, balances, begin))
         begin += len(parts)
     return tuple(found)
 
 
-def _reduced(
+def _reduce(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], begin: int
 ) -> Recording:
     command = recording.command.samples.copy()
@@ -52,10 +52,10 @@ def _reduced(
         regression = balance.search.regression
         for number, (start, stop) in enumerate(parts, begin):
             motion = regression.motions[number]
-            left = motion.force[:, axis] - _beside(balance, motion)
+            left = motion.force[:, axis] - _force_beside(balance, motion)
             # What lies below an integrated motion's band has no motion to balance it.
             command[start:stop, axis] = motion.band_pass(left[:, None])[:, 0] if motion.order == 2 else left
-    response, integrated = _driven(recording, parts, balances, begin)
+    response, integrated = _driven_motions(recording, parts, balances, begin)
     return replace(
         recording,
         command=replace(recording.command, samples=command),
@@ -67,7 +67,7 @@ def _reduced(
     )
 
 
-def _beside(balance: Balance, motion: Motion) -> FloatArray:
+def _force_beside(balance: Balance, motion: Motion) -> FloatArray:
     """(n,): what the force needs beside the driven motion's own mass, damping and stiffness, and the named laws."""
     regression, d = balance.search.regression, len(motion.channels)
     linear = [each.place for each in balance.laws if each.law.linear]
@@ -81,7 +81,7 @@ def _beside(balance: Balance, motion: Motion) -> FloatArray:
     return np.asarray(whole[:, kept] @ weights[: whole.shape[1]][kept])
 
 
-def _driven(
+def _driven_motions(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], begin: int
 ) -> tuple[Signal, bool]:
     """The driven motions as measured, and whether they are integrals of what was."""

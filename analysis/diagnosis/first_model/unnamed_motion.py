@@ -22,26 +22,26 @@ NEEDED = 0.02
 """Share of the force's power, held out, from which a derivative of the response is of use."""
 
 
-def with_named_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
+def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
     """recordings: alike in channels, units and rate. And what was taken for what; empty where all was said."""
     first = recordings[0]
     if set(first.response.quantities) & KNOWN:
         return recordings, ""
     moved = set(first.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
-    quantity = "force" if moved else _derivative(recordings)
+    quantity = "force" if moved else _likely_quantity(recordings)
     if quantity == "position" and set(first.response.quantities) == {"voltage"}:
         return recordings, ""
     names = listed(list(first.response.channels))
-    return tuple(_with(each, quantity) for each in recordings), (
+    return tuple(_with_quantity(each, quantity) for each in recordings), (
         f"Nothing says what {names} measures: it was taken for a {quantity}, as its course suggests; if it is another, "
         "say so in the map (quantity)."
     )
 
 
-def _derivative(recordings: Sequence[Recording]) -> str:
+def _likely_quantity(recordings: Sequence[Recording]) -> str:
     """Of the first response, against the first command; a position where nothing tells."""
     count = len(recordings[0].response.channels)
-    taken = [replace(_with(each, "position"), position=None) for each in recordings]
+    taken = [replace(_with_quantity(each, "position"), position=None) for each in recordings]
     try:
         motions = motions_of(observed_parts(taken, count))
         regression = regression_of(motions, 0, (), turns=False)
@@ -61,5 +61,5 @@ def _derivative(recordings: Sequence[Recording]) -> str:
     return "velocity" if twice < NEEDED <= itself else "position"
 
 
-def _with(recording: Recording, quantity: str) -> Recording:
+def _with_quantity(recording: Recording, quantity: str) -> Recording:
     return replace(recording, response=replace(recording.response, quantity=quantity))

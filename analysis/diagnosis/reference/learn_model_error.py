@@ -13,7 +13,7 @@ from analysis.diagnosis.errors.whitening_filter import WhiteningFilter, whitenin
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, learn_floor
 from analysis.diagnosis.localisation.mismatch_maps import cells_of
-from analysis.diagnosis.search.explain import retuned_alone
+from analysis.diagnosis.search.explain import retune_alone
 from analysis.diagnosis.search.reference_recordings import ReferenceRecordings, reference_recording
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.settings import LEARNED_TOO_MUCH
@@ -141,7 +141,7 @@ def _rms(courses: Sequence[FloatArray]) -> FloatArray:
 def _learn_from_recording(chosen: Chosen, model: MechanicalModel, recording: Recording, map_: Mapper) -> _Lesson:
     whole, tuning = chosen.measure, tuning_of(model, recording.command.channels)
     context = SearchContext(whole.shorten(), whole, tuning, map_)
-    retuned = context.confirmed(context.candidate(retuned_alone(context)))
+    retuned = context.with_test_score(context.candidate(retune_alone(context)))
     cells = cells_of(whole, retuned.fitted, chosen.floors)
     return _Lesson(whole, tuning, retuned, cells, _channel_shares(whole, retuned))
 

@@ -10,7 +10,7 @@ from analysis.diagnosis.reference.learn_model_error import LearnedError, count_a
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.no_prediction import is_without_prediction
-from analysis.diagnosis.search.search import Searched, searched
+from analysis.diagnosis.search.search import SearchResult, search_effects
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import EXPLAINED_ERROR, NOISE_ALONE
@@ -24,7 +24,7 @@ def search_beside_reference(
     catalogue: Sequence[Effect],
     progress: Progress,
     time_left: TimeBudget,
-) -> Searched:
+) -> SearchResult:
     """context: as without reference recordings, but for what is certain. What is found has its residuals by its own
     measure, with what a device in order differs by counted as noise.
 
@@ -42,7 +42,7 @@ def search_beside_reference(
     )
 
 
-def _mean_log_error(context: SearchContext, seen: Searched) -> float:
+def _mean_log_error(context: SearchContext, seen: SearchResult) -> float:
     """Mean log error power of what is named, on the samples to fit and to choose by."""
     stands = seen.found.after if seen.judged.named else seen.found.retuned
     fitted = evaluate_fit(context.measure, context.tuning, stands.fitted.deviations, stands.fitted.hypothesis)
@@ -55,10 +55,10 @@ def _by_size(
     catalogue: Sequence[Effect],
     progress: Progress,
     time_left: TimeBudget,
-) -> Searched:
+) -> SearchResult:
     wide = replace(learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels))
     plain = count_as_noise(context.whole, wide)
-    seen = searched(replace(context, measure=plain.shorten(), whole=plain), catalogue, progress, time_left)
+    seen = search_effects(replace(context, measure=plain.shorten(), whole=plain), catalogue, progress, time_left)
     back = count_as_noise(context.whole, learned.floor).with_records(seen.context.whole.records)
     own = replace(context, measure=back.shorten(), whole=back)
     return replace(seen, context=own, found=_refit_by(own, seen.found))
@@ -70,11 +70,11 @@ def _by_contrast(
     catalogue: Sequence[Effect],
     progress: Progress,
     time_left: TimeBudget,
-) -> Searched:
+) -> SearchResult:
     plain = count_as_noise(context.whole, learned.floor)
     whole = learned.noise_measure(plain, context.tuning.model)
     beside = replace(context, measure=whole.shorten(), whole=whole, references=learned.references)
-    seen = searched(beside, catalogue, progress, time_left)
+    seen = search_effects(beside, catalogue, progress, time_left)
     plain = plain.with_records(seen.context.whole.records)
     back = replace(context, measure=plain.shorten(), whole=plain)
     found = _refit_by(back, seen.found)

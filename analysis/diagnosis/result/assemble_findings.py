@@ -9,7 +9,7 @@ import numpy as np
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.first_model.turned_round import as_recorded
+from analysis.diagnosis.first_model.reversed_commands import as_recorded
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, mismatch_maps, whole_mismatch
@@ -25,7 +25,7 @@ from analysis.diagnosis.result.unconfirmed import with_gains
 from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import final_errors
-from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE
@@ -37,7 +37,7 @@ from equalizer.signals.signal import FloatArray
 
 
 def assemble_findings(
-    searched: Searched,
+    searched: SearchResult,
     floors: tuple[NoiseFloor, ...],
     names: Sequence[str],
     learned: CleanFloor,
@@ -83,7 +83,7 @@ def assemble_findings(
     )
 
 
-def _models(searched: Searched, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
+def _models(searched: SearchResult, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
     """The re-tuned models with the named effects and without, driven by the commands as they were recorded."""
     tuning, found = searched.context.tuning, searched.found
     fitted, said = found.after.fitted, labels_of(recording, tuning.model)
@@ -109,7 +109,7 @@ def _split_s(measure: ErrorMeasure) -> dict[str, float]:
     }
 
 
-def _standard_errors(searched: Searched) -> FloatArray:
+def _standard_errors(searched: SearchResult) -> FloatArray:
     """Standard errors of the model's own numbers, then of the named effects'; NaN where none is shown. See
     `final_errors`."""
     context, found = searched.context, searched.found
@@ -124,7 +124,7 @@ def _standard_errors(searched: Searched) -> FloatArray:
 
 
 def _document(
-    searched: Searched, errors: FloatArray, looked: tuple[Maps, Localisation], proposal: Proposal | None
+    searched: SearchResult, errors: FloatArray, looked: tuple[Maps, Localisation], proposal: Proposal | None
 ) -> Diagnosis:
     found, judged = searched.found, searched.judged
     measure, tuning, fitted = searched.context.whole, searched.context.tuning, found.after.fitted
@@ -149,13 +149,13 @@ def _document(
     )
 
 
-def _effects_with_gains(searched: Searched, errors: FloatArray, said: Labels) -> tuple[NamedEffect, ...]:
+def _effects_with_gains(searched: SearchResult, errors: FloatArray, said: Labels) -> tuple[NamedEffect, ...]:
     """The named effects, with their gains on held-out data where samples were compared."""
     context, found = searched.context, searched.found
     effects = named_effects(found, errors, said)
     if found.statistic is not None or len(found.steps) != len(effects):
         return effects
-    between = [context.confirmed(step) for step in found.steps[:-1]]
+    between = [context.with_test_score(step) for step in found.steps[:-1]]
     return with_gains(effects, context.whole, (found.plain, *between, found.after))
 
 

@@ -16,7 +16,7 @@ from analysis.diagnosis.result.named_effects import labels_of
 from analysis.diagnosis.result.signature_curves import Names, signature_of
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Part
-from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import SearchContext
 from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter
@@ -34,7 +34,7 @@ class Looks:
     black_box: BlackBox | None
 
 
-def looks_of(searched: Searched, floor: NoiseFloor, maps: Maps) -> Looks:
+def looks_of(searched: SearchResult, floor: NoiseFloor, maps: Maps) -> Looks:
     """floor: of the first recording."""
     context, found = searched.context, searched.found
     measure, tuning, stages = context.whole, context.tuning, found.stages

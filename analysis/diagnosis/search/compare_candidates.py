@@ -19,7 +19,7 @@ from analysis.diagnosis.settings import (
 )
 
 SECOND_ROUNDS, WHOLE_ROUNDS = 4, 2
-MOST_REFRESHED, SETTLED, SETTLED_FAR, STALE = 4, 0.0005, 0.01, 0.5
+MOST_REFRESHED, CONVERGED, CONVERGED_FAR, STALE = 4, 0.0005, 0.01, 0.5
 """What the model's numbers do is recomputed so often, or until that gains no more than such a share, or, far above the
 noise, such a share of the logarithm of what is left; and only where one of them has moved by so many standard
 deviations since, for it costs a simulation for each."""
@@ -30,7 +30,7 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
     worth = _worth_refining(base, fits)
 
     def refit_first(law: Fitted) -> tuple[Fitted, Sensitivity]:
-        return refined_with(context, law)
+        return refine_with_sensitivity(context, law)
 
     first: list[tuple[Fitted, Sensitivity]] = list(
         context.guard.over(map, FITTING)(refit_first, worth[:1])  # type: ignore[arg-type]
@@ -38,34 +38,37 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
     refined = [law for law, _ in first]
 
     def refit(law: Fitted) -> Fitted:
-        near = first and _timeless(law) == _timeless(refined[0])
-        near = near and _apart(context, law, refined[0]) < SHARED_MOTION * (base.cost - refined[0].cost)
-        return refined_with(context, law, first[0][1] if near else None)[0]
+        near = first and _is_timeless(law) == _is_timeless(refined[0])
+        near = near and _prediction_difference(context, law, refined[0]) < SHARED_MOTION * (base.cost - refined[0].cost)
+        return refine_with_sensitivity(context, law, first[0][1] if near else None)[0]
 
     others = [
         law
         for number, law in enumerate(worth[1:MOST_REFINED], 1)
-        if not any(_repeats(context, law, other) for other in worth[:number])
+        if not any(_is_same_start(context, law, other) for other in worth[:number])
     ]
     if refined and context.candidate(refined[0]).score.worst_channel <= NO_SECOND_START:
         others = [law for law in others if context.candidate(law).score.worst_channel <= REACHES_NOISE]
     rest = [law for law in fits[1 if worth else 0 :] if not any(law is other for other in others)]
-    plain = [plain_law for plain_law in rest if any(_holds(richer, plain_law) for richer in refined[:1])][:1]
+    plain = [plain_law for plain_law in rest if any(_contains(richer, plain_law) for richer in refined[:1])][:1]
     refined += context.guard.over(context.map_, FITTING)(refit, [*others, *plain])  # type: ignore[arg-type]
     fitted_candidates = [context.candidate(law) for law in [*refined, *(law for law in rest if law not in plain)]]
     return tuple(sorted(fitted_candidates, key=lambda candidate: candidate.score.mean_log_error))
 
 
-def _timeless(law: Fitted) -> bool:
+def _is_timeless(law: Fitted) -> bool:
     return not any(placed.effect.of_time for placed in law.hypothesis.placed_effects())
 
 
-def _repeats(context: SearchContext, law: Fitted, other: Fitted) -> bool:
+def _is_same_start(context: SearchContext, law: Fitted, other: Fitted) -> bool:
     """Whether a law that was started elsewhere has come to where another start of it is."""
-    return law.hypothesis.key == other.hypothesis.key and _apart(context, law, other) < SAME_START * law.cost
+    return (
+        law.hypothesis.key == other.hypothesis.key
+        and _prediction_difference(context, law, other) < SAME_START * law.cost
+    )
 
 
-def _apart(context: SearchContext, law: Fitted, other: Fitted) -> float:
+def _prediction_difference(context: SearchContext, law: Fitted, other: Fitted) -> float:
     """Mean square of what their predictions differ by, in units of the noise."""
     apart = residuals_to_fit(context.measure, law.residuals) - residuals_to_fit(context.measure, other.residuals)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -80,50 +83,56 @@ def _worth_refining(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
 
 def refine(context: SearchContext, fitted: Fitted) -> Fitted:
     """Fitted until it settles."""
-    return refined_with(context, fitted)[0]
+    return refine_with_sensitivity(context, fitted)[0]
 
 
-def refined_with(
+def refine_with_sensitivity(
     context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
     """Where a drive repeats, first fitted to one period of each segment, whose sensitivities then stand for all of
     them. known: as this gives it back, of a law that moves the device nearly alike."""
     short_form = short_recordings_of(context, fitted.hypothesis)
     if short_form is None:
-        return _settled(context, fitted, known)
+        return _refine_from_both_starts(context, fitted, known)
     short = short_form.context
-    near, known = _settled(
+    near, known = _refine_from_both_starts(
         short, evaluate_fit(short.measure, short.tuning, fitted.deviations, fitted.hypothesis), known
     )
     start = evaluate_fit(context.measure, context.tuning, near.deviations, near.hypothesis)
-    found = fit(context.measure, context.tuning, start, short_form.repeated(known), WHOLE_ROUNDS, context.map_)
+    found = fit(
+        context.measure, context.tuning, start, short_form.repeat_sensitivity(known), WHOLE_ROUNDS, context.map_
+    )
     # What one period leaves open may run away on the whole.
-    return (_plainest(context, found) if found.cost <= fitted.cost else _settled(context, fitted)[0]), known
+    return (
+        _choose_plainest(context, found) if found.cost <= fitted.cost else _refine_from_both_starts(context, fitted)[0]
+    ), known
 
 
-def _settled(context: SearchContext, fitted: Fitted, known: Sensitivity | None = None) -> tuple[Fitted, Sensitivity]:
+def _refine_from_both_starts(
+    context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
+) -> tuple[Fitted, Sensitivity]:
     """With sensitivities recomputed; where more than noise is left, also from the calibration, because re-tuning may
     have absorbed the missing effect and ended in another minimum."""
     # A gain of all that there is counts as the one before: what is shared may have to be computed anew.
-    here, known = _refined_from(context, fitted, known, 1.0)
-    here, known = _of_alike(context, here, known)
+    here, known = _refine_from(context, fitted, known, 1.0)
+    here, known = _refine_similar(context, here, known)
     if context.candidate(here).score.worst_channel <= NO_SECOND_START:
         return here, known
     calibrated = evaluate_fit(context.measure, context.tuning, np.zeros_like(here.deviations), here.hypothesis)
-    there, beside = _refined_from(context, calibrated, known)
+    there, beside = _refine_from(context, calibrated, known)
     return (there, beside) if there.cost < here.cost else (here, known)
 
 
-def _of_alike(context: SearchContext, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
+def _refine_similar(context: SearchContext, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
     """The best of the hypotheses that behave almost alike, each fitted; the plain one where it is as good as any."""
     best = fitted, known
     for other in similar_hypotheses(fitted.hypothesis):
-        beside = _refined_from(context, evaluate_fit(context.measure, context.tuning, fitted.deviations, other), known)
+        beside = _refine_from(context, evaluate_fit(context.measure, context.tuning, fitted.deviations, other), known)
         best = beside if beside[0].cost < best[0].cost else best
-    return _plainest(context, best[0]), best[1]
+    return _choose_plainest(context, best[0]), best[1]
 
 
-def _plainest(context: SearchContext, fitted: Fitted) -> Fitted:
+def _choose_plainest(context: SearchContext, fitted: Fitted) -> Fitted:
     best = fitted
     for other in similar_hypotheses(fitted.hypothesis):
         plain = evaluate_fit(context.measure, context.tuning, best.deviations, other)
@@ -132,7 +141,7 @@ def _plainest(context: SearchContext, fitted: Fitted) -> Fitted:
     return best
 
 
-def _refined_from(
+def _refine_from(
     context: SearchContext, fitted: Fitted, known: Sensitivity | None, before: float = np.inf
 ) -> tuple[Fitted, Sensitivity]:
     """known: sensitivity at another point of the same hypothesis, or of one that moves the device nearly alike; None =
@@ -147,7 +156,7 @@ def _refined_from(
         # Gains shrink about evenly, so that the next one can be foreseen.
         foreseen, before = gained * min(gained / before, 1.0) if before > 0 else gained, gained
         best = better
-        settled = (foreseen if complete else gained) < max(SETTLED, SETTLED_FAR * np.log(max(best.cost, 1.0)))
+        settled = (foreseen if complete else gained) < max(CONVERGED, CONVERGED_FAR * np.log(max(best.cost, 1.0)))
         if (complete and settled) or (context.candidate(best).score.worst_channel <= NO_SECOND_START and settled):
             break
         if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:
@@ -156,7 +165,7 @@ def _refined_from(
     return best, there
 
 
-def _holds(richer: Fitted, plain: Fitted) -> bool:
+def _contains(richer: Fitted, plain: Fitted) -> bool:
     """Whether the last claim contains the other's as a special case: then both must be fitted equally well."""
     last, other = richer.hypothesis.claims[-1], plain.hypothesis.claims[-1]
     return other.effect.name in last.effect.simpler and set(other.sites) <= set(last.sites)

@@ -11,7 +11,7 @@ from analysis.diagnosis.search.compare_candidates import compare_candidates, ref
 from analysis.diagnosis.search.no_prediction import predicts_nothing
 from analysis.diagnosis.search.parsimony import excludes, plainest_first
 from analysis.diagnosis.search.same_within_errors import excess
-from analysis.diagnosis.search.screening import Screened, screen
+from analysis.diagnosis.search.screening import ScreenedHypothesis, screen
 from analysis.diagnosis.search.search_context import (
     FITTING,
     SCREENING,
@@ -23,7 +23,7 @@ from analysis.diagnosis.search.search_context import (
 )
 from analysis.diagnosis.search.short_recordings import ShortRecordings, short_recordings_of
 from analysis.diagnosis.search.starting_hypotheses import CLOCK_DRIFT, candidates, clock_drift_by_trial, within_data
-from analysis.diagnosis.search.time_budget import OutOfTimeError, always, budgeted
+from analysis.diagnosis.search.time_budget import OutOfTimeError, always, limit_map
 from analysis.diagnosis.settings import (
     ADDED_GAIN,
     ADDED_SHARE,
@@ -60,14 +60,16 @@ def fits_on_short_recordings(
     fits: list[Fitted] = list(each(whole, first_fits(short, there, known, screened)))  # type: ignore[arg-type]
     if timed:
         # What the model's own numbers do repeats all the same.
-        repeats = short_form.repeated(known)
+        repeats = short_form.repeat_sensitivity(known)
         screened = screen(context.measure, context.tuning, base, repeats, timed, guard.over(context.map_, SCREENING))
-        fits += first_fits(context, base, repeats, _promising(base, fits, screened))
+        fits += first_fits(context, base, repeats, _keep_promising(base, fits, screened))
     # A law that the short recordings leave open may run away on the whole.
     return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda found: found.cost)
 
 
-def _promising(base: Fitted, fits: Sequence[Fitted], screened: Sequence[Screened]) -> list[Screened]:
+def _keep_promising(
+    base: Fitted, fits: Sequence[Fitted], screened: Sequence[ScreenedHypothesis]
+) -> list[ScreenedHypothesis]:
     """Those that foresee as much of the best gain so far as a first fit asks for."""
     best = max((base.cost - law.cost for law in fits), default=0.0)
     return [law for law in screened if base.cost - law.cost >= max(WORTH_FITTING * best, 0.0)]
@@ -124,16 +126,16 @@ def explain(
     """time_left: asked before each piece of the search for effects; what was found when it says no is kept."""
     before = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
-    retuned = _retuned_from(context, before)
+    retuned = _retune(context, before)
     base = context.candidate(retuned)
-    confirmed = context.confirmed(base)
+    confirmed = context.with_test_score(base)
     surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > SEALED_SURPRISE)
     rounds: list[tuple[FittedCandidate, ...]] = []
     steps: list[FittedCandidate] = []
     barred, ended_early = "", False
-    within_time = replace(context, map_=budgeted(context.map_, time_left))
+    within_time = replace(context, map_=limit_map(context.map_, time_left))
     for certain in context.certain:
-        base = _with(context, base, certain)
+        base = _add_certain(context, base, certain)
         rounds.append((base,))
         steps.append(base)
     more = SEARCH_ON * (1.0 if context.references is None else context.references.beyond)
@@ -142,24 +144,24 @@ def explain(
         and len(rounds) < MOST_EFFECTS
         and (base.score.worst_channel > (more if rounds else NOISE_ALONE) or (surprised and not rounds))
     ):
-        step = Step(f"looking for the {_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
+        step = Step(f"looking for the {_ORDINALS[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
         try:
-            tried = _next(within_time, catalogue, base.fitted, step)
+            tried = _find_next_effect(within_time, catalogue, base.fitted, step)
         except OutOfTimeError:
             ended_early = True
             break
         named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
         rounds.append(named)
-        if not named or not worthwhile(base, named[0]) or named[0] is not tried[0]:
-            barred = tried[0].newest if named and worthwhile(base, named[0]) else ""
+        if not named or not is_worthwhile(base, named[0]) or named[0] is not tried[0]:
+            barred = tried[0].newest if named and is_worthwhile(base, named[0]) else ""
             break
         base = named[0]
         steps.append(base)
-    ends = (context.confirmed(context.candidate(before)), confirmed, context.confirmed(base))
+    ends = (context.with_test_score(context.candidate(before)), confirmed, context.with_test_score(base))
     return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early, barred=barred)
 
 
-def _with(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:
+def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:
     """With a hypothesis that is certain, whether or not it lowers the error."""
     start = evaluate_fit(
         context.measure, context.tuning, base.fitted.deviations, combine(base.fitted.hypothesis, hypothesis)
@@ -167,14 +169,12 @@ def _with(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis)
     return context.candidate(refine(context, start))
 
 
-def retuned_alone(context: SearchContext) -> Fitted:
+def retune_alone(context: SearchContext) -> Fitted:
     """The model re-tuned, without any added effect."""
-    return _retuned_from(
-        context, evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
-    )
+    return _retune(context, evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
 
 
-def _retuned_from(context: SearchContext, before: Fitted) -> Fitted:
+def _retune(context: SearchContext, before: Fitted) -> Fitted:
     return refine(context, before)
 
 
@@ -190,23 +190,25 @@ class Step:
         self.progress(self.what, self.begun + 0.3 * share)
 
 
-def _next(context: SearchContext, catalogue: Sequence[Effect], base: Fitted, step: Step) -> tuple[FittedCandidate, ...]:
+def _find_next_effect(
+    context: SearchContext, catalogue: Sequence[Effect], base: Fitted, step: Step
+) -> tuple[FittedCandidate, ...]:
     step.at(0.0)
     evidence = gather_evidence(context.measure, context.tuning, base)[0]
     told = [effect for effect in catalogue if context.measure.can_observe(effect)]
     short_form = short_recordings_of(context, base.hypothesis)
     if short_form is None:
-        suggested = _suggested(context, base.hypothesis, told, evidence)
+        suggested = _suggest_hypotheses(context, base.hypothesis, told, evidence)
         known = sensitivity_at(context, base.deviations, base.hypothesis)
         step.at(0.2)
         each = context.guard.over(context.map_, SCREENING)
         screened = screen(context.measure, context.tuning, base, known, suggested, each)
         fits = first_fits(context, base, known, screened)
     else:
-        timeless = _suggested(
+        timeless = _suggest_hypotheses(
             context, base.hypothesis, [effect for effect in told if not effect.of_time], short_form.of(evidence)
         )
-        timed = _suggested(context, base.hypothesis, [effect for effect in told if effect.of_time], evidence)
+        timed = _suggest_hypotheses(context, base.hypothesis, [effect for effect in told if effect.of_time], evidence)
         step.at(0.2)
         fits = fits_on_short_recordings(context, short_form, base, timeless, timed)
     step.at(0.6)
@@ -221,7 +223,7 @@ def _next(context: SearchContext, catalogue: Sequence[Effect], base: Fitted, ste
     )
 
 
-def _suggested(
+def _suggest_hypotheses(
     context: SearchContext, held: Hypothesis, catalogue: Sequence[Effect], evidence: Evidence
 ) -> list[Hypothesis]:
     suggested = [
@@ -234,7 +236,7 @@ def _suggested(
     return suggested
 
 
-def worthwhile(base: FittedCandidate, better: FittedCandidate) -> bool:
+def is_worthwhile(base: FittedCandidate, better: FittedCandidate) -> bool:
     """Whether an effect lowers the error enough to be added. Where only the worst channel is above the noise, and not
     the mean over channels, its logarithm must fall by half."""
     gained, over = base.score.mean_log_error - better.score.mean_log_error, np.log(base.score.worst_channel)
@@ -243,4 +245,4 @@ def worthwhile(base: FittedCandidate, better: FittedCandidate) -> bool:
     return gained > max(ADDED_SHARE * excess(base), ADDED_GAIN)
 
 
-_COUNTED = ("first", "second", "third")
+_ORDINALS = ("first", "second", "third")

@@ -52,7 +52,7 @@ class Guard:
         def mapped(function: Callable[..., object], items: Iterable[object]) -> Iterable[object]:
             @wraps(function)
             def kept(item: object) -> tuple[object, ...] | Crash:
-                return _tried(_effect_of(item), doing, lambda: function(item))
+                return _try(_effect_of(item), doing, lambda: function(item))
 
             results: list[tuple[object, ...] | Crash] = list(map_(kept, items))  # type: ignore[arg-type]
             # Noted here, for it may have happened in another process.
@@ -71,7 +71,7 @@ class Guard:
     ) -> Result:
         """Of a piece of the work that can be left out. what: an effect's name, or words. answers: errors that say
         something to a user, and are no crashes."""
-        found = _tried(what, doing, work, answers) if self.on else (work(),)
+        found = _try(what, doing, work, answers) if self.on else (work(),)
         if isinstance(found, Crash):
             self.crashes.append(found)
             return instead
@@ -81,7 +81,7 @@ class Guard:
         """The results of pieces that need nothing of each other."""
 
         def tried(piece: Part) -> tuple[Any] | Crash:
-            return _tried(piece.what, piece.doing, piece.work) if self.on else (piece.work(),)
+            return _try(piece.what, piece.doing, piece.work) if self.on else (piece.work(),)
 
         results: list[tuple[Any] | Crash] = list(map_(tried, pieces))  # type: ignore[arg-type]
         self.crashes.extend(found for found in results if isinstance(found, Crash))
@@ -96,7 +96,7 @@ class Guard:
         return tuple(_sentence(what, self.crashes) for what in dict.fromkeys(crash.what for crash in self.crashes))
 
 
-def _tried(
+def _try(
     what: str, doing: str, work: Callable[[], Result], answers: tuple[type[Exception], ...] = ()
 ) -> tuple[Result] | Crash:
     try:

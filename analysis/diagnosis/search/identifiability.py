@@ -46,58 +46,62 @@ def final_errors(context: SearchContext, found: Explanation) -> FloatArray:
     short_form = short_recordings_of(context, fitted.hypothesis)
     near = context if short_form is None else short_form.context
     known = sensitivity_at(near, fitted.deviations, fitted.hypothesis, with_forces=single)
-    known = known if short_form is None else short_form.repeated(known)
+    known = known if short_form is None else short_form.repeat_sensitivity(known)
     return standard_errors(context.measure, context.tuning, fitted, known)
 
 
-def identified(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
+def keep_identifiable(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
     """The same where all numbers are determined; else without the effects whose numbers are not, or with an explanation
     that is as good and whose numbers are determined."""
     if not found.steps:
         return found
-    found = _profiled(context, found, time_left)
-    left_open = [number for number, is_open in enumerate(_open(context, found)) if is_open]
+    found = _with_profile_errors(context, found, time_left)
+    left_open = [number for number, is_open in enumerate(_open_effects(context, found)) if is_open]
     if not left_open:
         return found
     worst = left_open[-1]
     name = found.after.fitted.hypothesis.claims[worst].effect.name
     known = (*found.undetermined, name)
     if len(found.steps) == 1 or (worst < len(found.steps) - 1 and not time_left()):
-        found = (_instead(context, found, time_left) if len(found.steps) == 1 else None) or _nothing(found)
+        found = (_find_replacement(context, found, time_left) if len(found.steps) == 1 else None) or _without_effects(
+            found
+        )
         return replace(found, undetermined=known)
     fewer = without_effect(context, found, worst)
     rounds = tuple(
         tuple(candidate for candidate in fitted_candidates if candidate.newest != name)
         for fitted_candidates in fewer.rounds
     )
-    return identified(context, replace(fewer, rounds=rounds, undetermined=known), time_left)
+    return keep_identifiable(context, replace(fewer, rounds=rounds, undetermined=known), time_left)
 
 
-def _instead(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation | None:
+def _find_replacement(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation | None:
     """The next explanation that is as good and whose numbers are determined."""
     best = found.rounds[0][0]
     others = tuple(candidate for candidate in found.rounds[0] if candidate.newest != best.newest)
     as_good = {candidate.newest: candidate for candidate in reversed(others) if both_stand(best, candidate)}
     for other in sorted(as_good.values(), key=lambda candidate: candidate.score.mean_log_error)[:REPLACEMENTS_TRIED]:
         rest = tuple(candidate for candidate in others if candidate is not other)
-        instead = replace(found, after=context.confirmed(other), rounds=((other, *rest),), steps=(other,), errors=None)
-        instead = _profiled(context, instead, time_left)
-        if not any(_open(context, instead)):
+        instead = replace(
+            found, after=context.with_test_score(other), rounds=((other, *rest),), steps=(other,), errors=None
+        )
+        instead = _with_profile_errors(context, instead, time_left)
+        if not any(_open_effects(context, instead)):
             return instead
     return None
 
 
-def _nothing(found: Explanation) -> Explanation:
+def _without_effects(found: Explanation) -> Explanation:
     return replace(found, after=found.retuned, steps=())
 
 
-def _profiled(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
+def _with_profile_errors(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
     """With the standard errors of the final fit; those of an effect's only number from its profile, where the
     linearised interval holds none, and the profile tells it from none. The profile of an effect before the last fits
     those after it anew, which is left out where no time is left."""
     errors = final_errors(context, found).copy()
     first = len(context.tuning.names)
-    for effect, own in enumerate(_could_be_none(found, errors[first:])):
+    for effect, own in enumerate(_numbers_with_none(found, errors[first:])):
         refits = effect < len(found.steps) - 1
         if found.statistic is not None or len(own) != 1 or (refits and not time_left()):
             continue
@@ -105,7 +109,7 @@ def _profiled(context: SearchContext, found: Explanation, time_left: TimeBudget)
         reach, away = _reach(number, at, error)
         if not away < reach <= UNDETERMINED_REACH * away:
             continue
-        sure = told_from_none(context, found, effect)
+        sure = distance_from_none(context, found, effect)
         if sure > 1:
             share = away / (sure * reach)
             by_factor = number.parameter.scale == "log"
@@ -113,7 +117,7 @@ def _profiled(context: SearchContext, found: Explanation, time_left: TimeBudget)
     return replace(found, errors=(found.steps[-1].fitted, errors))
 
 
-def _could_be_none(found: Explanation, errors: FloatArray) -> Iterator[list[tuple[Number, int, float, float]]]:
+def _numbers_with_none(found: Explanation, errors: FloatArray) -> Iterator[list[tuple[Number, int, float, float]]]:
     """Per effect, its numbers that have a value meaning no effect: with place, coordinate and standard error."""
     hypothesis, first = found.after.fitted.hypothesis, 0
     each = list(zip(hypothesis.numbers, range(len(errors)), hypothesis.point.tolist(), errors.tolist(), strict=True))
@@ -124,9 +128,9 @@ def _could_be_none(found: Explanation, errors: FloatArray) -> Iterator[list[tupl
         yield [number for number in own if number[0].parameter.none is not None]
 
 
-def _open(context: SearchContext, found: Explanation) -> Iterator[bool]:
+def _open_effects(context: SearchContext, found: Explanation) -> Iterator[bool]:
     """By effect: whether the intervals of all its numbers that have a value meaning no effect hold it."""
-    for own in _could_be_none(found, number_errors(context, found)):
+    for own in _numbers_with_none(found, number_errors(context, found)):
         yield bool(own) and all(_is_open(number, at, error) for number, _, at, error in own)
 
 
@@ -142,7 +146,7 @@ def _reach(number: Number, at: float, error: float) -> tuple[float, float]:
     return 1.96 * INTERVAL_FACTOR * abs(number.value(at + error) - value), abs(value - none)
 
 
-def told_from_none(context: SearchContext, found: Explanation, effect: int) -> float:
+def distance_from_none(context: SearchContext, found: Explanation, effect: int) -> float:
     """How many standard errors an effect's only number is away from none, over those that an interval spans; above 1,
     the interval does not hold none. effect: its place."""
     with_it = found.steps[-1].fitted

@@ -33,7 +33,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 WORDS = "band power of the response"
-COURSES = 4
+SIMULATIONS = 4
 """Simulations of one hypothesis: their spread is what chance does, their mean what the last fit compares."""
 WIDTHS = np.geomspace(0.02, 5.0, 13)
 """Gaps that are tried, over the estimated one."""
@@ -44,30 +44,30 @@ GAINED = 0.02
 RIVAL = "loose_joint"
 
 
-def rattling(
+def explain_impacts(
     context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor], catalogue: Sequence[Effect]
 ) -> Explanation | None:
     """None where the response is regular, or where play does not explain it."""
     effects = {effect.name: effect for effect in catalogue}
     if "backlash" not in effects or not isinstance(context.whole, FreeSimulation):
         return None
-    if not irregular(context, found, floors):
+    if not is_irregular(context, found, floors):
         return None
     given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     evidence = gather_evidence(context.measure, context.tuning, given)[0]
     view = View(BandPower(context.measure), context.tuning, context.map_)
     claims = [Claim(effects["backlash"], "one", (axis,)) for axis in range(context.tuning.model.inputs)]
-    places = sorted((_at(view, evidence, claim) for claim in claims), key=lambda claim: claim.cost)
+    places = sorted((_fit_claim(view, evidence, claim) for claim in claims), key=lambda claim: claim.cost)
     if places[0].cost >= evaluate_hypothesis(view, given.deviations, NOTHING).cost:
         return None
-    best = _refined(view, places[0])
+    best = _refine(view, places[0])
     others = list(places[1:])
     if RIVAL in effects:
-        others.append(_at(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
-    return _judged(context, found, best, [rival.hypothesis for rival in others if _is_model(rival)])
+        others.append(_fit_claim(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
+    return _judge(context, found, best, [rival.hypothesis for rival in others if _is_model(rival)])
 
 
-def _at(view: View, evidence: Evidence, claim: Claim) -> BandPowerFit:
+def _fit_claim(view: View, evidence: Evidence, claim: Claim) -> BandPowerFit:
     """The best fit of a claim, on the segments that excite its axis."""
     measure = view.power.measure
     assert isinstance(measure, FreeSimulation)
@@ -88,7 +88,7 @@ def _is_model(trial: BandPowerFit) -> bool:
     return bool(trial.hypothesis.claims) and bool(np.isfinite(trial.cost))
 
 
-def _refined(view: View, start: BandPowerFit) -> BandPowerFit:
+def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
     """Own and the model's numbers together: with play, the model's numbers do something else than without."""
     view = _with_chance(view, start)
     best = evaluate_hypothesis(view, start.deviations, start.hypothesis)
@@ -108,8 +108,8 @@ def _with_chance(view: View, at: BandPowerFit) -> View:
     def course(number: int) -> FloatArray:
         return view.predict(at.deviations, perturb(at.hypothesis, number))
 
-    spread = np.std(np.array(list(view.map_(course, range(COURSES)))), axis=0, ddof=1)
-    return replace(view, spread=spread, ensemble=COURSES)
+    spread = np.std(np.array(list(view.map_(course, range(SIMULATIONS)))), axis=0, ddof=1)
+    return replace(view, spread=spread, ensemble=SIMULATIONS)
 
 
 def _by_deviations(view: View, at: BandPowerFit) -> FloatArray:
@@ -132,7 +132,7 @@ class _Comparison:
     chance: FloatArray
     """(c,)"""
 
-    def scored(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
+    def score_candidate(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
         whole = evaluate_fit(self.context.whole, self.context.tuning, deviations, hypothesis)
         off = self.power.misfits(self.power.measured - self.power.predict(whole.residuals))
         return FittedCandidate(whole, FitScore(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
@@ -142,24 +142,27 @@ class _Comparison:
         return off if np.isnan(off).all() else np.where(np.isnan(off), 1.0, off / self.chance)
 
 
-def _judged(
+def _judge(
     context: SearchContext, found: Explanation, best: BandPowerFit, others: Sequence[Hypothesis]
 ) -> Explanation | None:
     comparison = _comparison(context, best)
-    named = comparison.scored(best.deviations, best.hypothesis)
+    named = comparison.score_candidate(best.deviations, best.hypothesis)
     given = np.zeros_like(best.deviations)
-    before = comparison.scored(given, NOTHING)
-    linear = [before, *(comparison.scored(at, NOTHING) for at in (found.retuned.fitted.deviations, best.deviations))]
+    before = comparison.score_candidate(given, NOTHING)
+    linear = [
+        before,
+        *(comparison.score_candidate(at, NOTHING) for at in (found.retuned.fitted.deviations, best.deviations)),
+    ]
     retuned = min(linear, key=lambda candidate: candidate.score.mean_log_error)
-    rivals = [comparison.scored(given, rival) for rival in others]
+    rivals = [comparison.score_candidate(given, rival) for rival in others]
     earlier = (*(found.rounds[0] if found.rounds else ()), *found.steps[1:])
     rivals += [
-        comparison.scored(candidate.fitted.deviations, candidate.fitted.hypothesis)
+        comparison.score_candidate(candidate.fitted.deviations, candidate.fitted.hypothesis)
         for candidate in earlier
         if candidate.fitted.hypothesis.key[-1] != best.hypothesis.key[-1]
     ]
     rivals.sort(key=lambda rival: rival.score.mean_log_error)
-    if not _convincing(named, retuned) or any(_as_good(rival, named) for rival in rivals):
+    if not _is_convincing(named, retuned) or any(_as_good(rival, named) for rival in rivals):
         return None
     statistic = Statistic(WORDS, comparison.chance, best.errors)
     return Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
@@ -177,27 +180,35 @@ def _comparison(context: SearchContext, best: BandPowerFit) -> _Comparison:
     return _Comparison(context, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
 
 
-def _convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
+def _is_convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
     pairs = [
         (getattr(retuned.score, part), getattr(named.score, part))
         for part in ("choose", "test")
         if np.isfinite(getattr(named.score, part)).any()
     ]
-    return all(_whole(left) <= (1 - IMPACTS_SHARE) * _whole(of) and _whole(left) <= IMPACTS_ERROR for of, left in pairs)
+    return all(
+        _rms_over_channels(left) <= (1 - IMPACTS_SHARE) * _rms_over_channels(of)
+        and _rms_over_channels(left) <= IMPACTS_ERROR
+        for of, left in pairs
+    )
 
 
 def _as_good(rival: FittedCandidate, named: FittedCandidate) -> bool:
     ways = [(getattr(candidate.score, part) for candidate in (rival, named)) for part in ("choose", "test")]
-    return all(_whole(other) <= IMPACTS_AS_GOOD * _whole(own) for other, own in ways if np.isfinite(other).any())
+    return all(
+        _rms_over_channels(other) <= IMPACTS_AS_GOOD * _rms_over_channels(own)
+        for other, own in ways
+        if np.isfinite(other).any()
+    )
 
 
-def _whole(times: FloatArray) -> float:
+def _rms_over_channels(times: FloatArray) -> float:
     """Root mean square over the channels."""
     return float(np.sqrt(np.nanmean(times**2)))
 
 
 # A response is irregular where repeats differ by far more than the noise or, without repeats, its residual is peaked.
-def irregular(context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
+def is_irregular(context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
     if any(floor.how == "repeats" for floor in floors):
         return any(_varies(channel) for floor in floors for channel in (floor.response, floor.position) if channel)
     masks = [record.fit | record.choose for record in context.whole.records]

@@ -16,30 +16,30 @@ _TINY = 1e-300
 
 def is_without_prediction(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
     """Whether in no channel, on the samples to fit and choose by, the prediction is better than none."""
-    return bool((_left(measure, candidate.fitted) >= NO_PREDICTION_SHARE * _signal(measure)).all())
+    return bool((_residual_rms(measure, candidate.fitted) >= NO_PREDICTION_SHARE * _signal_rms(measure)).all())
 
 
 def predicts_nothing(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
     """Whether the new effect leaves no predictive power, far above the noise, in the channel where it gains most or
     whose sensor it acts on: a low pass that passes nothing explains nothing, though it frees the model for others."""
-    before, left = _left(measure, base), _left(measure, fitted)
+    before, left = _residual_rms(measure, base), _residual_rms(measure, fitted)
     most = int(np.argmax(np.log(np.maximum(before, _TINY)) - np.log(np.maximum(left, _TINY))))
     claim = fitted.hypothesis.claims[-1]
     sensed = claim.sites if place_of_effect(claim.effect) == "sensor" else ()
-    nothing = left >= np.maximum(NO_PREDICTION_SHARE * _signal(measure), NO_PREDICTION_ERROR * measure.noise)
+    nothing = left >= np.maximum(NO_PREDICTION_SHARE * _signal_rms(measure), NO_PREDICTION_ERROR * measure.noise)
     return bool(nothing[most] or any(nothing[site] for site in sensed if site < len(nothing)))
 
 
-def _left(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
+def _residual_rms(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
     """(c,): rms"""
-    return np.asarray(rms_over(measure.records, fitted.residuals, _seen(measure)) * measure.unit)
+    return np.asarray(rms_over(measure.records, fitted.residuals, _decision_samples(measure)) * measure.unit)
 
 
-def _signal(measure: ErrorMeasure) -> FloatArray:
+def _signal_rms(measure: ErrorMeasure) -> FloatArray:
     """(c,): rms"""
     signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
-    return rms_over(measure.records, signals, _seen(measure))
+    return rms_over(measure.records, signals, _decision_samples(measure))
 
 
-def _seen(measure: ErrorMeasure) -> list[Mask]:
+def _decision_samples(measure: ErrorMeasure) -> list[Mask]:
     return [record.fit | record.choose for record in measure.records]

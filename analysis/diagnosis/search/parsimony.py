@@ -48,10 +48,12 @@ def plainest_first(fitted_candidates: Sequence[FittedCandidate]) -> tuple[Fitted
 
 
 def _is_plainer(plain: FittedCandidate, other: FittedCandidate) -> bool:
-    return only_refines(other, plain) or (_price(plain) < _price(other) and not only_refines(plain, other))
+    return only_refines(other, plain) or (
+        _information_criterion(plain) < _information_criterion(other) and not only_refines(plain, other)
+    )
 
 
-def _price(candidate: FittedCandidate) -> float:
+def _information_criterion(candidate: FittedCandidate) -> float:
     """Akaike's information criterion (1974): two per number, and the squared deviations from the calibration."""
     deviations = candidate.fitted.deviations
     return 2.0 * len(candidate.fitted.hypothesis.point) + float(deviations @ deviations)
@@ -59,7 +61,7 @@ def _price(candidate: FittedCandidate) -> float:
 
 def only_refines(other: FittedCandidate, plain: FittedCandidate) -> bool:
     """Whether the other's last effect contains the plain one's as a special case, at the same place."""
-    return _contained(plain, other)
+    return _is_special_case(plain, other)
 
 
 def both_stand(named: FittedCandidate, other: FittedCandidate) -> bool:
@@ -67,13 +69,13 @@ def both_stand(named: FittedCandidate, other: FittedCandidate) -> bool:
     return inseparable(named, other) and not only_refines(other, named)
 
 
-def _contained(candidate: FittedCandidate, other: FittedCandidate) -> bool:
+def _is_special_case(candidate: FittedCandidate, other: FittedCandidate) -> bool:
     plain, refined = candidate.fitted.hypothesis.claims[-1], other.fitted.hypothesis.claims[-1]
     return plain.effect.name in refined.effect.simpler and set(plain.sites) <= set(refined.sites)
 
 
 def _good_enough(plain: FittedCandidate, refined: FittedCandidate) -> bool:
-    if not _contained(plain, refined):
+    if not _is_special_case(plain, refined):
         return inseparable(refined, plain)
     gained = plain.score.mean_log_error - refined.score.mean_log_error
     rubs = plain.newest in DRY_FRICTION

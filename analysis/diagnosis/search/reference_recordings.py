@@ -29,7 +29,7 @@ class ReferenceRecording:
     """Of the model's numbers, there."""
     evidence: Evidence
 
-    def gained(self, wanted: Hypothesis) -> FloatArray:
+    def gain_on_clean(self, wanted: Hypothesis) -> FloatArray:
         """(c,): fall of the logarithm of the rms error by the hypothesis, both fitted."""
         measure, tuning = self.measure, self.tuning
         starts = [
@@ -60,12 +60,12 @@ class ReferenceRecordings:
     """A gain counts by what is more than so many times that on the reference ones: the fewer, the more."""
     seen: dict[object, FloatArray] = field(default_factory=dict)
 
-    def gained(self, hypothesis: Hypothesis) -> FloatArray:
+    def gain_on_clean(self, hypothesis: Hypothesis) -> FloatArray:
         """(c,): the gain that is counted against the hypothesis; 0 for a model without effects."""
         if not hypothesis.claims:
             return np.zeros(1)
         if hypothesis.key not in self.seen:
-            gains = np.max([each.gained(hypothesis) for each in self.each], axis=0)
+            gains = np.max([each.gain_on_clean(hypothesis) for each in self.each], axis=0)
             self.seen[hypothesis.key] = self.beyond * np.maximum(gains, 0.0)
         return self.seen[hypothesis.key]
 

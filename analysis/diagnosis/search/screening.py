@@ -14,7 +14,7 @@ from analysis.diagnosis.types import Mapper
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Screened:
+class ScreenedHypothesis:
     hypothesis: Hypothesis
     """Together with what is already held to be true."""
     cost: float
@@ -28,22 +28,22 @@ def screen(
     known: Sensitivity,
     suggested: Sequence[Hypothesis],
     map_: Mapper,
-) -> tuple[Screened, ...]:
+) -> tuple[ScreenedHypothesis, ...]:
     """The best first."""
     model = tuning.tune(base.deviations)
     errors = residuals_to_fit(measure, base.residuals)
 
-    def foreseen(hypothesis: Hypothesis) -> Screened:
+    def foreseen(hypothesis: Hypothesis) -> ScreenedHypothesis:
         whole = combine(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
             there = residuals_to_fit(measure, measure.residuals(model, whole.placed_effects()))
-        return Screened(whole, _reached(base, known, errors, errors - there))
+        return ScreenedHypothesis(whole, _predicted_cost(base, known, errors, errors - there))
 
-    found: list[Screened] = list(map_(foreseen, suggested))  # type: ignore[arg-type]
+    found: list[ScreenedHypothesis] = list(map_(foreseen, suggested))  # type: ignore[arg-type]
     return tuple(sorted(found, key=lambda screened: screened.cost))
 
 
-def _reached(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray) -> float:
+def _predicted_cost(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray) -> float:
     with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
         strength = float(change @ change)
     if not (np.isfinite(strength) and strength > 0):

@@ -7,8 +7,8 @@ import numpy as np
 
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.search.explain import Explanation, explain, worthwhile
-from analysis.diagnosis.search.identifiability import identified
+from analysis.diagnosis.search.explain import Explanation, explain, is_worthwhile
+from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
@@ -20,25 +20,25 @@ from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
 
 
-def pruned(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
+def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
     """Backward elimination: effects that forward selection added and that are not needed are removed."""
     if found.statistic is not None or context.certain:
         return found
     if len(found.steps) == 2 and time_left():
-        found = _without_former(context, found)
+        found = _drop_former(context, found)
     if context.references is None:
-        found = _without_little(context, found)
-    return identified(context, found, time_left)
+        found = _drop_negligible(context, found)
+    return keep_identifiable(context, found, time_left)
 
 
-def _without_former(context: SearchContext, found: Explanation) -> Explanation:
+def _drop_former(context: SearchContext, found: Explanation) -> Explanation:
     """Of two effects, the later alone where it does as well: the earlier may have stood in for it."""
     alone = without_effect(context, found, 0)
-    kept = worthwhile(alone.steps[-1], found.steps[-1]) or not np.isfinite(alone.steps[-1].fitted.cost)
+    kept = is_worthwhile(alone.steps[-1], found.steps[-1]) or not np.isfinite(alone.steps[-1].fitted.cost)
     return found if kept else alone
 
 
-def _without_little(context: SearchContext, found: Explanation) -> Explanation:
+def _drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
     while len(found.steps) > 1 and not as_good_as_noise(found):
         if shares_taken(found.retuned, found.steps)[-1] >= LAST_EFFECT_SHARE:
             break
@@ -49,7 +49,7 @@ def _without_little(context: SearchContext, found: Explanation) -> Explanation:
     return found
 
 
-OPENED = (
+TEST_HALF_USED = (
     "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
     "such stretch was used to find it, the second half to confirm it."
 )
@@ -75,7 +75,7 @@ class Unconfirmed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Searched:
+class SearchResult:
     context: SearchContext
     """With the samples as they were used in the end."""
     found: Explanation
@@ -87,55 +87,55 @@ class Searched:
     """The largest gain first."""
 
 
-def searched(
+def search_effects(
     context: SearchContext,
     catalogue: Sequence[Effect],
     progress: Progress,
     time_left: TimeBudget = always,
-    beyond: Callable[[Searched], Searched] = lambda seen: seen,
-) -> Searched:
+    beyond: Callable[[SearchResult], SearchResult] = lambda seen: seen,
+) -> SearchResult:
     """beyond: what is tried where the catalogue leaves something, before sealed samples are opened for it."""
-    found = _pruned(context, explain(context, catalogue, progress, time_left), time_left)
-    judged = _judged(context, found)
-    tried = beyond(Searched(context, found, judged, _remarks(found)))
-    if found.ended_early or found.barred or tried.judged.named or not _sealed_alone(found):
+    found = _prune_guarded(context, explain(context, catalogue, progress, time_left), time_left)
+    judged = _judge_with_prediction(context, found)
+    tried = beyond(SearchResult(context, found, judged, _remarks(found)))
+    if found.ended_early or found.barred or tried.judged.named or not _shows_in_test_alone(found):
         return tried
-    half = context.half_opened()
-    again = _pruned(half, explain(half, catalogue, progress, time_left), time_left)
-    second = _judged(half, again)
+    half = context.open_half()
+    again = _prune_guarded(half, explain(half, catalogue, progress, time_left), time_left)
+    second = _judge_with_prediction(half, again)
     if second.named:
-        return Searched(half, again, second, (OPENED, *_remarks(again)), unconfirmed=tried.unconfirmed)
+        return SearchResult(half, again, second, (TEST_HALF_USED, *_remarks(again)), unconfirmed=tried.unconfirmed)
     judged = replace(judged, verdict="unexplained")
     return replace(tried, judged=judged, remarks=(NOT_SHOWN, *tried.remarks))
 
 
-def _pruned(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
+def _prune_guarded(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
     """Nothing is named whose last look crashes."""
     nothing = replace(found, after=found.retuned, steps=())
     newest = found.steps[-1].newest if found.steps else ""
-    return context.guard.part(newest, "its last look", lambda: pruned(context, found, time_left), nothing)
+    return context.guard.part(newest, "its last look", lambda: prune(context, found, time_left), nothing)
 
 
 def _remarks(found: Explanation) -> tuple[str, ...]:
     early = (OUT_OF_TIME,) if found.ended_early else ()
     barred = (ONLY_REFINES,) if found.barred else ()
-    return early + barred + (_left_open(found.undetermined) if found.undetermined else ())
+    return early + barred + (_open_sentences(found.undetermined) if found.undetermined else ())
 
 
-def _left_open(names: Sequence[str]) -> tuple[str, ...]:
+def _open_sentences(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(
         f"An explanation by {noun_of(name)} is not named: these recordings leave its numbers as good as open."
         for name in dict.fromkeys(names)
     )
 
 
-def _judged(context: SearchContext, found: Explanation) -> Judgement:
+def _judge_with_prediction(context: SearchContext, found: Explanation) -> Judgement:
     judged = judge(found)
     if judged.named and is_without_prediction(context.whole, found.after):
         return Judgement("unexplained", False)
     return judged
 
 
-def _sealed_alone(found: Explanation) -> bool:
+def _shows_in_test_alone(found: Explanation) -> bool:
     shown = float(np.nanmax(found.retuned.score.test, initial=0.0))
     return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * found.retuned.score.worst_channel

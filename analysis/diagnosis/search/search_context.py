@@ -12,7 +12,7 @@ from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
-from analysis.diagnosis.search.screening import Screened
+from analysis.diagnosis.search.screening import ScreenedHypothesis
 from analysis.diagnosis.settings import LEAST_FITTED, MOST_FITTED, WORTH_FITTING
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.effect import AxisForce, JointForce
@@ -21,7 +21,7 @@ from equalizer.signals.signal import FloatArray
 FIRST_ROUNDS = 3
 STARTING, SCREENING, FITTING = "its starting values", "its screening", "its fit"
 """What is done once for each effect."""
-FELT = 0.06
+SENSED_SHARE = 0.06
 """Change of an axis's channel, as a share of the largest that any number makes there."""
 
 
@@ -64,33 +64,35 @@ class SearchContext:
     guard: Guard = field(default_factory=Guard)
     """Of what is done once for each effect."""
 
-    def half_opened(self) -> "SearchContext":
+    def open_half(self) -> "SearchContext":
         """With the first half of every sealed stretch to fit and to choose by."""
         whole = self.whole.with_records(tuple(record.unseal_half() for record in self.whole.records))
         return replace(self, measure=whole.shorten(), whole=whole)
 
     def candidate(self, fitted: Fitted) -> FittedCandidate:
         """On the samples to fit and to choose by; its `test` is NaN."""
-        return self._scored(fitted, self.measure)
+        return self._score(fitted, self.measure)
 
-    def confirmed(self, candidate: FittedCandidate) -> FittedCandidate:
+    def with_test_score(self, candidate: FittedCandidate) -> FittedCandidate:
         """With the sealed samples."""
         fitted = evaluate_fit(self.whole, self.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
-        return self._scored(fitted, self.whole)
+        return self._score(fitted, self.whole)
 
-    def _scored(self, fitted: Fitted, measure: ErrorMeasure) -> FittedCandidate:
+    def _score(self, fitted: Fitted, measure: ErrorMeasure) -> FittedCandidate:
         score = fit_score(measure, fitted.residuals)
         if self.references is None:
             return FittedCandidate(fitted, score)
-        gained = self.references.gained(fitted.hypothesis)
+        gained = self.references.gain_on_clean(fitted.hypothesis)
         return FittedCandidate(fitted, score.larger(np.exp(gained)), 2 * float(gained.mean()))
 
 
-def first_fits(context: SearchContext, base: Fitted, known: Sensitivity, screened: Sequence[Screened]) -> list[Fitted]:
+def first_fits(
+    context: SearchContext, base: Fitted, known: Sensitivity, screened: Sequence[ScreenedHypothesis]
+) -> list[Fitted]:
     """Of those that the screening foresees a gain of, the best first."""
     measure, tuning = context.measure, context.tuning
 
-    def first(entry: Screened) -> Fitted:
+    def first(entry: ScreenedHypothesis) -> Fitted:
         return fit(
             measure, tuning, evaluate_fit(measure, tuning, base.deviations, entry.hypothesis), known, FIRST_ROUNDS
         )
@@ -116,14 +118,14 @@ def sensitivity_at(
     return sensitivity(context.measure, context.tuning, deviations, hypothesis, context.map_, (plain.columns, felt))
 
 
-def _worth_fitting(base: Fitted, screened: Sequence[Screened]) -> list[Screened]:
-    varied = _varied(screened)
+def _worth_fitting(base: Fitted, screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
+    varied = _interleave_starts(screened)
     best = max((base.cost - entry.cost for entry in varied), default=0.0)
     worth = [entry for entry in varied if base.cost - entry.cost >= WORTH_FITTING * best]
     return (worth if len(worth) >= LEAST_FITTED else varied[:LEAST_FITTED])[:MOST_FITTED]
 
 
-def _varied(screened: Sequence[Screened]) -> list[Screened]:
+def _interleave_starts(screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
     """The best start of each hypothesis before the second start of any."""
     seen: dict[object, int] = {}
     ranked = []
@@ -152,7 +154,7 @@ def sensitive_parameters(
     felt = np.zeros(len(tuning.names), dtype=bool)
     for site in sites:
         in_channel = strength[:, int(np.argmax(reached[:, site]))]
-        felt |= in_channel > FELT * in_channel.max(initial=0.0)
+        felt |= in_channel > SENSED_SHARE * in_channel.max(initial=0.0)
     return np.flatnonzero(felt).tolist()
 
 

@@ -50,7 +50,7 @@ class ShortRecordings:
     stands_in: Places
     """(samples to fit of the long measure,): which of the kept samples to fit stands for each."""
 
-    def repeated(self, known: Sensitivity) -> Sensitivity:
+    def repeat_sensitivity(self, known: Sensitivity) -> Sensitivity:
         """As it is on the long measure: what one period does, all of them do."""
         times = np.sqrt(np.bincount(self.stands_in, minlength=self._samples)).repeat(
             known.columns.shape[1] // self._samples
@@ -86,20 +86,20 @@ def short_recordings_of(context: SearchContext, held: Hypothesis) -> ShortRecord
         return None
     if any(placed.effect.of_time for placed in (*measure.known, *held.placed_effects())):
         return None
-    around = _around(measure, context.tuning.model)
+    around = _run_in_s(measure, context.tuning.model)
     cut = [_cut(record, around) for record in measure.records]
     before = sum(len(record.command) for record in measure.records)
     if not len(cut[0].kept) or sum(len(each.kept) for each in cut) > SHORT_SHARE * before:
         return None
-    short = _in_pieces(measure, cut) if isinstance(measure, PredictedForce) else _spliced(measure, cut)
+    short = _cut_in_pieces(measure, cut) if isinstance(measure, PredictedForce) else _splice(measure, cut)
     if short is None:
         return None
     return ShortRecordings(
-        replace(context, measure=short), tuple(each.kept for each in cut if len(each.kept)), _stands_in(measure, cut)
+        replace(context, measure=short), tuple(each.kept for each in cut if len(each.kept)), _replacements(measure, cut)
     )
 
 
-def _stands_in(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
+def _replacements(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
     found, before = [], 0
     for record, each in zip(measure.records, cut, strict=True):
         found.append(before + (np.cumsum(each.fit) - 1)[each.instead[record.fit]])
@@ -107,7 +107,7 @@ def _stands_in(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
     return np.concatenate(found)
 
 
-def _around(measure: FreeSimulation | PredictedForce, model: MechanicalModel) -> tuple[float, float]:
+def _run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) -> tuple[float, float]:
     """Seconds before and behind a stretch that its errors hang on. A simulation forgets as the model comes to rest; a
     force that was needed hangs on the motion before and after, as far as the model's inverse rings."""
     if isinstance(measure, FreeSimulation):
@@ -133,13 +133,13 @@ def _cut(record: Observed, around_s: tuple[float, float]) -> _Cut:
     return _Cut(np.flatnonzero(needed), fit, instead)
 
 
-def _spliced(measure: FreeSimulation, cut: Sequence[_Cut]) -> FreeSimulation:
+def _splice(measure: FreeSimulation, cut: Sequence[_Cut]) -> FreeSimulation:
     """End to end, as one course."""
     pairs = zip(measure.records, cut, strict=True)
     return measure.with_records(tuple(_piece(record, each.kept, each.fit) for record, each in pairs if len(each.kept)))
 
 
-def _in_pieces(measure: PredictedForce, cut: Sequence[_Cut]) -> PredictedForce | None:
+def _cut_in_pieces(measure: PredictedForce, cut: Sequence[_Cut]) -> PredictedForce | None:
     """Each stretch a record of its own; None where one drives an axis that the whole record drives, but it does not:
     errors count over what is commanded."""
     records, motions = [], []

@@ -20,7 +20,7 @@ def always() -> bool:
     return True
 
 
-class Counted:
+class CountedBudget:
     """TimeBudget until it was asked so often: the same pieces on every machine, however busy."""
 
     def __init__(self, most: int) -> None:
@@ -30,7 +30,7 @@ class Counted:
         return next(self._asked) < self._most
 
 
-def budgeted(map_: Mapper, time_left: TimeBudget) -> Mapper:
+def limit_map(map_: Mapper, time_left: TimeBudget) -> Mapper:
     """The same map; raises OutOfTimeError before a piece of work that would begin after the time limit.
 
     Where pieces are worked on in other processes, a count is asked here again, for what was asked there: each counts
@@ -54,7 +54,7 @@ def budgeted(map_: Mapper, time_left: TimeBudget) -> Mapper:
 
         found: list[tuple[object, int]] = list(map_(work, *items))  # type: ignore[arg-type]
         elsewhere = sum(times for _, times in found) - (asked[0] - begun)
-        if isinstance(time_left, Counted):
+        if isinstance(time_left, CountedBudget):
             for _ in range(elsewhere):
                 ask()
         else:

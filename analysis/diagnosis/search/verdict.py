@@ -34,7 +34,7 @@ class Judgement:
 
 def judge(found: Explanation) -> Judgement:
     """By the samples to fit and to choose by; the sealed ones can only withdraw a name, or `explained`."""
-    if not found.after.fitted.hypothesis.claims or not _confirmed(found):
+    if not found.after.fitted.hypothesis.claims or not _is_confirmed(found):
         if found.before.score.worst_channel <= NOISE_ALONE:
             return Judgement("no_mismatch", False)
         return Judgement("parameters" if found.retuned.score.worst_channel <= NOISE_ALONE else "unexplained", False)
@@ -62,7 +62,7 @@ def worth_naming(found: Explanation) -> bool:
     return found.after.score.worst_channel <= NAMED_ERROR or share >= NAMED_SHARE or taken >= NAMED_GAIN
 
 
-def _confirmed(found: Explanation) -> bool:
+def _is_confirmed(found: Explanation) -> bool:
     """Whether the sealed samples confirm the explanation; yes where nothing was sealed."""
     without, with_it = (np.log(candidate.score.test) for candidate in (found.retuned, found.after))
     whole, left = float(np.mean(without)), float(np.mean(with_it))

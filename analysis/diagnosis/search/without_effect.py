@@ -14,12 +14,12 @@ def without_effect(context: SearchContext, found: Explanation, number: int) -> E
     another."""
     earlier, later = found.steps[:number], list(found.steps[number + 1 :])
     if not later:
-        return replace(found, after=context.confirmed(earlier[-1]), rounds=found.rounds[:number], steps=earlier)
+        return replace(found, after=context.with_test_score(earlier[-1]), rounds=found.rounds[:number], steps=earlier)
     alone = [_without(context, candidate, number) for candidate in later]
     alone[-1] = context.candidate(refine(context, alone[-1].fitted))
     others = [candidate for candidate in found.rounds[number] if candidate.newest != alone[0].newest]
     rounds = (*found.rounds[:number], (alone[0], *others), *found.rounds[number + 2 :])
-    return replace(found, after=context.confirmed(alone[-1]), rounds=rounds, steps=(*earlier, *alone))
+    return replace(found, after=context.with_test_score(alone[-1]), rounds=rounds, steps=(*earlier, *alone))
 
 
 def _without(context: SearchContext, candidate: FittedCandidate, number: int) -> FittedCandidate:

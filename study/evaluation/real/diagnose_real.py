@@ -13,7 +13,7 @@ from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.prediction_error import PredictionError, prediction_error
 from analysis.diagnosis.first_model.fitted_first import FirstModel
 from analysis.diagnosis.first_model.plain_form import plain_form
-from analysis.diagnosis.prepare_recordings import prepared, same_position
+from analysis.diagnosis.prepare_recordings import keep_common_position, prepare
 from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, named_sentences
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.reference.learn_model_error import NothingLearned
@@ -118,11 +118,11 @@ def _read(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: 
         raise not_diagnosable_error((why,))
     # Of a real recording, for which there is no other, few cycles are a remark.
     try:
-        ready = prepared((import_real_recording(wanted.found),), (wanted.name,), _is_plain(wanted), short=True)
+        ready = prepare((import_real_recording(wanted.found),), (wanted.name,), _is_plain(wanted), short=True)
     except NothingToDiagnose as refusal:
         raise not_diagnosable_error(refusal.problems) from refusal
     before = () if wanted.before is None else (import_real_recording(wanted.before),)
-    every = same_position((*ready.recordings, *before))
+    every = keep_common_position((*ready.recordings, *before))
     recording = every.recordings[0]
     first = _model(wanted, recording, bounds, on_progress)
     remarks = (*ready.remarks, *every.remarks, *first.remarks)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
-from analysis.diagnosis.search.time_budget import Counted
+from analysis.diagnosis.search.time_budget import CountedBudget
 from analysis.diagnosis.types import TimeBudget
 from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
@@ -155,7 +155,7 @@ def _answer(
     """Diagnose one recording and write its results. budget_s: processor time for the search."""
     begun_s, worked, guard = clock.now_s(), processor_s(), crash_guard()
     timed: TimeBudget = lambda: processor_s() - worked < budget_s  # noqa: E731
-    time_left = Counted(EVALUATIONS) if plan.seconds is None else timed
+    time_left = CountedBudget(EVALUATIONS) if plan.seconds is None else timed
 
     def kept(done: RealDiagnosis) -> RealAnswer:
         answer = replace(done.answer, seconds=round(clock.now_s() - begun_s, 1))

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_alike, require_model_of
-from analysis.diagnosis.prepare_recordings import comparable, prepared
+from analysis.diagnosis.prepare_recordings import comparable, prepare
 from analysis.wording import begun
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -57,7 +57,7 @@ def read_input(
     read, names = tuple(recording for recording, _ in taken), _names(sources)
     _translate_refusal(lambda: require_alike(read, names))
     forces, stated = _as_forces(read, constants)
-    ready = _translate_refusal(lambda: prepared(forces, names, plain))
+    ready = _translate_refusal(lambda: prepare(forces, names, plain))
     remarks = (*_notes(taken), *stated, *ready.remarks)
     return DiagnosisInput(ready.recordings, names, tuple(sources), remarks, constants=constants)
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from analysis.diagnosis.data.carried_weight import has_carried_weight
-from analysis.diagnosis.first_model.choose_structure import Choice, first_structure
+from analysis.diagnosis.first_model.choose_structure import Choice, choose_structure
 from analysis.diagnosis.first_model.model_structures import KINDS, Kind, Number, StructureRefused
-from analysis.diagnosis.first_model.turned_round import as_recorded
+from analysis.diagnosis.first_model.reversed_commands import as_recorded
 from analysis.diagnosis.result.unit_doubt import constant_sentence
 from analysis.wording import typeset
 from equalizer.plant.mechanical_model import suggest_word
@@ -50,7 +50,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
     if has_carried_weight(found.recordings):
         raise _refusal("A recording was made with a weight on, and the model would hold the weight.")
     try:
-        choice = first_structure(found.recordings, wanted, on_progress)
+        choice = choose_structure(found.recordings, wanted, on_progress)
     except StructureRefused as refusal:
         what = "no structure" if wanted is None else f"the structure {wanted}"
         raise _refusal(f"The recordings do not carry {what}: {refusal}.") from refusal

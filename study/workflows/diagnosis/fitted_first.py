@@ -34,7 +34,7 @@ def fit_linear_model(
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """A linear model fitted to the spectra, and remarks, as in `analysis`. Raises StudyError."""
     with _translate_refusals():
-        return fitted_first.fitted_model(found.recordings, on_progress, whose)
+        return fitted_first.fit_first_linear_model(found.recordings, on_progress, whose)
 
 
 @contextmanager

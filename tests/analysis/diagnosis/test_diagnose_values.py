@@ -59,7 +59,7 @@ def test_without_a_model_the_first_one_is_of_the_clean_recordings(monkeypatch):
         seen.update(settings=settings, model=model)
         return FINDINGS
 
-    monkeypatch.setattr(module, "fitted_model", fitted)
+    monkeypatch.setattr(module, "fit_first_linear_model", fitted)
     monkeypatch.setattr(module, "diagnose", diagnosed)
     monkeypatch.setattr(module, "replace", lambda found, **new: new if found is FINDINGS else replace(found, **new))
     clean = recording(2)

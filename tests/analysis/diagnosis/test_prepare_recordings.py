@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from analysis.diagnosis.prepare_recordings import prepared
+from analysis.diagnosis.prepare_recordings import prepare
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -20,5 +20,5 @@ def repeating(seed: int) -> Recording:
 
 
 def test_recordings_are_called_by_their_names_whatever_is_in_these():
-    remarks = prepared((repeating(1), repeating(2)), ("pull 1.5 N", "pull 2.5 N"), plain=False).remarks
+    remarks = prepare((repeating(1), repeating(2)), ("pull 1.5 N", "pull 2.5 N"), plain=False).remarks
     assert [remark.split(":")[0] for remark in remarks] == ["pull 1.5 N", "pull 2.5 N"]

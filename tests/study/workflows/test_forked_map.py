@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.search.guard import Guard
-from analysis.diagnosis.search.time_budget import Counted, OutOfTimeError, budgeted
+from analysis.diagnosis.search.time_budget import CountedBudget, OutOfTimeError, limit_map
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.discovered_law import law_effect
 from equalizer.effects.effect import living_effects
@@ -219,7 +219,7 @@ def test_crashes_in_a_process_are_noted_here():
 
 def asked(most: int, map_: object) -> int:
     """How many maps of four nested maps of two a count allows."""
-    mapped, done = budgeted(map_, Counted(most)), 0
+    mapped, done = limit_map(map_, CountedBudget(most)), 0
 
     def nested(number: int) -> float:
         time.sleep(0.01)
@@ -241,7 +241,7 @@ def test_evaluations_are_counted_wherever_they_are_made(most):
 
 def test_pieces_that_began_in_time_are_kept_where_a_clock_ran_out_before_they_were_done(tmp_path):
     over = tmp_path / "over"
-    mapped = budgeted(map_forked, lambda: not over.exists())
+    mapped = limit_map(map_forked, lambda: not over.exists())
 
     def last(number: int) -> int:
         (tmp_path / str(number)).touch()

@@ -106,11 +106,11 @@ def test_a_body_that_is_not_measured_does_not_hide_friction(two_bodies, recordin
 
 def test_what_is_left_of_a_command_drives_one_body(of_both):
     from analysis.diagnosis.first_model.model_of_balance import first_model
-    from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduced_recordings
+    from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 
     recording, balances = of_both
 
-    (reduced,) = reduced_recordings((recording,), balances)
+    (reduced,) = reduce_recordings((recording,), balances)
     model = first_model(balances, reduced, "one body")
 
     assert is_reduced(balances)

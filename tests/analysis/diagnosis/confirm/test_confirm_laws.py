@@ -9,14 +9,14 @@ from analysis.diagnosis.confirm import confirm_laws as by_balance
 from analysis.diagnosis.confirm.confirm_laws import (
     ONLY_BESIDE_CALIBRATION,
     VAGUE,
+    _find_vague_law,
     _from_starts,
-    _vague,
-    unconfirmed_beside_motion,
+    unname_doubtful_effects,
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.search.verdict import Judgement
 from equalizer.effects.catalogue import EFFECTS
@@ -48,7 +48,7 @@ def explained(*laws):
     ids=["all known", "refinement open", "secondary open alone", "main open", "another family", "first open"],
 )
 def test_a_law_goes_by_its_main_number_and_a_refinement_by_any(laws, errors, dropped):
-    assert _vague(explained(*laws), np.array([0.0, *errors]), 1) == dropped
+    assert _find_vague_law(explained(*laws), np.array([0.0, *errors]), 1) == dropped
 
 
 def ends_at(error):
@@ -70,7 +70,7 @@ def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_be
         return [ends_at(from_balance if np.any(deviations) else from_model)]
 
     monkeypatch.setattr(by_balance, "_steps", steps)
-    monkeypatch.setattr(by_balance, "released_numbers", lambda tuning, balances, laws: np.array([1.0, -2.0]))
+    monkeypatch.setattr(by_balance, "numbers_beside_laws", lambda tuning, balances, laws: np.array([1.0, -2.0]))
     context = SimpleNamespace(tuning=None, confirmed=lambda candidate: candidate)
     _, after = _from_starts(context, (), (ends_at(8.0), ends_at(8.0)), ())
     assert after.score.test[0] == end
@@ -102,7 +102,7 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
     context = SimpleNamespace(
         measure=None, tuning=SimpleNamespace(names=()), candidate=ends_at, confirmed=lambda each: each
     )
-    found = by_balance.searched_by_balance(context, (balance,), False)
+    found = by_balance.search_by_balance(context, (balance,), False)
     assert (found is not None) == is_named
 
 
@@ -122,7 +122,7 @@ def searched_to(*names):
     steps = tuple(candidate(*names[: place + 1]) for place in range(len(names)))
     found = Explanation(retuned, retuned, steps[-1], (), steps)
     context = SimpleNamespace(whole=None, confirmed=lambda each: each)
-    return Searched(context, found, Judgement("partly_explained", True))
+    return SearchResult(context, found, Judgement("partly_explained", True))
 
 
 @pytest.fixture
@@ -133,7 +133,7 @@ def gains_half(monkeypatch):
 @pytest.mark.usefixtures("gains_half")
 @pytest.mark.parametrize("name", ["sensor_nonlinearity", "slew_limit", "transport_delay", "force_gain"])
 def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
-    seen = unconfirmed_beside_motion(searched_to(name))
+    seen = unname_doubtful_effects(searched_to(name))
     assert seen.judged == Judgement("unexplained", False)
     assert not seen.found.steps
     (told,) = seen.unconfirmed
@@ -143,9 +143,9 @@ def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
 @pytest.mark.usefixtures("gains_half")
 def test_what_the_signal_itself_shows_keeps_its_name():
     seen = searched_to("sensor_clipping")
-    assert unconfirmed_beside_motion(seen) is seen
+    assert unname_doubtful_effects(seen) is seen
 
 
 def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
     monkeypatch.setattr(by_balance, "held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
-    assert unconfirmed_beside_motion(searched_to("slew_limit")).unconfirmed == ()
+    assert unname_doubtful_effects(searched_to("slew_limit")).unconfirmed == ()

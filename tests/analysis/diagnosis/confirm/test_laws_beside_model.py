@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.confirm import laws_beside_model as beside_given
-from analysis.diagnosis.confirm.balance_beside_model import balances_beside
+from analysis.diagnosis.confirm.balance_beside_model import find_balances_beside_model
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.confirm.laws_beside_model import objection
 from analysis.diagnosis.search.time_budget import always
@@ -40,7 +40,7 @@ def rubbing(level, mass=MASS):
 
 @pytest.fixture(scope="module")
 def with_friction():
-    return balances_beside((rubbing(LEVEL),), GIVEN, frozenset(), always)[0]
+    return find_balances_beside_model((rubbing(LEVEL),), GIVEN, frozenset(), always)[0]
 
 
 def test_what_a_given_model_lacks_is_named_by_the_balance(with_friction):
@@ -52,7 +52,7 @@ def test_what_a_given_model_lacks_is_named_by_the_balance(with_friction):
 
 @pytest.mark.parametrize("mass", [MASS, MASS + 0.05], ids=["as calibrated", "a standard deviation off"])
 def test_a_device_within_its_calibration_lacks_nothing(mass):
-    (balance,) = balances_beside((rubbing(0.0, mass),), GIVEN, frozenset(), always)
+    (balance,) = find_balances_beside_model((rubbing(0.0, mass),), GIVEN, frozenset(), always)
     assert balance.named == ()
     assert balance.linear < 0.05
 

@@ -19,7 +19,7 @@ from analysis.diagnosis.discovery.snap_exponents import simplify_powers
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.result.wording import summary_lines
-from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.verdict import judge
 from analysis.diagnosis.settings import LAW_PLACEBO
 from equalizer.effects.catalogue import CATALOGUE
@@ -90,7 +90,7 @@ def test_ten_times_the_noise_leaves_the_law(seed=6):
 
 def joined(recording):
     context, known = arena_of(recording)
-    return add_laws(Searched(context, known, judge(known)), quiet, always)
+    return add_laws(SearchResult(context, known, judge(known)), quiet, always)
 
 
 def test_a_proved_law_explains(seed=7):

@@ -86,9 +86,9 @@ def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, cl
     lag, rubbing = (
         hypothesis_of_claim(Claim(placed.effect, "one", (0,)), [{**placed.values}]) for placed in (LAG, RUBBING)
     )
-    assert learned.references.gained(lag).mean() > 0.2
-    assert learned.references.gained(rubbing).mean() < 0.01
-    assert not learned.references.gained(NOTHING).any()
+    assert learned.references.gain_on_clean(lag).mean() > 0.2
+    assert learned.references.gain_on_clean(rubbing).mean() < 0.01
+    assert not learned.references.gain_on_clean(NOTHING).any()
 
 
 def test_a_device_that_is_its_model_teaches_next_to_nothing(diagnosed):

@@ -31,7 +31,7 @@ def compared(context, name, values):
     known = sensitivity(context.measure, context.tuning, zero, NOTHING)
     start = evaluate_fit(context.measure, context.tuning, zero, whole)
     after = refine(context, fit(context.measure, context.tuning, start, known, 4))
-    retuned, ended = (context.confirmed(context.candidate(each)) for each in (bare, after))
+    retuned, ended = (context.with_test_score(context.candidate(each)) for each in (bare, after))
     found = Explanation(retuned, retuned, ended, (), ())
     physics = errors_of(context.whole, found).test.after
     return black_box(context.whole, retuned, len(whole.point), physics), errors_of(context.whole, found).test
@@ -62,7 +62,7 @@ def test_the_black_box_has_as_many_numbers_per_channel_as_physics(bent):
 def test_where_nothing_is_missing_the_black_box_finds_nothing(arena_of):
     context = arena_of()
     bare = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
-    retuned = context.confirmed(context.candidate(bare))
+    retuned = context.with_test_score(context.candidate(bare))
     error = errors_of(context.whole, Explanation(retuned, retuned, retuned, (), ())).test.after
     assert black_box(context.whole, retuned, 3, error).test == pytest.approx(error, rel=0.01)
 

@@ -16,6 +16,6 @@ def test_commands_that_are_never_played_together_where_it_is_fitted_do_not_break
     command[record.test] += 1.0
     whole = context.whole.with_records((replace(record, command=command),))
     bare = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
-    box = black_box(whole, context.confirmed(context.candidate(bare)), 2, 0.02)
+    box = black_box(whole, context.with_test_score(context.candidate(bare)), 2, 0.02)
     assert np.isfinite(box.test)
     assert box.test < 10

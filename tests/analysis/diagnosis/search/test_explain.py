@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.search.explain import worthwhile
+from analysis.diagnosis.search.explain import is_worthwhile
 from analysis.diagnosis.search.search import ONLY_REFINES
 from analysis.diagnosis.settings import ADDED_GAIN, INTERVAL_SHARE
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
@@ -162,4 +162,4 @@ def test_an_effect_that_leaves_the_one_bad_channel_as_bad_is_not_added(standing_
     base = standing_at([1.16, 0.9, 0.9, 0.95])
     better = standing_at([left, 0.9, 0.9, 0.94], "quadratic_damping")
     assert base.score.mean_log_error - better.score.mean_log_error > ADDED_GAIN
-    assert worthwhile(base, better) is worth
+    assert is_worthwhile(base, better) is worth

@@ -8,9 +8,9 @@ import pytest
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.explain import Explanation, retuned_alone
-from analysis.diagnosis.search.identifiability import final_errors, identified, told_from_none
-from analysis.diagnosis.search.search import searched
+from analysis.diagnosis.search.explain import Explanation, retune_alone
+from analysis.diagnosis.search.identifiability import distance_from_none, final_errors, keep_identifiable
+from analysis.diagnosis.search.search import search_effects
 from analysis.diagnosis.search.time_budget import always
 from analysis.diagnosis.settings import INTERVAL_FACTOR
 from equalizer.effects.catalogue import EFFECTS
@@ -30,11 +30,15 @@ def candidate(context, base, *claims):
 
 def explained_by(context, *rivals):
     """rivals: of the one round, the named one first; all as good as it."""
-    base = context.candidate(retuned_alone(context))
+    base = context.candidate(retune_alone(context))
     found = [candidate(context, base, rival) for rival in rivals]
     found = [replace(each, score=found[0].score) for each in found]
     return Explanation(
-        context.confirmed(base), context.confirmed(base), context.confirmed(found[0]), (tuple(found),), (found[0],)
+        context.with_test_score(base),
+        context.with_test_score(base),
+        context.with_test_score(found[0]),
+        (tuple(found),),
+        (found[0],),
     )
 
 
@@ -52,25 +56,25 @@ FRICTION, OPEN = claim("coulomb_friction", level=FRICTION_N), claim("viscous_dam
 
 def test_a_number_that_is_fixed_is_named(rubbing):
     found = explained_by(rubbing, FRICTION, OPEN)
-    assert identified(rubbing, found, always).steps is found.steps
+    assert keep_identifiable(rubbing, found, always).steps is found.steps
 
 
 def test_in_place_of_one_that_is_open_stands_what_is_as_good_and_fixed(rubbing):
-    assert names(identified(rubbing, explained_by(rubbing, OPEN, FRICTION), always)) == ["coulomb_friction"]
+    assert names(keep_identifiable(rubbing, explained_by(rubbing, OPEN, FRICTION), always)) == ["coulomb_friction"]
 
 
 def test_with_nothing_as_good_nothing_is_named_and_what_was_left_out_is_known(rubbing):
-    left = identified(rubbing, explained_by(rubbing, OPEN), always)
+    left = keep_identifiable(rubbing, explained_by(rubbing, OPEN), always)
     assert left.after is left.retuned
     assert (left.steps, left.undetermined) == ((), ("viscous_damping",))
 
 
 @pytest.mark.parametrize("order", [(FRICTION, OPEN), (OPEN, FRICTION)])
 def test_of_two_the_one_that_is_open_goes_whichever_came_first(rubbing, order):
-    base = rubbing.candidate(retuned_alone(rubbing))
+    base = rubbing.candidate(retune_alone(rubbing))
     first, both = candidate(rubbing, base, order[0]), candidate(rubbing, base, *order)
-    ends = [rubbing.confirmed(each) for each in (base, base, both)]
-    left = identified(rubbing, Explanation(*ends, ((first,), (both,)), (first, both)), always)
+    ends = [rubbing.with_test_score(each) for each in (base, base, both)]
+    left = keep_identifiable(rubbing, Explanation(*ends, ((first,), (both,)), (first, both)), always)
     assert (names(left), left.undetermined) == (["coulomb_friction"], ("viscous_damping",))
     assert [step.fitted.hypothesis.key for step in left.steps] == [left.rounds[0][0].fitted.hypothesis.key]
 
@@ -78,17 +82,17 @@ def test_of_two_the_one_that_is_open_goes_whichever_came_first(rubbing, order):
 def test_one_number_that_is_fixed_is_enough(rubbing):
     """Rubbing in one direction alone: the other's number is open, and the effect is there."""
     found = explained_by(rubbing, claim("asymmetric_friction", level_positive=FRICTION_N, level_negative=1e-9))
-    assert identified(rubbing, found, always).steps is found.steps
+    assert keep_identifiable(rubbing, found, always).steps is found.steps
 
 
 def test_what_has_no_number_that_could_be_none_is_not_judged(rubbing):
     found = explained_by(rubbing, claim("force_saturation", limit=1e3))
-    assert identified(rubbing, found, always).steps is found.steps
+    assert keep_identifiable(rubbing, found, always).steps is found.steps
 
 
 def test_it_is_said_that_numbers_were_left_open(rubbing, monkeypatch):
     monkeypatch.setattr("analysis.diagnosis.search.identifiability.INTERVAL_FACTOR", 1e6)
-    seen = searched(rubbing, [EFFECTS["coulomb_friction"]], lambda what, share: None)
+    seen = search_effects(rubbing, [EFFECTS["coulomb_friction"]], lambda what, share: None)
     assert (seen.judged.verdict, seen.judged.named) == ("unexplained", False)
     assert seen.remarks == (
         "An explanation by dry friction is not named: these recordings leave its numbers as good as open.",
@@ -97,7 +101,7 @@ def test_it_is_said_that_numbers_were_left_open(rubbing, monkeypatch):
 
 def fitted(context, *claims):
     """As a search ends: each claim fitted beside those before it."""
-    base = context.candidate(retuned_alone(context))
+    base = context.candidate(retune_alone(context))
     steps, at = [], base
     for newest in claims:
         start = evaluate_fit(
@@ -105,14 +109,14 @@ def fitted(context, *claims):
         )
         at = context.candidate(refine(context, start))
         steps.append(at)
-    ends = [context.confirmed(each) for each in (base, base, at)]
+    ends = [context.with_test_score(each) for each in (base, base, at)]
     return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
 
 
 def test_a_profile_tells_a_number_from_none_where_it_is_there_and_not_where_it_is_not(rubbing):
     both = fitted(rubbing, FRICTION, OPEN)
-    assert told_from_none(rubbing, both, 0) > 1
-    assert told_from_none(rubbing, both, 1) < 1
+    assert distance_from_none(rubbing, both, 0) > 1
+    assert distance_from_none(rubbing, both, 1) < 1
 
 
 def test_an_interval_that_holds_none_is_judged_by_the_profile_and_then_does_not(rubbing, monkeypatch):
@@ -125,7 +129,7 @@ def test_an_interval_that_holds_none_is_judged_by_the_profile_and_then_does_not(
         "analysis.diagnosis.search.identifiability.final_errors",
         lambda context, found: found.errors[1] if found.errors else wide,
     )
-    named = identified(rubbing, found, always)
+    named = keep_identifiable(rubbing, found, always)
     assert names(named) == ["coulomb_friction"]
     assert 1.96 * INTERVAL_FACTOR * level * np.expm1(named.errors[1][place]) < level
 
@@ -138,4 +142,4 @@ def test_numbers_whose_intervals_all_hold_none_are_not_named(rubbing, monkeypatc
         "analysis.diagnosis.search.identifiability.final_errors",
         lambda context, found: found.errors[1] if found.errors else wide,
     )
-    assert identified(rubbing, found, always).undetermined == ("asymmetric_friction",)
+    assert keep_identifiable(rubbing, found, always).undetermined == ("asymmetric_friction",)

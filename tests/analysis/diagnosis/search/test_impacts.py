@@ -16,7 +16,7 @@ from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.assemble_findings import impact_remainder
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.impacts import irregular, rattling
+from analysis.diagnosis.search.impacts import explain_impacts, is_irregular
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import judge
 from equalizer.effects.backlash import EFFECT as PLAY
@@ -43,7 +43,7 @@ def searched(real, effects, repeats=True):
     given = context.candidate(
         evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     )
-    whole = context.confirmed(given)  # as a search hands it over: with the sealed samples
+    whole = context.with_test_score(given)  # as a search hands it over: with the sealed samples
     return context, Explanation(whole, whole, whole, (), ()), chosen.floors
 
 
@@ -54,7 +54,7 @@ def loose(diagnosed):
 
 @pytest.fixture(scope="module")
 def told(loose):
-    return rattling(*loose, CATALOGUE)
+    return explain_impacts(*loose, CATALOGUE)
 
 
 def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
@@ -97,17 +97,17 @@ def test_what_is_left_is_said_by_channel_and_not_by_the_course_of_blows(loose, t
 
 def test_a_device_that_repeats_is_left_alone(diagnosed):
     rubs = searched(diagnosed, (PlacedEffect(DRY, (0,), {"level": 0.2}),))
-    assert not irregular(*rubs)
-    assert rattling(*rubs, CATALOGUE) is None
+    assert not is_irregular(*rubs)
+    assert explain_impacts(*rubs, CATALOGUE) is None
 
 
 def test_without_play_in_the_catalogue_nothing_is_named(loose):
-    assert rattling(*loose, [each for each in CATALOGUE if each.name != "backlash"]) is None
+    assert explain_impacts(*loose, [each for each in CATALOGUE if each.name != "backlash"]) is None
 
 
 def test_where_nothing_repeats_peaks_give_rattle_away(diagnosed):
-    assert irregular(*searched(diagnosed, LOOSE, repeats=False))
-    assert not irregular(*searched(diagnosed, (), repeats=False))
+    assert is_irregular(*searched(diagnosed, LOOSE, repeats=False))
+    assert not is_irregular(*searched(diagnosed, (), repeats=False))
 
 
 def test_the_whole_diagnosis_says_what_was_compared(diagnosed):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.confirm.fitting_measures import ABOUT_MEAN, look_of
+from analysis.diagnosis.confirm.fitting_measures import ABOUT_MEAN, choose_fitting_measure
 from analysis.diagnosis.data.operating_point import about_operating_point
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -39,14 +39,14 @@ def test_the_constant_that_keeps_the_mean_position_is_found_and_said():
     weighed = recording(weight=20.0)
     (moved,) = about_operating_point((weighed,), model()) or ()
     assert np.allclose(moved.command.samples - weighed.command.samples, 20.0, rtol=0.05)
-    look = look_of((weighed,), model(), (), "auto", about_mean=True)
+    look = choose_fitting_measure((weighed,), model(), (), "auto", about_mean=True)
     assert ABOUT_MEAN in look.chosen.remarks
 
 
 def test_a_device_without_a_constant_and_a_calibrated_model_are_played_from_the_command_as_it_is():
-    plain = look_of((recording(),), model(), (), "auto", about_mean=True)
+    plain = choose_fitting_measure((recording(),), model(), (), "auto", about_mean=True)
     assert ABOUT_MEAN not in plain.chosen.remarks
-    given = look_of((recording(weight=20.0),), model(), (), "auto")
+    given = choose_fitting_measure((recording(weight=20.0),), model(), (), "auto")
     assert ABOUT_MEAN not in given.chosen.remarks
 
 

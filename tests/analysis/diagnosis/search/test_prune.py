@@ -7,8 +7,8 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
-from analysis.diagnosis.search.explain import Explanation, retuned_alone
-from analysis.diagnosis.search.search import pruned, searched
+from analysis.diagnosis.search.explain import Explanation, retune_alone
+from analysis.diagnosis.search.search import prune, search_effects
 from analysis.diagnosis.search.starting_hypotheses import candidates
 from analysis.diagnosis.search.time_budget import always
 from analysis.diagnosis.settings import LAST_EFFECT_SHARE
@@ -28,11 +28,11 @@ def claim(name, **values):
 
 def one_after_the_other(context, *claims):
     """An explanation as a search leaves it that added these in this order."""
-    base, steps, whole = context.candidate(retuned_alone(context)), [], None
+    base, steps, whole = context.candidate(retune_alone(context)), [], None
     for each in claims:
         whole = each if whole is None else combine(whole, each)
         steps.append(context.candidate(evaluate_fit(context.measure, context.tuning, base.fitted.deviations, whole)))
-    ends = (context.confirmed(item) for item in (base, base, steps[-1]))
+    ends = (context.with_test_score(item) for item in (base, base, steps[-1]))
     return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
 
 
@@ -55,7 +55,7 @@ def test_a_stopgap_goes_once_the_true_law_has_its_numbers(rubbing):
         rubbing, claim("constant_force", force=1e-6), claim("coulomb_friction", level=FRICTION_N)
     )
     assert names(found) == ["constant_force", "coulomb_friction"]
-    left = pruned(rubbing, found, always)
+    left = prune(rubbing, found, always)
     assert names(left) == ["coulomb_friction"]
     assert len(left.rounds) == len(left.steps) == 1
     # What it was compared with stays to be told.
@@ -69,7 +69,7 @@ def test_two_that_are_needed_stay(rubbing_and_pushed):
     found = one_after_the_other(
         rubbing_and_pushed, claim("constant_force", force=0.2), claim("coulomb_friction", level=FRICTION_N)
     )
-    assert pruned(rubbing_and_pushed, found, always).steps is found.steps
+    assert prune(rubbing_and_pushed, found, always).steps is found.steps
 
 
 @pytest.fixture
@@ -85,14 +85,14 @@ def test_two_that_are_needed_are_compared_while_there_is_time(rubbing_and_pushed
         rubbing_and_pushed, claim("constant_force", force=0.2), claim("coulomb_friction", level=FRICTION_N)
     )
     with pytest.raises(AssertionError, match="fitted again"):
-        pruned(rubbing_and_pushed, found, always)
+        prune(rubbing_and_pushed, found, always)
 
 
 def test_out_of_time_nothing_is_fitted_again(rubbing_and_pushed, no_fit):
     found = one_after_the_other(
         rubbing_and_pushed, claim("constant_force", force=0.2), claim("coulomb_friction", level=FRICTION_N)
     )
-    assert names(pruned(rubbing_and_pushed, found, lambda: False)) == ["constant_force", "coulomb_friction"]
+    assert names(prune(rubbing_and_pushed, found, lambda: False)) == ["constant_force", "coulomb_friction"]
 
 
 def test_out_of_time_no_profile_is_fitted_and_what_may_be_none_is_not_named(rubbing, no_fit):
@@ -100,7 +100,7 @@ def test_out_of_time_no_profile_is_fitted_and_what_may_be_none_is_not_named(rubb
     found = one_after_the_other(
         rubbing, claim("constant_force", force=0.1), claim("coulomb_friction", level=FRICTION_N)
     )
-    left = pruned(rubbing, found, lambda: False)
+    left = prune(rubbing, found, lambda: False)
     assert (names(left), left.undetermined) == ([], ("constant_force",))
 
 
@@ -129,14 +129,14 @@ def test_a_little_more_is_not_named_where_more_than_noise_is_left_with_it(
         steps=steps,
         rounds=((steps[0],), (steps[1],)),
     )
-    assert len(pruned(rubbing_and_pushed_a_little, found, lambda: False).steps) == kept
+    assert len(prune(rubbing_and_pushed_a_little, found, lambda: False).steps) == kept
 
 
 def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(arena_of, diagnosed):
     """From below a whole number of ticks no small step leads above it."""
     late = 1.16 / diagnosed.RATE_HZ
     context = arena_of((placed("transport_delay", delay=late),))
-    base = retuned_alone(context)
+    base = retune_alone(context)
     starts = [
         candidate.placed_effects()[-1].values["delay"]
         for candidate in candidates(
@@ -145,7 +145,7 @@ def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(arena_of, d
     ]
     assert any(start < 1 / diagnosed.RATE_HZ for start in starts)
     assert any(start > 1 / diagnosed.RATE_HZ for start in starts)
-    found = searched(context, CATALOGUE, lambda what, share: None).found
+    found = search_effects(context, CATALOGUE, lambda what, share: None).found
     assert names(found) == ["transport_delay"]
     assert found.after.fitted.hypothesis.placed_effects()[-1].values["delay"] == pytest.approx(late, rel=0.01)
     assert np.nanmax(found.after.score.test) < 1.1

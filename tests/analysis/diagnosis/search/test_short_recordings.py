@@ -70,7 +70,7 @@ def test_the_sensitivities_of_one_period_stand_for_those_of_all(lagging):
     short, at = short_recordings_of(lagging, NOTHING), np.zeros(len(lagging.tuning.names))
     (record,) = lagging.measure.records
     whole = sensitivity(lagging.measure, lagging.tuning, at, NOTHING)
-    found = short.repeated(sensitivity(short.context.measure, short.context.tuning, at, NOTHING))
+    found = short.repeat_sensitivity(sensitivity(short.context.measure, short.context.tuning, at, NOTHING))
     later = np.ones(len(record.fit), dtype=bool)
     for segment in record.recording.segments:
         later[segment.start : segment.start + segment.period] = False  # in which the motion settles

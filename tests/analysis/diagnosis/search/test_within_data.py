@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import gather_evidence
-from analysis.diagnosis.search.explain import retuned_alone
+from analysis.diagnosis.search.explain import retune_alone
 from analysis.diagnosis.search.starting_hypotheses import within_data
 from equalizer.effects.catalogue import EFFECTS
 
@@ -15,7 +15,7 @@ from equalizer.effects.catalogue import EFFECTS
 @pytest.fixture(scope="module")
 def evidence(diagnosed, arena_of):
     context = arena_of(diagnosed.RUBBING)
-    return gather_evidence(context.measure, context.tuning, retuned_alone(context))[0]
+    return gather_evidence(context.measure, context.tuning, retune_alone(context))[0]
 
 
 def claim(name, **values):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.search.time_budget import Counted
+from analysis.diagnosis.search.time_budget import CountedBudget
 from study.errors import StudyError
 from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
@@ -122,7 +122,7 @@ def test_a_count_of_evaluations_is_another_limit_than_seconds(answered: RealPlan
 
 
 def test_a_patience_that_counts_is_asked_as_often_everywhere() -> None:
-    patient = Counted(3)
+    patient = CountedBudget(3)
     assert [patient() for _ in range(5)] == [True, True, True, False, False]
 
 

@@ -89,7 +89,7 @@ def test_where_the_force_balance_crashes_a_model_is_fitted_without_it_and_the_cr
         raise ValueError("operands could not be broadcast together")
 
     monkeypatch.setattr(fitted_first, "first_model_of", broken)
-    monkeypatch.setattr(fitted_first, "fitted_model", lambda *arguments: ("a model", ("how",)))
+    monkeypatch.setattr(fitted_first, "fit_first_linear_model", lambda *arguments: ("a model", ("how",)))
     guard, given = Guard(on=True), DiagnosisInput((), (), (), ())
     first = first_model_of(given, (), (lambda: True, guard), quiet)
     assert (first.model, first.remarks, first.balances) == ("a model", ("how",), ())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.prediction_error import prediction_error
-from analysis.diagnosis.first_model.choose_structure import first_structure
+from analysis.diagnosis.first_model.choose_structure import choose_structure
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
@@ -115,7 +115,7 @@ def test_a_motion_beside_the_force_of_another_recording_is_not_explained(tmp_pat
     """The negative control; files of that kind are refused."""
     plain, other = (recorded(device(0.4, 6.0, 900.0), seed) for seed in (1, 2))
     mixed = replace(plain, command=other.command)
-    assert min(first_structure([mixed], "massless", lambda share: None).fit.held_out) > 0.9
+    assert min(choose_structure([mixed], "massless", lambda share: None).fit.held_out) > 0.9
     with pytest.raises(StudyError, match="nothing to do with the commands"):
         fitted(tmp_path, mixed, "mass-spring")
 

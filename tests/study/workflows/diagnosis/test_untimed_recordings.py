@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.confirm.fitting_measures import looks_of
+from analysis.diagnosis.confirm.fitting_measures import list_fitting_measures
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.measure_rule import UNTIMED
@@ -47,7 +47,7 @@ def test_the_first_model_is_a_spring(first, recording):
 def test_friction_is_weighed_and_forces_are_compared_once(first, recording):
     (balance,) = first.balances
     assert "coulomb_friction" in {law.law.effect for law in balance.named}
-    (look,) = looks_of((recording,), first.model, first.balances, "auto")
+    (look,) = list_fitting_measures((recording,), first.model, first.balances, "auto")
     assert look.chosen.measure.name == "predicted force"
     assert look.chosen.remarks == (UNTIMED,)  # no frequency up to which they are compared
 

@@ -27,15 +27,15 @@ FITS, BETTER = 0.5, 0.5
 leave."""
 
 
-def restored(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
+def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
     """Where the only response is a speed that is never negative though its command is."""
-    if any(not _only_amount(recording) for recording in recordings):
+    if any(not _is_unsigned_speed(recording) for recording in recordings):
         return recordings, ""
     found = []
     for recording in recordings:
         amount = recording.response.samples[:, 0]
-        signed, left = _signed(recording.command.samples[:, 0], amount)
-        plain = _left(recording.command.samples[:, 0], amount)
+        signed, left = _find_signs(recording.command.samples[:, 0], amount)
+        plain = _unexplained_share(recording.command.samples[:, 0], amount)
         if left > 1 - FITS or left > BETTER * plain:
             return recordings, ""
         found.append(replace(recording, response=replace(recording.response, samples=signed[:, None])))
@@ -46,7 +46,7 @@ def restored(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], 
     )
 
 
-def _only_amount(recording: Recording) -> bool:
+def _is_unsigned_speed(recording: Recording) -> bool:
     response, command = recording.response, recording.command
     if len(response.channels) != 1 or len(command.channels) != 1 or recording.position is not None:
         return False
@@ -60,7 +60,7 @@ def _only_amount(recording: Recording) -> bool:
     return rms > 0 and float(speed.min()) > -BELOW * rms and touches and min(ways) > BOTH_WAYS * power
 
 
-def _signed(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, float]:
+def _find_signs(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, float]:
     """With signs, and the share of its power that the filter leaves."""
     rows = _rows(command)
     stretches = _stretches(amount)
@@ -68,16 +68,16 @@ def _signed(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, float]
     heard = [late[k + 1] - late[max(k + 1 - TAPS // 4, 0)] for k in range(len(command))]
     best = _with_signs(amount, np.array(heard), stretches)
     for _ in range(ROUNDS):
-        signed = _with_signs(amount, _foretold(rows, best), stretches)
+        signed = _with_signs(amount, _predict_speed(rows, best), stretches)
         if np.array_equal(signed, best):
             break
         best = signed
-    return best, float(np.sum((best - _foretold(rows, best)) ** 2) / np.sum(best**2))
+    return best, float(np.sum((best - _predict_speed(rows, best)) ** 2) / np.sum(best**2))
 
 
-def _left(command: FloatArray, amount: FloatArray) -> float:
+def _unexplained_share(command: FloatArray, amount: FloatArray) -> float:
     rows, flat = _rows(command), amount - amount.mean()
-    return float(np.sum((flat - _foretold(rows, flat)) ** 2) / np.sum(amount**2))
+    return float(np.sum((flat - _predict_speed(rows, flat)) ** 2) / np.sum(amount**2))
 
 
 def _rows(command: FloatArray) -> FloatArray:
@@ -86,7 +86,7 @@ def _rows(command: FloatArray) -> FloatArray:
     return np.column_stack([*(padded[TAPS - k : len(padded) - k] for k in range(TAPS)), np.ones(len(command))])
 
 
-def _foretold(rows: FloatArray, speed: FloatArray) -> FloatArray:
+def _predict_speed(rows: FloatArray, speed: FloatArray) -> FloatArray:
     gram = rows.T @ rows
     weights = np.linalg.solve(gram + RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), rows.T @ speed)
     return np.asarray(rows @ weights)

@@ -24,13 +24,13 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
-TURNED = "turned commands"
+REVERSED = "turned commands"
 """Note of a recording: the channels of its commands that were turned round."""
 CLEARLY = 0.1
 """Share of the folds' error power that the turned sign must take; as much as a linear law must."""
 
 
-def turned_round(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
+def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
     """recordings: alike in channels, units and rate. And a sentence, where a force was turned round."""
     driven = all_as_force_driven(recordings)
     count = len(driven[0].command.channels)
@@ -38,7 +38,7 @@ def turned_round(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
         motions = motions_of(observed_parts(driven, len(driven[0].response.channels)))
         if len(motions[0].channels) != count:
             return recordings, ""
-        against = [axis for axis in range(count) if _against(motions, axis)]
+        against = [axis for axis in range(count) if _is_reversed(motions, axis)]
     except (NoMotionError, np.linalg.LinAlgError):
         return recordings, ""
     if not against:
@@ -48,8 +48,8 @@ def turned_round(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
     sign = np.ones(count)
     sign[against] = -1.0
     verb = "is" if len(names) == 1 else "are"
-    told = {TURNED: names}
-    turned = tuple(_turned(replace(each, meta={**each.meta, **told}), imposed, sign) for each in recordings)
+    told = {REVERSED: names}
+    turned = tuple(_reverse(replace(each, meta={**each.meta, **told}), imposed, sign) for each in recordings)
     return turned, (
         f"{listed(names)} {verb} counted against the motion: as recorded, the device would give work instead of taking "
         f"it. The sign was turned round, and a model that is written has it in its input matrix; where the device is a "
@@ -60,14 +60,14 @@ def turned_round(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
 def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
     """model: of the recording as it is compared, where commands may have been turned round. The same device, driven by
     the commands as they were recorded."""
-    channels, turned = recording.command.channels, recording.meta.get(TURNED)
+    channels, turned = recording.command.channels, recording.meta.get(REVERSED)
     if not isinstance(turned, Sequence) or not set(turned) & set(channels):
         return model
     signs = [-1.0 if channel in turned else 1.0 for channel in channels]
     return with_turned_commands(model, signs, channels, recording.response.channels)
 
 
-def _against(motions: Sequence[Motion], axis: int) -> bool:
+def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
     plain, turned = (
         regression_of([replace(each, force=sign * each.force) for each in motions], axis, (), turns=False)
         for sign in (1.0, -1.0)
@@ -76,12 +76,12 @@ def _against(motions: Sequence[Motion], axis: int) -> bool:
     return other.error < (1 - CLEARLY) * first.error and is_better(first, other)
 
 
-def _turned(recording: Recording, imposed: bool, sign: FloatArray) -> Recording:
+def _reverse(recording: Recording, imposed: bool, sign: FloatArray) -> Recording:
     if imposed:
-        return replace(recording, response=_times(recording.response, sign))
-    excitation = None if recording.excitation is None else _times(recording.excitation, sign)
-    return replace(recording, command=_times(recording.command, sign), excitation=excitation)
+        return replace(recording, response=_scale_channels(recording.response, sign))
+    excitation = None if recording.excitation is None else _scale_channels(recording.excitation, sign)
+    return replace(recording, command=_scale_channels(recording.command, sign), excitation=excitation)
 
 
-def _times(signal: Signal, sign: FloatArray) -> Signal:
+def _scale_channels(signal: Signal, sign: FloatArray) -> Signal:
     return replace(signal, samples=signal.samples * sign)
