@@ -1,4 +1,4 @@
-"""From recordings and a model to findings: the whole diagnosis, without files, clocks or screens."""
+"""The whole diagnosis: from recordings and a model to findings, without files, clocks or screens."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -60,9 +60,9 @@ from equalizer.signals.recording import Recording
 
 BALANCE = "the force balance"
 TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
-"""Laws of the command that a balance has weighed: what it does not name is not there."""
+"""Laws of the command that a force balance tests: what it does not name is absent."""
 GAINS = ("force_gain", "sensor_gain")
-"""A model that was fitted to the recordings holds them: only against a calibrated one can a gain be wrong."""
+"""A model fitted to the recordings contains these: only against a calibrated one can a gain be wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,21 +74,21 @@ class DiagnosisSettings:
     names: tuple[str, ...] = ()
     """Of the recordings, for the reader."""
     clean: tuple[Recording, ...] = ()
-    """Of the device when it was in order: what it differed by then from its model, re-tuned, is no mismatch."""
+    """Recordings of the device without the fault: its difference from the re-tuned model there is no mismatch."""
     fitted: bool = False
-    """The model was fitted to these recordings by the program: evidence is then weighed in the force balance."""
+    """The model was fitted to these recordings by the program: laws are then tested in the force balance."""
     balances: tuple[Balance, ...] | None = None
-    """Where they were weighed already: `find_balances` these recordings."""
+    """`find_balances` of these recordings, where known already."""
     compared: Compared = "auto"
     """What is compared: motion, force, or what suits."""
     discovery: bool = False
-    """Where no name of the catalogue stands, laws without a name are looked for."""
+    """Whether laws are discovered where no effect of the catalogue is named."""
     kept: tuple[LawEntry, ...] = ()
-    """Laws that were found elsewhere, to be looked for beside the catalogue."""
+    """Laws discovered elsewhere, to be tried beside the catalogue."""
     time_left: TimeBudget = always
     """Asked before each piece of the search; once it says no, what was found until then stands."""
     guard: Guard = field(default_factory=Guard)
-    """Where it is on, an effect that crashes is left out, and that is said."""
+    """Where it is on, an effect that crashes is left out, with a remark."""
 
 
 def diagnose(
@@ -98,8 +98,8 @@ def diagnose(
     map_: Mapper,
     progress: Progress,
 ) -> Findings:
-    """recordings: of one device, alike in channels, units and rate; see `input_checks` for what is refused. Raises
-    NothingLearned where the clean recordings say nothing of these."""
+    """What the model lacks. recordings: of one device, alike in channels, units and rate; see `input_checks` for what
+    is refused. Raises NothingLearned where the clean recordings cannot be compared with these."""
     balances: tuple[Balance, ...] = ()
     if settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.0)
@@ -132,9 +132,9 @@ def _compare_with_clean(
     map_: Mapper,
     progress: Progress,
 ) -> Findings | None:
-    """None where a given model foresees the clean recordings so well that a fault is told by it, or where repeats say
-    that noise is small. What no fault of the comparison explains is looked for with the given model, among effects that
-    the comparison cannot undo."""
+    """Findings by comparison with the clean recordings. None where the given model predicts these so well that it is
+    used itself, or where repeats show that noise is small. Where no fault of the comparison explains the difference,
+    the search beside the given model is tried for effects that the comparison does not test."""
     look = FittingMeasure(model, measure_of(recordings, model))
     if not settings.fitted and (noise_is_from_repeats(look.chosen) or foresees(model, settings.clean)):
         return None
@@ -162,20 +162,20 @@ def _search_beside_clean(
     map_: Mapper,
     progress: Progress,
 ) -> Findings | None:
-    """weighed: effects that a comparison weighed, and did not find. None where the search beside clean recordings names
-    nothing else, or cannot be done."""
+    """Findings by the search beside clean recordings. weighed: effects that the comparison tested, and did not find.
+    None where the search names nothing else, or cannot be done."""
     look = choose_fitting_measure(recordings, model, settings.clean, settings.compared)
     rest = replace(settings, without=(*settings.without, *weighed))
     try:
         seen = _by_search(recordings, look, rest, map_, progress, ())
     except (NothingLearned, np.linalg.LinAlgError):
         return None
-    context = seen.searched.context
-    found = keep_identifiable(context, seen.searched.found, settings.time_left)
-    searched = require_enough_gain(replace(seen.searched, found=found, errors=None), False)
-    if not (searched.judged.named and searched.found.steps):
+    context = seen.result.context
+    found = keep_identifiable(context, seen.result.found, settings.time_left)
+    result = require_enough_gain(replace(seen.result, found=found, errors=None), False)
+    if not (result.judgement.named and result.found.steps):
         return None
-    return _assemble(recordings, settings, look, replace(seen, searched=searched), ())
+    return _assemble(recordings, settings, look, replace(seen, result=result), ())
 
 
 def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings) -> tuple[Balance, ...]:
@@ -185,22 +185,23 @@ def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings) -> t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Result:
-    searched: SearchResult
+    result: SearchResult
     floor: CleanFloor
 
 
 def _judge_beside_model(
     recordings: Sequence[Recording], look: FittingMeasure, seen: _Result, settings: DiagnosisSettings
 ) -> tuple[_Result, tuple[Balance, ...]]:
-    weigh = partial(judge_beside_model, recordings, look, seen.searched, settings.time_left)
-    beside = settings.guard.part(BALANCE, "its weighing", weigh, ResultBesideModel(seen.searched))
-    return replace(seen, searched=beside.searched), beside.balances
+    weigh = partial(judge_beside_model, recordings, look, seen.result, settings.time_left)
+    beside = settings.guard.part(BALANCE, "its weighing", weigh, ResultBesideModel(seen.result))
+    return replace(seen, result=beside.result), beside.balances
 
 
 def _search_context(
     recording: Recording, look: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchContext:
-    """recording: as it was given; where forces are compared, the measure's own have forces for responses."""
+    """The shared state of the search. recording: as given; where forces are compared, the measure's own recordings have
+    forces for responses."""
     measure = look.chosen.measure
     model = with_units_of(look.model, recording.command.units, recording.response.units, time_unit(recording))
     tuning = tuning_of(model, recording.command.channels)
@@ -215,8 +216,8 @@ def _by_search(
     progress: Progress,
     balances: Sequence[Balance],
 ) -> _Result:
-    """balances: where they name a law of the motion, nothing else is looked for; where they were weighed and name none,
-    effects of actuator and sensor are."""
+    """The result of the search by simulation. balances: where they name a law of the motion, nothing else is tried;
+    where they name none, only effects of actuator and sensor are."""
     chosen, context = look.chosen, _search_context(recordings[0], look, settings, map_)
     catalogue = _catalogue(settings, recordings[0], context.barred)
     may_be_named = [effect for effect in catalogue if effect.name not in context.barred]
@@ -233,19 +234,19 @@ def _by_search(
         found = _Result(beside, learned.floor)
     else:
         found = _search(context, catalogue, settings, progress)
-        if hums_low(found.searched.found):
+        if hums_low(found.result.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
             found = _search(context, catalogue, settings, progress)
-    if balances and found.searched.judged.named:
+    if balances and found.result.judgement.named:
         repeats = all(floor.how == "repeats" for floor in chosen.floors)
-        found = replace(found, searched=unname_doubtful_effects(require_enough_gain(found.searched, repeats)))
-    seen = found.searched
-    left = seen.judged.verdict in ("unexplained", "partly_explained") and not has_law(seen)
+        found = replace(found, result=unname_doubtful_effects(require_enough_gain(found.result, repeats)))
+    seen = found.result
+    left = seen.judgement.verdict in ("unexplained", "partly_explained") and not has_law(seen)
     if left and not context.certain and settings.time_left():
         progress("looking for play that rattles", 0.9)
         rattled = explain_impacts(seen.context, seen.found, chosen.floors, may_be_named)
         if rattled is not None:
-            return replace(found, searched=SearchResult(seen.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
+            return replace(found, result=SearchResult(seen.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
     return found
 
 
@@ -260,7 +261,7 @@ def _search(
 
 
 def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozenset[str]) -> list[Effect]:
-    """The effects to look for; with those that a barred effect refines, though they were left out, as rivals."""
+    """The effects to try; with barred effects that others refine, as rivals."""
     left_out = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
     known = (*CATALOGUE, *kept_effects(settings.kept, recording))
     catalogue = [effect for effect in known if effect.name not in left_out]
@@ -269,7 +270,7 @@ def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozen
 
 
 def _beside_motion(name: str, place: str, imposed: bool) -> bool:
-    """An effect of the actuator or sensor, of which a force balance tells nothing."""
+    """Whether an effect of the actuator or sensor cannot be seen by a force balance."""
     told = name == "body_on_actuator" or (name in TESTED_BY_BALANCE and not imposed)
     return place in ("actuator", "sensor") and not told
 
@@ -281,11 +282,11 @@ def _assemble(
     seen: _Result,
     balances: Sequence[Balance],
 ) -> Findings:
-    searched, names = seen.searched, names_of_parts(recordings, settings.names)
-    found = searched.found if searched.judged.named else replace(searched.found, after=searched.found.retuned)
-    whole = assemble_findings(replace(searched, found=found), look.chosen.floors, names, seen.floor)
+    result, names = seen.result, names_of_parts(recordings, settings.names)
+    found = result.found if result.judgement.named else replace(result.found, after=result.found.retuned)
+    whole = assemble_findings(replace(result, found=found), look.chosen.floors, names, seen.floor)
     channels = recordings[0].command.channels
-    found_too = unconfirmed_candidates(searched.unconfirmed, whole.black_box, recordings[0], look.model)
+    found_too = unconfirmed_candidates(result.unconfirmed, whole.black_box, recordings[0], look.model)
     if settings.fitted:
         diagnosis = with_balances(whole.diagnosis, balances, channels, found_too)
     else:
@@ -294,7 +295,7 @@ def _assemble(
     maps: tuple[StateMaps, ...] = settings.guard.part("the map of states", "its making", drawn, ())
     early = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
     linear = linear_remarks(balances, channels) if settings.fitted else ()
-    remarks = tuple(dict.fromkeys((*early, *look.chosen.remarks, *searched.remarks, *linear, *whole.remarks)))
+    remarks = tuple(dict.fromkeys((*early, *look.chosen.remarks, *result.remarks, *linear, *whole.remarks)))
     reached = balance_errors(diagnosis, balances, channels)
     found_here = replace(whole, diagnosis=diagnosis, remarks=remarks, fitted=settings.fitted)
     return replace(found_here, reached=reached, state_maps=maps)

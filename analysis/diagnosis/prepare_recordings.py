@@ -1,4 +1,4 @@
-"""Recordings in the form in which they are compared with a model: the same for files, real recordings and values.
+"""Prepares recordings for the comparison with a model, alike for files, real recordings and values.
 
 In this order: segments are found where a recording states none, commands and responses are brought into the form that
 a force balance needs (only where no model says what they are), motions become force-driven, gaps in commands are left
@@ -19,20 +19,21 @@ from analysis.wording import begun, listed
 from equalizer.signals.recording import Recording
 
 STILL = 1e-9
-"""Of its value: what changes by less is the rounding of numbers."""
+"""Range of a signal over its size, below which changes are rounding errors."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedRecordings:
     recordings: tuple[Recording, ...]
     remarks: tuple[str, ...] = ()
-    """What must be known of them: one sentence each."""
+    """Sentences about what was changed, and what is weak."""
 
 
 def prepare(
     recordings: Sequence[Recording], names: Sequence[str], plain: bool, short: bool | None = None
 ) -> PreparedRecordings:
-    """recordings: alike, in the order of names. plain: one motion for each force, as a force balance needs it. short:
+    """The prepared recordings. recordings: alike, in the order of names. plain: one motion for each force, as a force
+    balance needs it. short:
     few cycles are a remark and no refusal; None: as plain. Raises NothingToDiagnose."""
     found = [find_segments(each) for each in recordings]
     told = [(name, text) for name, (_, text) in zip(names, found, strict=True) if text]
@@ -45,7 +46,7 @@ def prepare(
 
 
 def comparable(recordings: Sequence[Recording], names: Sequence[str], short: bool) -> PreparedRecordings:
-    """The last two steps alone, of what has its form: a session's trials. Raises NothingToDiagnose."""
+    """The last two steps alone, for recordings in this form, such as a session's trials. Raises NothingToDiagnose."""
     few: tuple[str, ...] = ()
     try:
         require_different(recordings, names)
@@ -60,7 +61,7 @@ def comparable(recordings: Sequence[Recording], names: Sequence[str], short: boo
 
 
 def keep_common_position(recordings: Sequence[Recording]) -> PreparedRecordings:
-    """Compared where every recording has it in the same channels; where not, it is left out, and that is said."""
+    """The recordings with their positions, where all have the same position channels; else without, and a remark."""
     kinds = {None if each.position is None else (each.position.channels, each.position.units) for each in recordings}
     if len(kinds) < 2:
         return PreparedRecordings(tuple(recordings))
@@ -68,7 +69,7 @@ def keep_common_position(recordings: Sequence[Recording]) -> PreparedRecordings:
 
 
 def _drop_constant_position(recordings: Sequence[Recording]) -> PreparedRecordings:
-    """What stands still throughout says nothing, and its errors cannot be counted in units of anything."""
+    """The recordings without positions where a position never changes: its errors have no unit to be counted in."""
     positions = [each.position for each in recordings if each.position is not None]
     if not positions:
         return PreparedRecordings(tuple(recordings))

@@ -1,4 +1,4 @@
-"""The force balance beside a model that was given: its numbers are columns under the prior of their calibration.
+"""The force balance beside a given model, whose open numbers are columns under the prior of their calibration.
 
 The force that the model needs is taken along the measured motion, with everything that its file names: actuator, modes,
 effects. Laws are then tested as beside a fitted model (`balance.judge_laws`), by what they take of the error on
@@ -31,7 +31,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 FINEST = 6.0
-"""Samples per period of the band's end at which laws are computed: they have overtones, which must not fold back."""
+"""Samples per period of the band's end at which laws are computed: their overtones must not be aliased."""
 MOVED = 0.1
 """Step of the finite differences, in standard deviations of the calibration."""
 
@@ -39,7 +39,7 @@ MOVED = 0.1
 def find_balances_beside_model(
     recordings: Sequence[Recording], model: MechanicalModel, without: frozenset[str], time_left: TimeBudget
 ) -> tuple[Balance, ...]:
-    """One per command; none where not each drives a measured position or velocity."""
+    """One balance per command; empty where not each command drives a measured position or velocity."""
     records = observed_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
         return ()
@@ -64,7 +64,7 @@ def find_balances_beside_model(
 
 
 def _select_axis(motion: Motion, axis: int) -> Motion:
-    """Of one axis alone: laws of another one's motion are no physics of the catalogue."""
+    """The motion of one axis alone: the catalogue has no laws of another axis's motion."""
     courses = {name: getattr(motion, name)[:, [axis]] for name in ("position", "velocity", "acceleration")}
     return replace(motion, channels=motion.channels[axis : axis + 1], **courses)
 
@@ -99,8 +99,8 @@ def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _
 
 
 def _grounded_columns(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
-    """(n, m) each: what one standard deviation of mass, damping and stiffness at the driven axes adds, as `Tuning`
-    counts them."""
+    """(n, m) each: force of one standard deviation of mass, damping and stiffness at the driven axes, in the order of
+    `Tuning`."""
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     length = np.linalg.norm(model.input, axis=0)
@@ -115,7 +115,7 @@ def _grounded_columns(motion: Motion, model: MechanicalModel, recording: Recordi
 def _mode_columns(
     motion: Motion, model: MechanicalModel, recording: Recording, known: Sequence[PlacedEffect]
 ) -> Iterator[FloatArray]:
-    """(n, m) each: the same of the modes' numbers."""
+    """(n, m) each: force of one standard deviation of each number of the modes."""
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
     first = 3 * m * (m + 1) // 2
     if first == len(tuning.names):

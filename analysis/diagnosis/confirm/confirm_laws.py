@@ -1,4 +1,4 @@
-"""From laws that a force balance weighed to effects that are fitted by output error, and what may be said of them.
+"""Confirms laws that a force balance named by fitting them by output error.
 
 Used where the model itself was fitted to the recordings: then no calibration says how large its errors may be, and
 evidence is the gain on held-out data instead of a remainder in units of noise.
@@ -36,21 +36,21 @@ from equalizer.signals.signal import FloatArray
 CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
 """Effects that are numbers of a fitted model, and their values."""
 SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
-"""Effects of a sensor that its own signal shows, whatever moves before it."""
+"""Effects of a sensor that its signal shows by itself."""
 ONLY_BESIDE_CALIBRATION = (
     "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may look like it; a "
     "calibrated model, or recordings of the device in order, would tell"
 )
 VAGUE = 1.96 * INTERVAL_FACTOR
-"""Standard errors of a logarithm from which an interval reaches a number that is none."""
+"""Half width of an interval in standard errors: a logarithm with a larger relative error leaves its number open."""
 HELD_BY_SIMULATION = 0.9
 """Times the held-out error without new physics that the completed model may leave at most, in the measure that suits.
 """
 
 
 def search_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> SearchResult | None:
-    """repeats: the noise is known from what repeats; else nothing counts as explained. None where nothing is named, or
-    where simulations do not bear it out."""
+    """The named laws of the balances as a search result. repeats: the noise is known from repeats; else nothing counts
+    as explained. None where nothing is named, or simulations do not confirm it."""
     named = [
         (axis, law)
         for axis, balance in enumerate(balances)
@@ -82,26 +82,25 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
 
 
 def require_enough_gain(seen: SearchResult, repeats: bool) -> SearchResult:
-    """Of what a search beside balances named, the name only where it takes as much of the held-out error power as a
-    law of a balance must, and `explained` only where repeats show the noise; what is a number of the model needs no
-    name, and no proof."""
+    """The result with only those effects named that take as much of the held-out error power as a law of a balance
+    must, and `explained` only where repeats show the noise. Constants are numbers of the model and need no proof."""
     found = seen.found
     while found.steps and not _takes_enough(seen.context, found):
         if len(found.steps) > 1:
             found = without_effect(seen.context, found, len(found.steps) - 1)
         else:
             found = replace(found, after=found.retuned, steps=())
-        seen = replace(seen, found=found, judged=judge(found), errors=None)
+        seen = replace(seen, found=found, judgement=judge(found), errors=None)
     names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed_effects()}
-    if repeats or seen.judged.verdict != "explained" or names <= set(CONSTANTS):
+    if repeats or seen.judgement.verdict != "explained" or names <= set(CONSTANTS):
         return seen
-    return replace(seen, judged=replace(seen.judged, verdict="partly_explained"))
+    return replace(seen, judgement=replace(seen.judgement, verdict="partly_explained"))
 
 
 def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
-    """Effects of actuator and sensor that a search beside balances named become candidates, except where the signal
-    itself shows them: the model was fitted to these very recordings, so that its numbers give way to whatever bends,
-    and a law of the motion that no catalogue holds looks like a bent or late sensor."""
+    """The result with named effects of actuator and sensor made candidates, unless the signal itself shows them: the
+    model was fitted to these recordings, so that a law of the motion that the catalogue lacks may look like a nonlinear
+    or late sensor."""
     found, told = seen.found, []
     doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
     for place in reversed(doubtful):
@@ -115,7 +114,7 @@ def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
     if not doubtful:
         return seen
     kept = tuple(sorted(told, key=lambda each: -each.gain))
-    return replace(seen, found=found, judged=judge(found), errors=None, unconfirmed=(*seen.unconfirmed, *kept))
+    return replace(seen, found=found, judgement=judge(found), errors=None, unconfirmed=(*seen.unconfirmed, *kept))
 
 
 def _takes_enough(context: SearchContext, found: Explanation) -> bool:
@@ -130,8 +129,10 @@ def _from_starts(
     without: tuple[FittedCandidate, FittedCandidate],
     named: Sequence[tuple[int, JudgedLaw]],
 ) -> tuple[list[FittedCandidate], FittedCandidate]:
-    """The steps, and the last of them on all samples. without: the re-tuned model, and what there is without new
-    physics on all samples. From the balance's linear numbers; where that ends beside the law, from the model's own."""
+    """The fits after each law, and the last of them scored on all samples, started from the balance's linear numbers,
+    or, where these fail, from the model's own. without: the re-tuned model, and the model without new physics on all
+    samples.
+    """
     retuned, plain = without
     released = numbers_beside_laws(context.tuning, balances, [law.place for _, law in named])
     steps = _steps(context, retuned, named, released)
@@ -147,7 +148,7 @@ def _from_starts(
 def _steps(
     context: SearchContext, retuned: FittedCandidate, named: Sequence[tuple[int, JudgedLaw]], deviations: FloatArray
 ) -> list[FittedCandidate]:
-    """The laws one after the other beside the constants, each fitted with those before it."""
+    """The fits with the laws added one after the other beside the constants."""
     whole = retuned.fitted.hypothesis
     steps = [retuned for _ in whole.claims]
     for axis, law in named:
@@ -159,8 +160,8 @@ def _steps(
 
 
 def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) -> int | None:
-    """The place among the named laws of a law whose main number's interval holds zero, or any number's, where the law
-    only refines another of its family; None where there is none."""
+    """Place of a named law whose main parameter's interval includes zero, or any parameter's where the law only refines
+    another of its family; None = there is none."""
     begin, hypothesis = 0, explained.steps[-1].fitted.hypothesis
     families = [family_of(claim.effect.name) for claim in hypothesis.claims]
     for place, claim in enumerate(hypothesis.claims):
@@ -174,11 +175,11 @@ def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) 
     return None
 
 
-def leaves_open(searched: SearchResult) -> bool:
+def leaves_open(result: SearchResult) -> bool:
     """Whether the interval of any positive number of a law reaches zero: a stiffness before sliding, say."""
-    assert searched.errors is not None
-    numbers = searched.found.steps[-1].fitted.hypothesis.numbers
-    errors = searched.errors[len(searched.context.tuning.names) :]
+    assert result.errors is not None
+    numbers = result.found.steps[-1].fitted.hypothesis.numbers
+    errors = result.errors[len(result.context.tuning.names) :]
     return any(
         number.parameter.scale == "log" and VAGUE * error >= 1 for number, error in zip(numbers, errors, strict=True)
     )

@@ -1,4 +1,4 @@
-"""How errors are measured of what a force balance named: in which measures its laws are fitted, one after the other."""
+"""Chooses the error measures in which the laws of a force balance are fitted, one after the other."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -31,12 +31,12 @@ ABOUT_MEAN = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittingMeasure:
-    """A model, and how its errors are measured."""
+    """A model, and the error measure of its fit."""
 
     model: MechanicalModel
     chosen: Chosen
     narrow: bool = False
-    """Only up to where noise is small in the force, which may leave numbers of laws open."""
+    """Whether the band ends where noise is small in the force, which may leave numbers of laws open."""
 
 
 def choose_fitting_measure(
@@ -46,7 +46,8 @@ def choose_fitting_measure(
     compared: Compared,
     about_mean: bool = False,
 ) -> FittingMeasure:
-    """about_mean: the model was fitted to what changes, and is played about the mean where that leaves less."""
+    """The measure that the rule chooses. about_mean: the model was fitted to deviations from the mean, and a constant
+    command is added where that lowers the error."""
     look = FittingMeasure(model, measure_of(recordings, model, clean, compared))
     moved = about_operating_point(recordings, model) if about_mean and not clean else None
     if moved is None or look.chosen.measure.name != "free simulation":
@@ -60,7 +61,7 @@ def choose_fitting_measure(
 
 
 def _error_over_noise(model: MechanicalModel, chosen: Chosen) -> float:
-    """As the model is, on what may be fitted to: the error over the noise."""
+    """Error of the unchanged model over the noise, on the samples to fit and to choose by."""
     measure = chosen.measure
     tuning = tuning_of(model, measure.records[0].recording.command.channels)
     given = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
@@ -70,9 +71,9 @@ def _error_over_noise(model: MechanicalModel, chosen: Chosen) -> float:
 def list_fitting_measures(
     recordings: Sequence[Recording], model: MechanicalModel, balances: Sequence[Balance], compared: Compared
 ) -> Iterator[FittingMeasure]:
-    """In a free simulation, the strictest, where the fitted model bears one; else along the measured motion, with the
-    balance's own linear numbers: up to where noise is small, where that holds what the laws push, or else as far as the
-    balance looked."""
+    """The measures to try, the strictest first: a free simulation where the fitted model allows one; then forces along
+    the measured motion with the balance's linear numbers, in the band where noise is small, if it holds the laws'
+    power, and in the band of the balance."""
     if not any(balance.named for balance in balances):
         return
     chosen = measure_of(recordings, model)

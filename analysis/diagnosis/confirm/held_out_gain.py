@@ -1,8 +1,8 @@
-"""The share of the held-out error power that goes with an effect, with an interval from resampled stretches.
+"""The share of the held-out error power that an effect takes, with an interval by block bootstrap.
 
-No device is within its sensors' noise of any model, so that no remainder in units of noise says whether an effect is
-right: what it foretells of samples that nothing was fitted to does. Stretches are resampled, for residuals are
-correlated (Kunsch, Ann. Stat. 17:1217, 1989).
+No device is within its sensors' noise of any model, so that an effect is judged by its prediction of held-out samples,
+not by the remainder in units of noise. Stretches are resampled as blocks, for residuals are correlated (Kunsch, Ann.
+Stat. 17:1217, 1989).
 """
 
 from dataclasses import dataclass
@@ -15,23 +15,24 @@ from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.signals.signal import FloatArray
 
 STRETCHES = 16
-"""Of all that is held out together, about."""
+"""Number of stretches of all held-out samples, about."""
 LEAST_STRETCHES = 4
 
 
 @dataclass(frozen=True, slots=True)
 class HeldOutGain:
-    """Shares of the error power, the mean over the channels of each one's."""
+    """Shares of the error power that an effect takes, in the mean over the channels."""
 
     gain: float
     low: float
-    """At 2.5 %,"""
+    """Bound at 2.5 %."""
     high: float
-    """and at 97.5 %."""
+    """Bound at 97.5 %."""
 
 
 def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: FittedCandidate) -> HeldOutGain | None:
-    """measure: with the sealed samples, as both candidates' fits. None where too little is held out."""
+    """The gain of one candidate over another. measure: with the held-out samples, as both candidates' fits. None where
+    too little is held out."""
     left, right = (_powers(measure, each) for each in (without, with_it))
     if len(left) < LEAST_STRETCHES or not (np.isfinite(left).all() and np.isfinite(right).all()):
         return None

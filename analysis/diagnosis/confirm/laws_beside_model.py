@@ -1,9 +1,9 @@
-"""What a search beside a given model may claim where its errors are not those of noise: by held-out gain.
+"""Decides by held-out gain what a search beside a given model names, where its errors are not those of noise.
 
-Where repeats tell a noise that is about as large as what is left, the verdict is the likelihood's (`verdict`).
-Elsewhere a real device is far from any model in units of its noise, and no true law brings the error anywhere near it.
-A name is then confirmed by what it takes of the held-out error power: against the re-tuned model, against its best
-rival, and against what could be taken at all.
+Where repeats show a noise about as large as the remaining error, the verdict is the likelihood's (`verdict`). Elsewhere
+a real device is far from any model in units of its noise, and even a true law does not bring the error near it. An
+effect is then confirmed by its share of the held-out error power: against the re-tuned model, against its best rival,
+and against what could be taken at all.
 """
 
 from collections.abc import Sequence
@@ -27,14 +27,14 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.recording import Recording
 
 AT_LIMIT = 0.97
-"""Of the bound of a re-tuned number, from which it presses against it."""
+"""Share of a re-tuned number's bound, from which on it counts as at the bound."""
 SHOWN = 3
-"""Fitted candidates of the last round that are told with their gain."""
+"""Fitted candidates of the last round that are reported with their gain."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResultBesideModel:
-    searched: SearchResult
+    result: SearchResult
     balances: tuple[Balance, ...] = ()
     """Empty where nothing is missing, or no motion was measured."""
 
@@ -42,13 +42,13 @@ class ResultBesideModel:
 def judge_beside_model(
     recordings: Sequence[Recording], look: FittingMeasure, seen: SearchResult, time_left: TimeBudget
 ) -> ResultBesideModel:
-    """seen: by simulation."""
-    if seen.judged.verdict not in ("unexplained", "partly_explained") or seen.found.statistic is not None:
+    """The result by held-out gain, and the balances beside the model. seen: the result of the search by simulation."""
+    if seen.judgement.verdict not in ("unexplained", "partly_explained") or seen.found.statistic is not None:
         return ResultBesideModel(seen)
     known_noise = all(floor.how == "repeats" for floor in look.chosen.floors)
     balances = find_balances_beside_model(recordings, look.model, seen.context.barred, time_left)
     near = float(np.nanmax(seen.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
-    if seen.judged.named or seen.found.barred:
+    if seen.judgement.named or seen.found.barred:
         return ResultBesideModel(seen, balances)
     if known_noise and near:
         why_not = "the noise is known here, and what it leaves is more than noise"
@@ -57,18 +57,18 @@ def judge_beside_model(
         )
     why_not = objection(seen, balances)
     if seen.found.steps and not why_not:
-        return ResultBesideModel(replace(seen, judged=Judgement("partly_explained", True)), balances)
+        return ResultBesideModel(replace(seen, judgement=Judgement("partly_explained", True)), balances)
     found = search_by_balance(seen.context, balances, known_noise) if balances else None
     if found is not None and not objection(found, balances):
-        judged = replace(found.judged, verdict="partly_explained")
-        return ResultBesideModel(replace(found, judged=judged, remarks=seen.remarks), balances)
+        judged = replace(found.judgement, verdict="partly_explained")
+        return ResultBesideModel(replace(found, judgement=judged, remarks=seen.remarks), balances)
     return ResultBesideModel(
         replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed_candidates(seen, why_not))), balances
     )
 
 
 def objection(seen: SearchResult, balances: Sequence[Balance]) -> str:
-    """Why what was found is not named, as a sentence; empty where it is to be."""
+    """Why the effects found are not named, as a sentence; empty where they are."""
     context, found = seen.context, seen.found
     if not found.steps:
         return "it takes too little of the error to be added"
@@ -98,7 +98,8 @@ def _not_better(context: SearchContext, rival: FittedCandidate, after: FittedCan
 
 
 def _best_rival(context: SearchContext, seen: SearchResult) -> FittedCandidate | None:
-    """Of the last step that was added: the best other effect that is no refinement of it, with the sealed samples."""
+    """The best rival of the last effect that is no refinement of it, scored on held-out samples; None = there is
+    none."""
     steps = seen.found.steps
     if len(seen.found.rounds) < len(steps):
         return None

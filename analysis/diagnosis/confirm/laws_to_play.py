@@ -1,4 +1,4 @@
-"""Laws that a force balance named as hypotheses of a simulation: which it can play, from which numbers."""
+"""Converts laws that a force balance named to hypotheses of a simulation, with starting numbers."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ def can_be_played(own: int, judged: JudgedLaw) -> bool:
 
 
 def refit_laws(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
-    """With the numbers that the balances give these laws alone."""
+    """The laws with the parameters that the balances give when only these laws are fitted."""
     found = []
     for axis, law in named:
         if law.place == NO_COLUMN:
@@ -42,8 +42,8 @@ def refit_laws(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw
 
 
 def constants_of(balances: Sequence[Balance]) -> Hypothesis:
-    """A constant force along each axis: a weight, or the offset of an amplifier or sensor, which no model's matrices
-    hold."""
+    """Constant forces along the axes: a weight, or the offset of an amplifier or sensor, which mass, damping and
+    stiffness do not describe."""
     whole = NOTHING
     for axis, balance in enumerate(balances):
         regression = balance.search.regression
@@ -64,7 +64,8 @@ def hypothesis_of_law(axis: int, judged: JudgedLaw) -> Hypothesis:
 
 
 def numbers_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
-    """Mass, damping and stiffness as they are beside laws of the only balance, not as they were fitted without them."""
+    """Deviations of mass, damping and stiffness to their values beside the laws of the only balance; zeros
+    otherwise."""
     start = np.zeros(len(tuning.names))
     if any(balance.search.regression.prior is not None for balance in balances):
         return start

@@ -18,15 +18,15 @@ from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, SEALED_ALONE_E
 from analysis.diagnosis.types import Progress, TimeBudget
 
 
-def add_laws(searched: SearchResult, progress: Progress, time_left: TimeBudget) -> SearchResult:
+def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) -> SearchResult:
     """The search with the discovered law in place of its names. Unchanged where it needs no law or none is better; a
     law that fails a check of `proof` is added as an unconfirmed candidate only."""
-    context, known = searched.context, searched.found
-    if not _needs_law(searched) or not time_left():
-        return searched
+    context, known = result.context, result.found
+    if not _needs_law(result) or not time_left():
+        return result
     found = discover(context, known, progress, time_left)
     if found is None or not _improves_held_out(found.found):
-        return searched
+        return result
     rivals = _rivals(context, known)
     reasons = reasons_against(context, found, rivals)
     if not all(beats(found.found.after, rival) for rival in rivals):
@@ -41,20 +41,20 @@ def add_laws(searched: SearchResult, progress: Progress, time_left: TimeBudget) 
     if not judged.named:
         reasons = (*reasons, "what was kept for the test does not bear it out")
     if reasons:
-        return replace(searched, unconfirmed=(*searched.unconfirmed, *_candidates(context, found, reasons)))
+        return replace(result, unconfirmed=(*result.unconfirmed, *_candidates(context, found, reasons)))
     remarks = (proof_sentence(context, checked, rivals),)
     return SearchResult(context, checked, judged, remarks, None if checked.errors is None else checked.errors[1])
 
 
-def has_law(searched: SearchResult) -> bool:
+def has_law(result: SearchResult) -> bool:
     """Whether a discovered law is among what is named."""
-    laws = laws_of(searched.found.after.fitted.hypothesis)
-    return searched.judged.named and any(law is not None for law in laws)
+    laws = laws_of(result.found.after.fitted.hypothesis)
+    return result.judgement.named and any(law is not None for law in laws)
 
 
-def _needs_law(searched: SearchResult) -> bool:
+def _needs_law(result: SearchResult) -> bool:
     """Only whole simulations prove a law; where noise alone is left, there is none to be found."""
-    context, found = searched.context, searched.found
+    context, found = result.context, result.found
     if (
         context.measure.name != "free simulation"
         or context.references is not None
@@ -62,7 +62,7 @@ def _needs_law(searched: SearchResult) -> bool:
         or found.ended_early
     ):
         return False
-    left = found.after if searched.judged.named else found.retuned
+    left = found.after if result.judgement.named else found.retuned
     sealed = float(np.nanmax(left.score.test, initial=0.0))
     return found.statistic is None and (left.score.worst_channel > NOISE_ALONE or sealed > SEALED_ALONE_ERROR)
 

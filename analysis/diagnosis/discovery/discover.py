@@ -84,9 +84,9 @@ def discover(context: SearchContext, known: Explanation, progress: Progress, tim
 
 def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) -> Round | None:
     views = views_of(context.measure, context.tuning, base)
-    searched = [_search_axis(view, time_left) for view in _axes_to_search(views)]
+    ranked_sums = [_search_axis(view, time_left) for view in _axes_to_search(views)]
     every = sorted(
-        (item for found in searched for item in found.sums),
+        (item for found in ranked_sums for item in found.sums),
         key=lambda item: _explained_squares(views, item),
         reverse=True,
     )
@@ -113,7 +113,7 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) 
     ranked = _put_plainest_first([*refined, *(pair for pair in rest if pair not in close)])
     first = ranked[0][1]
     # Of the axis that it acts along.
-    placebo = max(found.placebo for found in searched if any(item.axis == first.axis for item in found.sums))
+    placebo = max(found.placebo for found in ranked_sums if any(item.axis == first.axis for item in found.sums))
     taken = 1 - first.cross_validated / max(first.without, 1e-300)
     return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo, taken)
 

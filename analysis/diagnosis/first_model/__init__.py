@@ -1,4 +1,4 @@
-"""A first model of a device, from its recording alone.
+"""Fits a first linear model of a device to its recordings alone.
 
 `plain_form` reads a recording of any origin as commands and the motions that they drive (`restore_sign` and
 `unnamed_motion` are two of its cases); `choose_structure` compares the structures of `model_structures`, `joint_fit`

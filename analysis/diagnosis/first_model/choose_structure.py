@@ -1,4 +1,4 @@
-"""Which structure a first model gets: the one asked for, or the plainest that held-out errors do not speak against."""
+"""Chooses the structure of a first model: the one asked for, or the plainest by held-out error."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 MODES_GAIN = 0.1
-"""Of the held-out error in a free simulation, that modes must take off."""
+"""Share of the held-out error in a free simulation that modes must take."""
 SHOWN = 0.1
-"""Of the power that remains, from which a shape in it is told."""
+"""Share of the remaining power from which on its dependence on a signal is reported."""
 SHAPES: dict[str, Callable[[Motion], FloatArray]] = {
     "the direction of motion, as dry friction does": lambda m: smooth_sign(m.velocity, 0.01 * float(m.velocity.std())),
     "the square of the speed": lambda m: m.velocity * np.abs(m.velocity),
@@ -55,7 +55,7 @@ class Choice:
 def choose_structure(
     recordings: Sequence[Recording], wanted: Kind | None, on_progress: Callable[[float], None]
 ) -> Choice:
-    """wanted: None = the best. Raises StructureRefused."""
+    """The fitted structure with the reason for it. wanted: None = the best. Raises StructureRefused."""
     try:
         given: BalancedRecordings | None = balance_recordings(recordings)
         why = ""
@@ -84,7 +84,7 @@ def choose_structure(
 
 
 def remains(given: BalancedRecordings | None, fit: StructureFit) -> str:
-    """A sentence on what the model leaves."""
+    """A sentence on the error that the model leaves, and what it depends on."""
     left = f"{100 * fit.error:.3g} % of the {fit.compared}"
     if given is None or fit.joint is None or given.untimed:
         return f"{left} remains."
@@ -101,7 +101,7 @@ def remains(given: BalancedRecordings | None, fit: StructureFit) -> str:
 
 
 def _share(columns: Sequence[FloatArray], left: Sequence[FloatArray]) -> float:
-    """Of the remainder's power, the largest over the axes."""
+    """Squared correlation of columns with the remainder, the largest over the axes."""
     x, y = np.vstack(columns), np.vstack(left)
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
     size = np.maximum((x**2).sum(axis=0) * (y**2).sum(axis=0), 1e-300)
@@ -125,7 +125,7 @@ def _fit_structures(
 
 
 def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Callable[[float], None]) -> Choice:
-    """The same, or two-mode where a free simulation of held-out samples speaks for it."""
+    """The choice, or two-mode where a free simulation of held-out samples favours it."""
     if plain.fit.kind != "mass-spring":
         return plain
     if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):

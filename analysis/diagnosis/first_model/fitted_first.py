@@ -1,4 +1,4 @@
-"""The model that a diagnosis starts from where none was given: fitted to the recordings first."""
+"""Fits the model that a diagnosis starts from where none was given."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -79,7 +79,7 @@ def _massless_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
 def fit_first_linear_model(
     recordings: Sequence[Recording], on_progress: Callable[[float], None], whose: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """A linear one, and what must be known of it. Raises NothingToDiagnose where the recordings do not carry one."""
+    """A linear model fitted by forces or spectra, with remarks. Raises NothingToDiagnose where none can be fitted."""
     _require_no_weight(recordings)
     if wants_rigid_model(recordings) and (rigid := _rigid_model(recordings, whose)) is not None:
         return rigid, (RIGID_SAID,)

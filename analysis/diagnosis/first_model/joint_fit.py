@@ -1,4 +1,4 @@
-"""Mass, damping and stiffness of all axes at once by least squares on forces, with matrices that are symmetric.
+"""Fits symmetric mass, damping and stiffness matrices of all axes at once, by least squares on forces.
 
 Axes count alike: each axis's error is divided by the power of its force. Standard errors are sandwich estimates over
 blocks, because residuals are correlated (White, Econometrica 48:817, 1980).
@@ -20,7 +20,7 @@ from equalizer.signals.signal import FloatArray
 Part = Literal["mass", "damping", "stiffness"]
 PARTS: tuple[Part, ...] = ("mass", "damping", "stiffness")
 LEAST_BLOCKS = 3
-"""Of test samples, below which folds of those to fit tell the held-out error."""
+"""Test blocks at least; with fewer, the held-out error is that of cross-validation on the fit blocks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,9 +32,9 @@ class JointFit:
     deviations: dict[Part, float]
     """The largest standard error on the diagonal."""
     folds: FloatArray
-    """(blocks,): squares of each block with numbers fitted to the others, over the power of all;"""
+    """(blocks,): cross-validated squares of each block over the power of all, in the mean over the axes."""
     folds_error: float
-    """their root."""
+    """Root of their sum."""
     held_out: FloatArray
     """(d,): rms of each axis's held-out error over that of its force."""
     remainders: tuple[FloatArray, ...]
@@ -56,8 +56,8 @@ def regressions_of(motions: Sequence[Motion], turns: bool) -> tuple[Regression, 
 
 
 def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> JointFit:
-    """parts: what the model has; a constant force is always fitted beside. Raises numpy.linalg.LinAlgError where the
-    motion does not tell them apart."""
+    """The joint fit. parts: matrices of the model; a constant force is always fitted, too. Raises
+    numpy.linalg.LinAlgError where the motion does not determine them."""
     shape = _parametrisation(regressions[0], parts)
     powers = [max(signal_power(regression.fit), 1e-300) for regression in regressions]
     own = _products([regression.fit for regression in regressions], shape, powers)
@@ -99,7 +99,7 @@ def _parametrisation(regression: Regression, parts: Sequence[Part]) -> _Parametr
 def _products(
     blocks: Sequence[Sequence[Block]], shape: _Parametrisation, powers: Sequence[float]
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Per block, of the joint numbers."""
+    """Normal equations of the joint numbers, per block."""
     found = []
     for each in zip(*blocks, strict=True):
         count = shape.rows[0].shape[1]

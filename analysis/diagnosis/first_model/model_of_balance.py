@@ -1,4 +1,4 @@
-"""The linear model that a force balance gives: one body per command."""
+"""Makes a linear model of a force balance: one body per command."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 OPEN = 0.1
-"""Of the numbers found, one standard deviation at least."""
+"""Standard deviation of the numbers found at least, relative."""
 
 
 def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
@@ -67,7 +67,7 @@ def plain_model(balances: Sequence[Balance], recording: Recording, name: str) ->
 
 
 def share_within(balances: Sequence[Balance], band_hz: float) -> float:
-    """Of each named law's force, the power below a frequency; the least of them."""
+    """Share of a named law's force power below a frequency; the least over the laws."""
     shares = [1.0]
     for balance in balances:
         regression = balance.search.regression
@@ -90,7 +90,7 @@ def _below(courses: Sequence[FloatArray], motions: Sequence[Motion], band_hz: fl
 
 
 def _numbers(balance: Balance, laws: Sequence[int], places: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rows of mass, damping and stiffness, of the motions at these places."""
+    """Rows of the mass, damping and stiffness matrices for the motions at these places."""
     regression = balance.search.regression
     weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
     d = len(regression.motions[0].channels)

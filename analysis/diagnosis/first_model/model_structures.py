@@ -31,11 +31,11 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
     "gravity": PARTS,
 }
 HELD_FIXED = 1e-6
-"""Of the least mass, and one standard deviation of what nothing tells, where no time is known."""
+"""Factor of the least mass, and standard deviation of unknown numbers, where no time is known."""
 LEAST_GAIN = 0.02
-"""Of the plainer structure's error power, and"""
+"""Share of the plainer structure's error power that a richer one must take."""
 SURE = 2.0
-"""standard errors over the folds, that a richer one must take off."""
+"""Standard errors over the folds that the gain must exceed."""
 NAME = "first model, {}"
 FORCE, MOTION = "force along the measured motion", "free simulation"
 
@@ -50,7 +50,7 @@ class Number:
     unit: str
     value: float
     half: float | None
-    """Of the 95 % interval; None where nothing tells it."""
+    """Half width of the 95 % interval; None where it is not known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,17 +59,17 @@ class StructureFit:
     model: MechanicalModel
     numbers: tuple[Number, ...]
     held_out: tuple[float, ...]
-    """Per axis or response channel: rms of the held-out error over that of the signal;"""
+    """Per axis or response channel: rms of the held-out error over that of the signal."""
     channels: tuple[str, ...]
     compared: str
-    """what that signal is."""
+    """What the signal is, in words."""
     joint: JointFit | None
     """None where it was fitted to accelerations, or has modes."""
     remarks: tuple[str, ...]
 
     @property
     def error(self) -> float:
-        """What structures are compared by: of folds, else of held-out samples."""
+        """The error by which structures are compared: cross-validated, else that of held-out samples."""
         return self.joint.folds_error if self.joint else float(np.sqrt(np.mean(np.square(self.held_out))))
 
 
@@ -85,7 +85,7 @@ class BalancedRecordings:
 
 
 def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
-    """Raises NoMotionError where forces cannot be balanced along a measured motion."""
+    """The regressions of all axes. Raises NoMotionError where forces cannot be balanced along a measured motion."""
     first = recordings[0]
     motions = motions_of(observed_parts(recordings, len(first.response.channels)))
     count = len(first.command.channels)
@@ -102,7 +102,7 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
 
 
 def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
-    """By the force balance. Raises StructureRefused."""
+    """A structure fitted by the force balance. Raises StructureRefused."""
     _refuse(given, kind)
     parts = ("stiffness",) if given.untimed else PARTS_OF[kind]
     try:
@@ -128,7 +128,7 @@ def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
 def fit_modal_structure(
     recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[float], None]
 ) -> StructureFit:
-    """By spectra, for accelerations and for modes. Raises StructureRefused."""
+    """A structure fitted to spectra, for accelerations and for modes. Raises StructureRefused."""
     if kind not in ("mass-spring", "two-mode"):
         raise StructureRefused("it needs a measured position or velocity along every command")
     axes = len(recordings[0].command.channels)
@@ -157,8 +157,7 @@ def fit_modal_structure(
 
 
 def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
-    """Of balanced fits, the one with fewest numbers from which no richer one takes a noticed part off, fold by fold; a
-    part below which no model goes is not noticed."""
+    """Of fits by force balance, the one with fewest numbers that no richer one beats significantly over the folds."""
     ordered = sorted(fits, key=lambda fit: (len(fit.numbers), fit.error))
     best = ordered[0]
     for other in ordered[1:]:
@@ -213,7 +212,7 @@ def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalMo
 
 
 def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """(d,): no simulation goes without one."""
+    """(d,): least masses, which a simulation needs."""
     force = np.vstack([motion.force for motion in motions]).std(axis=0)
     moved = np.vstack([np.gradient(motion.velocity, 1 / motion.rate_hz, axis=0) for motion in motions]).std(axis=0)
     return np.asarray(MASSLESS_SHARE * force / np.maximum(moved, 1e-300))

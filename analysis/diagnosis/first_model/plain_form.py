@@ -1,4 +1,5 @@
-"""Recordings of any form as ones whose forces can be balanced along a measured motion; what was done is said.
+"""Converts recordings of any form to ones whose forces can be balanced along a measured motion, with a sentence for
+each change.
 
 Only where no model is given: a model says itself what its commands and responses are.
 """
@@ -22,9 +23,9 @@ from equalizer.signals.signal import FloatArray, Signal
 
 FORCES = frozenset({"force", "torque"})
 DRIVES = FORCES | {"voltage", "current"} | set(DERIVATIVE_OF_QUANTITY)
-"""What moves something; all else that is commanded is a condition."""
+"""Quantities of commands that drive a motion; all others are conditions."""
 STILL = 1e-9
-"""Of its size: what changes by less is the rounding of numbers."""
+"""Range of a signal over its size, below which changes are rounding errors."""
 MOTIONS = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
 
 Recordings = tuple[Recording, ...]
@@ -32,8 +33,8 @@ Step = Callable[[Recordings], tuple[Recordings, str]]
 
 
 def plain_form(recordings: Sequence[Recording], turns: bool = True) -> tuple[Recordings, tuple[str, ...]]:
-    """recordings: alike in channels, units and rate. And a sentence for each change. turns: commands that are counted
-    against their motion are turned round; not where a model says already how they are counted."""
+    """The converted recordings, and a sentence for each change. recordings: alike in channels, units and rate. turns:
+    commands that are counted against their motion are reversed; not where a model says already how they are counted."""
     found, said = tuple(recordings), []
     steps: tuple[Step, ...] = (
         name_motion, _separate_conditions, _select_imposed_motion, _select_motions, _select_forces,
@@ -46,7 +47,7 @@ def plain_form(recordings: Sequence[Recording], turns: bool = True) -> tuple[Rec
 
 
 def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
-    """Temperatures and settings among the commands."""
+    """Temperatures and settings among the commands become conditions."""
     command = recordings[0].command
     others = [k for k, quantity in enumerate(command.quantities) if quantity not in DRIVES]
     if not others or len(others) == len(command.channels):
@@ -65,7 +66,7 @@ def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
-    """An imposed motion whose position and speed were both written down."""
+    """Of an imposed motion recorded as position and speed, only the position."""
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
         return recordings, ""
@@ -78,7 +79,7 @@ def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
-    """Motions of one kind beside others, or beside what is no motion."""
+    """Of responses of several kinds, only the motions of the lowest derivative."""
     response = recordings[0].response
     quantities = set(response.quantities)
     if not quantities & MOTIONS or len({DERIVATIVE_OF_QUANTITY.get(quantity, -1) for quantity in quantities}) == 1:
@@ -92,7 +93,7 @@ def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
-    """Several forces along fewer imposed motions."""
+    """Of several forces along fewer imposed motions, the strongest."""
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
         return recordings, ""
@@ -112,8 +113,8 @@ def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
-    """Commands that never change: nothing of their axis can be known. The motion of an axis is left out with its
-    command, where there is one for each."""
+    """Leaves out commands that never change, for nothing of their axis can be known, and with them the motion of their
+    axis, where there is one for each command."""
     command, response = recordings[0].command, recordings[0].response
     samples = np.vstack([each.command.samples for each in recordings])
     samples = samples[np.isfinite(samples).all(axis=1)]
@@ -133,7 +134,7 @@ def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _with_axes(recording: Recording, kept: list[int], paired: bool) -> Recording:
-    """Of some commands; paired: and of the responses, and positions, in the same places."""
+    """The recording with some commands only; paired: also only the responses and positions in the same places."""
     command, position, excitation = recording.command, recording.position, recording.excitation
     alike = position is not None and len(position.channels) == len(recording.response.channels)
     return replace(
@@ -151,7 +152,7 @@ def _verb(names: Sequence[str], name: str) -> str:
 
 
 def _merge_commands(recordings: Recordings) -> tuple[Recordings, str]:
-    """More commands than motions: those that push the same motion become one, each with the gain that fits."""
+    """Merges commands that drive the same single motion into one, each with its fitted gain."""
     command, response = recordings[0].command, recordings[0].response
     if len(command.channels) < 2 or len(response.channels) != 1 or set(response.quantities) <= FORCES:
         return recordings, ""
@@ -176,7 +177,7 @@ def _sum(signal: Signal, gains: FloatArray, main: int) -> Signal:
 
 
 def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
-    """(m,), 1 for the command that pushes the strongest; and which that is."""
+    """Gains (m,) of the commands, relative to the strongest one, and its number."""
     motions = motions_of(observed_parts(recordings, 1))
     rows, aims = [], []
     for motion in motions:

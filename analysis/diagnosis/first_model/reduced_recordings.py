@@ -1,7 +1,7 @@
-"""Recordings without the linear part of a force balance that no matrix of one body per command holds.
+"""Subtracts from the commands the linear part of a force balance that one body per command cannot describe.
 
-What a force needs for motions beside the driven ones, for modes and for a late command is taken off the command. What
-is left drives one measured motion each, so that laws are fitted and drawn as on any device.
+This is the force for motions beside the driven ones, for modes and for a delayed command. What is left drives one
+measured motion each, so that laws are fitted and drawn as on any device.
 """
 
 from collections.abc import Sequence
@@ -30,12 +30,12 @@ def is_reduced(balances: Sequence[Balance]) -> bool:
 
 
 def linear_laws(balance: Balance) -> tuple[Law, ...]:
-    """Beside mass, damping and stiffness: of the base, and of the chosen structure."""
+    """Linear laws beside mass, damping and stiffness, of the base and of the chosen structure."""
     return (*balance.search.regression.beside.laws, *(each.law for each in balance.laws if each.law.linear))
 
 
 def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
-    """recordings: those that the balances are of, part by part."""
+    """The reduced recordings. recordings: those of the balances, part by part."""
     found, begin = [], 0
     for recording in recordings:
         parts = parts_of(recording)
@@ -68,7 +68,7 @@ def _reduce(
 
 
 def _force_beside(balance: Balance, motion: Motion) -> FloatArray:
-    """(n,): what the force needs beside the driven motion's own mass, damping and stiffness, and the named laws."""
+    """(n,): linear force beside the driven motion's own mass, damping and stiffness, and beside the named laws."""
     regression, d = balance.search.regression, len(motion.channels)
     linear = [each.place for each in balance.laws if each.law.linear]
     weights = regression.weights(regression.columns_of([*linear, *(each.place for each in balance.named)]))
@@ -84,7 +84,7 @@ def _force_beside(balance: Balance, motion: Motion) -> FloatArray:
 def _driven_motions(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], begin: int
 ) -> tuple[Signal, bool]:
-    """The driven motions as measured, and whether they are integrals of what was."""
+    """The driven motions, and whether they are integrals of the measured ones."""
     regression = balances[0].search.regression
     measured = motion_signal(recording)
     assert measured is not None

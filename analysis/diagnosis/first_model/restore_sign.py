@@ -1,4 +1,4 @@
-"""A speed whose sensor tells its amount alone, such as a pulse counter: its sign is restored from the command.
+"""Restores the sign of a speed whose sensor shows its magnitude only, such as a pulse counter, from the command.
 
 Between two minima near zero the sign is one; it is that of the speed that a linear filter makes of the command, fitted
 in turn to the speed with the signs found (alternating projections, as phases are retrieved; Gerchberg and Saxton,
@@ -15,20 +15,20 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 BELOW = 0.05
-"""Of its rms: how far below zero noise may bring such a speed at most."""
+"""Negative values of such a speed by noise at most, over its rms."""
 BOTH_WAYS = 0.1
-"""Of the command's power that must push either way."""
+"""Share of the command's power that must push either way."""
 TAPS, RIDGE, ROUNDS = 40, 1e-3, 20
-"""Of the filter, with its memory spread over so many samples; its shrinkage; and how often it is fitted."""
+"""Number of taps of the filter, its ridge, and how often it is fitted."""
 NEAR_ZERO = 0.25
-"""Of the rms speed: below which a minimum may be a turn."""
+"""Speed over its rms below which a minimum may be a reversal."""
 FITS, BETTER = 0.5, 0.5
-"""Share of the speed's power that the filter must foretell, and share of what it leaves of the amount that it may
-leave."""
+"""Share of the signed speed's power that the filter must predict, and its error over that for the magnitude, at
+most."""
 
 
 def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """Where the only response is a speed that is never negative though its command is."""
+    """The recordings with signed speeds, and a sentence; unchanged where the only response is no unsigned speed."""
     if any(not _is_unsigned_speed(recording) for recording in recordings):
         return recordings, ""
     found = []
@@ -61,7 +61,7 @@ def _is_unsigned_speed(recording: Recording) -> bool:
 
 
 def _find_signs(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, float]:
-    """With signs, and the share of its power that the filter leaves."""
+    """The signed speed (n,), and the share of its power that the filter does not predict."""
     rows = _rows(command)
     stretches = _stretches(amount)
     late = np.concatenate([[0.0], np.cumsum(command)])
@@ -93,7 +93,7 @@ def _predict_speed(rows: FloatArray, speed: FloatArray) -> FloatArray:
 
 
 def _stretches(amount: FloatArray) -> list[slice]:
-    """Between minima near zero."""
+    """Stretches between minima near zero."""
     low = NEAR_ZERO * float(np.sqrt(np.mean(amount**2)))
     inner = (amount[1:-1] <= amount[:-2]) & (amount[1:-1] <= amount[2:]) & (amount[1:-1] < low)
     ends = [0, *(np.flatnonzero(inner) + 1).tolist(), len(amount)]

@@ -1,4 +1,5 @@
-"""Commands that are counted against the motion that they drive: an encoder or an amplifier wired the other way round.
+"""Finds and reverses commands that are counted against the motion that they drive, by an encoder or amplifier wired the
+other way round.
 
 Mass, damping and dry friction take work out of a drive. Counted the other way round they would give it, and no law of
 the motion has the signs that physics has. So forces are balanced with both signs, mass and damping not below zero in
@@ -31,7 +32,7 @@ CLEARLY = 0.1
 
 
 def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """recordings: alike in channels, units and rate. And a sentence, where a force was turned round."""
+    """The recordings with such commands reversed, and a sentence. recordings: alike in channels, units and rate."""
     driven = all_as_force_driven(recordings)
     count = len(driven[0].command.channels)
     try:
@@ -58,8 +59,8 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 
 
 def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
-    """model: of the recording as it is compared, where commands may have been turned round. The same device, driven by
-    the commands as they were recorded."""
+    """The model driven by the commands as they were recorded. model: of the recording as it is compared, where commands
+    may have been reversed."""
     channels, turned = recording.command.channels, recording.meta.get(REVERSED)
     if not isinstance(turned, Sequence) or not set(turned) & set(channels):
         return model

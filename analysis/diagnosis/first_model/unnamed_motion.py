@@ -1,4 +1,4 @@
-"""Responses of which nothing says what they are: as a motion or force that their course agrees with.
+"""Infers the quantity of responses without one: position, velocity or force, from how they go with the command.
 
 Along a measured position forces need its second derivative, unless no mass moves; along a velocity they do not, for
 the mass then goes with the first. So a response is taken as a position, or as a velocity where it is of use by itself
@@ -19,11 +19,12 @@ from equalizer.signals.recording import Recording
 
 KNOWN = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) - {"voltage"}
 NEEDED = 0.02
-"""Share of the force's power, held out, from which a derivative of the response is of use."""
+"""Share of the held-out force power that a derivative of the response must explain to be of use."""
 
 
 def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """recordings: alike in channels, units and rate. And what was taken for what; empty where all was said."""
+    """The recordings with their responses' quantity, and a sentence about it; empty where all was stated. recordings:
+    alike in channels, units and rate."""
     first = recordings[0]
     if set(first.response.quantities) & KNOWN:
         return recordings, ""
@@ -39,7 +40,7 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
 
 
 def _likely_quantity(recordings: Sequence[Recording]) -> str:
-    """Of the first response, against the first command; a position where nothing tells."""
+    """Quantity of the first response, judged against the first command; a position where nothing tells."""
     count = len(recordings[0].response.channels)
     taken = [replace(_with_quantity(each, "position"), position=None) for each in recordings]
     try:

@@ -37,14 +37,14 @@ def search_beside_reference(
     coarse = _by_size(context, learned, catalogue, progress, time_left)
     return (
         coarse
-        if coarse.judged.named and _mean_log_error(fine.context, coarse) < _mean_log_error(fine.context, fine)
+        if coarse.judgement.named and _mean_log_error(fine.context, coarse) < _mean_log_error(fine.context, fine)
         else fine
     )
 
 
 def _mean_log_error(context: SearchContext, seen: SearchResult) -> float:
     """Mean log error power of what is named, on the samples to fit and to choose by."""
-    stands = seen.found.after if seen.judged.named else seen.found.retuned
+    stands = seen.found.after if seen.judgement.named else seen.found.retuned
     fitted = evaluate_fit(context.measure, context.tuning, stands.fitted.deviations, stands.fitted.hypothesis)
     return FittedCandidate(fitted, fit_score(context.measure, fitted.residuals)).score.mean_log_error
 
@@ -80,10 +80,10 @@ def _by_contrast(
     found = _refit_by(back, seen.found)
     if context.certain:
         return replace(
-            seen, context=back, found=found, judged=_judge_with_floor(found, True, learned.floor.beyond), remarks=()
+            seen, context=back, found=found, judgement=_judge_with_floor(found, True, learned.floor.beyond), remarks=()
         )
-    named = seen.judged.named and not is_without_prediction(plain, found.after)
-    return replace(seen, context=back, found=found, judged=_judge_with_floor(found, named, learned.floor.beyond))
+    named = seen.judgement.named and not is_without_prediction(plain, found.after)
+    return replace(seen, context=back, found=found, judgement=_judge_with_floor(found, named, learned.floor.beyond))
 
 
 def _judge_with_floor(found: Explanation, named: bool, beyond: float) -> Judgement:

@@ -37,25 +37,25 @@ from equalizer.signals.signal import FloatArray
 
 
 def assemble_findings(
-    searched: SearchResult,
+    result: SearchResult,
     floors: tuple[NoiseFloor, ...],
     names: Sequence[str],
     learned: CleanFloor,
 ) -> Findings:
-    """The findings of a search. searched.found.after is the model with the named effects, the same as re-tuned where
+    """The findings of a search. result.found.after is the model with the named effects, the same as re-tuned where
     nothing is named. names: of the recordings. learned: the residual of clean recordings, counted as noise."""
-    context, found, judged = searched.context, searched.found, searched.judged
+    context, found, judged = result.context, result.found, result.judgement
     measure, tuning = context.whole, context.tuning
     recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.placed_effects()
-    said, (improved, retuned) = labels_of(recording, tuning.model), _models(searched, recording)
-    channels, errors = channel_names(recording, len(measure.noise)), _standard_errors(searched)
+    said, (improved, retuned) = labels_of(recording, tuning.model), _models(result, recording)
+    channels, errors = channel_names(recording, len(measure.noise)), _standard_errors(result)
     maps, courses = (
         mismatch_maps(measure, found.stages, floors, learned, context.map_),
         _time_series(measure, found, names),
     )
-    looked = looks_of(searched, floors[0], maps)
+    looked = looks_of(result, floors[0], maps)
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
-    document = _document(searched, errors, (maps, looked.local), proposal)
+    document = _document(result, errors, (maps, looked.local), proposal)
     return Findings(
         diagnosis=document,
         explanation=found,
@@ -83,9 +83,9 @@ def assemble_findings(
     )
 
 
-def _models(searched: SearchResult, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
+def _models(result: SearchResult, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
     """The re-tuned models with the named effects and without, driven by the commands as they were recorded."""
-    tuning, found = searched.context.tuning, searched.found
+    tuning, found = result.context.tuning, result.found
     fitted, said = found.after.fitted, labels_of(recording, tuning.model)
     effects = (*tuning.model.effects, *model_effects(fitted.hypothesis.placed_effects(), said.inputs, said.outputs))
     with_them = replace(tuning.tune(fitted.deviations), effects=effects)
@@ -109,25 +109,25 @@ def _split_s(measure: ErrorMeasure) -> dict[str, float]:
     }
 
 
-def _standard_errors(searched: SearchResult) -> FloatArray:
+def _standard_errors(result: SearchResult) -> FloatArray:
     """Standard errors of the model's own numbers, then of the named effects'; NaN where none is shown. See
     `final_errors`."""
-    context, found = searched.context, searched.found
+    context, found = result.context, result.found
     own, numbers = len(context.tuning.names), len(found.after.fitted.hypothesis.point)
     if found.statistic is not None:
         return np.concatenate([np.full(own, np.nan), found.statistic.errors])
-    if searched.errors is not None and searched.judged.named:
-        return searched.errors
-    if searched.judged.named or context.tuning.model.coordinates == 1:
-        return final_errors(context, found if searched.judged.named else replace(found, steps=()))
+    if result.errors is not None and result.judgement.named:
+        return result.errors
+    if result.judgement.named or context.tuning.model.coordinates == 1:
+        return final_errors(context, found if result.judgement.named else replace(found, steps=()))
     return np.full(own + numbers, np.nan)
 
 
 def _document(
-    searched: SearchResult, errors: FloatArray, looked: tuple[Maps, Localisation], proposal: Proposal | None
+    result: SearchResult, errors: FloatArray, looked: tuple[Maps, Localisation], proposal: Proposal | None
 ) -> Diagnosis:
-    found, judged = searched.found, searched.judged
-    measure, tuning, fitted = searched.context.whole, searched.context.tuning, found.after.fitted
+    found, judged = result.found, result.judgement
+    measure, tuning, fitted = result.context.whole, result.context.tuning, found.after.fitted
     maps, local = looked
     said = labels_of(measure.records[0].recording, tuning.model)
     return Diagnosis(
@@ -136,7 +136,7 @@ def _document(
         or (
             () if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.score, found.before.fitted)
         ),
-        effects=_effects_with_gains(searched, errors[len(tuning.names) :], said) if judged.named else (),
+        effects=_effects_with_gains(result, errors[len(tuning.names) :], said) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
@@ -149,9 +149,9 @@ def _document(
     )
 
 
-def _effects_with_gains(searched: SearchResult, errors: FloatArray, said: Labels) -> tuple[NamedEffect, ...]:
+def _effects_with_gains(result: SearchResult, errors: FloatArray, said: Labels) -> tuple[NamedEffect, ...]:
     """The named effects, with their gains on held-out data where samples were compared."""
-    context, found = searched.context, searched.found
+    context, found = result.context, result.found
     effects = named_effects(found, errors, said)
     if found.statistic is not None or len(found.steps) != len(effects):
         return effects

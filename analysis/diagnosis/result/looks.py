@@ -34,9 +34,9 @@ class Looks:
     black_box: BlackBox | None
 
 
-def looks_of(searched: SearchResult, floor: NoiseFloor, maps: Maps) -> Looks:
+def looks_of(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Looks:
     """floor: of the first recording."""
-    context, found = searched.context, searched.found
+    context, found = result.context, result.found
     measure, tuning, stages = context.whole, context.tuning, found.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
     look = partial(find_entry_point, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])

@@ -1,4 +1,4 @@
-"""Which effects are missing.
+"""The search for missing effects: forward selection by output-error fits, and the verdict.
 
 `search` runs it. `explain` re-tunes the model and adds one effect after another: `starting_hypotheses` suggests,
 `screening` ranks, `search_context` holds what all fits share and makes the first fits, `compare_candidates` fits the

@@ -1,4 +1,4 @@
-"""The best hypotheses fitted to the end, and ordered by their errors."""
+"""Compares candidates: the best hypotheses are fitted until they converge, and ordered by their errors."""
 
 from collections.abc import Sequence
 
@@ -20,13 +20,13 @@ from analysis.diagnosis.settings import (
 
 SECOND_ROUNDS, WHOLE_ROUNDS = 4, 2
 MOST_REFRESHED, CONVERGED, CONVERGED_FAR, STALE = 4, 0.0005, 0.01, 0.5
-"""What the model's numbers do is recomputed so often, or until that gains no more than such a share, or, far above the
-noise, such a share of the logarithm of what is left; and only where one of them has moved by so many standard
-deviations since, for it costs a simulation for each."""
+"""The sensitivity to the model's numbers is recomputed so often, or until that gains no more than such a share, or, far
+above the noise, such a share of the logarithm of the error; and only where one of the numbers has moved by so many
+standard deviations since, for it costs a simulation for each."""
 
 
 def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitted]) -> tuple[FittedCandidate, ...]:
-    """The best first. fits: as `first_fits` leaves them."""
+    """The candidates sorted by error, the best fits refined. fits: first fits, the best first (`first_fits`)."""
     worth = _worth_refining(base, fits)
 
     def refit_first(law: Fitted) -> tuple[Fitted, Sensitivity]:
@@ -61,7 +61,7 @@ def _is_timeless(law: Fitted) -> bool:
 
 
 def _is_same_start(context: SearchContext, law: Fitted, other: Fitted) -> bool:
-    """Whether a law that was started elsewhere has come to where another start of it is."""
+    """Whether two starts of the same hypothesis have converged to the same fit."""
     return (
         law.hypothesis.key == other.hypothesis.key
         and _prediction_difference(context, law, other) < SAME_START * law.cost
@@ -69,28 +69,29 @@ def _is_same_start(context: SearchContext, law: Fitted, other: Fitted) -> bool:
 
 
 def _prediction_difference(context: SearchContext, law: Fitted, other: Fitted) -> float:
-    """Mean square of what their predictions differ by, in units of the noise."""
+    """Mean square difference of two fits' predictions, in units of the noise."""
     apart = residuals_to_fit(context.measure, law.residuals) - residuals_to_fit(context.measure, other.residuals)
     with np.errstate(over="ignore", invalid="ignore"):
         return float(apart @ apart) / max(len(apart), 1)
 
 
 def _worth_refining(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
-    """fits: the best first."""
+    """The fits whose gain is not far below the best one's. fits: the best first."""
     gained = [base.cost - found.cost for found in fits]
     return [found for found, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
 
 
 def refine(context: SearchContext, fitted: Fitted) -> Fitted:
-    """Fitted until it settles."""
+    """The fit continued until it converges."""
     return refine_with_sensitivity(context, fitted)[0]
 
 
 def refine_with_sensitivity(
     context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
-    """Where a drive repeats, first fitted to one period of each segment, whose sensitivities then stand for all of
-    them. known: as this gives it back, of a law that moves the device nearly alike."""
+    """The refined fit and its sensitivity. Where a drive repeats, it is first fitted to one period of each segment,
+    whose sensitivity then stands for all periods. known: the sensitivity of a law that moves the device nearly
+    alike."""
     short_form = short_recordings_of(context, fitted.hypothesis)
     if short_form is None:
         return _refine_from_both_starts(context, fitted, known)
@@ -111,8 +112,8 @@ def refine_with_sensitivity(
 def _refine_from_both_starts(
     context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
-    """With sensitivities recomputed; where more than noise is left, also from the calibration, because re-tuning may
-    have absorbed the missing effect and ended in another minimum."""
+    """The refined fit and its sensitivity; where more than noise is left, also started from the calibrated model,
+    because re-tuning may have absorbed the missing effect and ended in another minimum."""
     # A gain of all that there is counts as the one before: what is shared may have to be computed anew.
     here, known = _refine_from(context, fitted, known, 1.0)
     here, known = _refine_similar(context, here, known)
@@ -124,7 +125,7 @@ def _refine_from_both_starts(
 
 
 def _refine_similar(context: SearchContext, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
-    """The best of the hypotheses that behave almost alike, each fitted; the plain one where it is as good as any."""
+    """The best fit among similar hypotheses; the plainest where it is as good as any."""
     best = fitted, known
     for other in similar_hypotheses(fitted.hypothesis):
         beside = _refine_from(context, evaluate_fit(context.measure, context.tuning, fitted.deviations, other), known)
@@ -144,8 +145,9 @@ def _choose_plainest(context: SearchContext, fitted: Fitted) -> Fitted:
 def _refine_from(
     context: SearchContext, fitted: Fitted, known: Sensitivity | None, before: float = np.inf
 ) -> tuple[Fitted, Sensitivity]:
-    """known: sensitivity at another point of the same hypothesis, or of one that moves the device nearly alike; None =
-    not computed yet. before: share that was gained last; infinite = one fit is enough, but for what is not computed."""
+    """Fits with the sensitivity recomputed until that gains little. known: sensitivity at another point of the same
+    hypothesis, or of one that moves the device nearly alike; None = not computed yet. before: share that was gained
+    last; infinite = one fit is enough once the sensitivity is computed."""
     best = fitted
     complete = known is not None
     before = before if complete else np.inf
@@ -153,7 +155,7 @@ def _refine_from(
     for _ in range(MOST_REFRESHED):
         better = fit(context.measure, context.tuning, best, there, SECOND_ROUNDS, context.map_)
         gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
-        # Gains shrink about evenly, so that the next one can be foreseen.
+        # Gains shrink about geometrically, so that the next one can be predicted.
         foreseen, before = gained * min(gained / before, 1.0) if before > 0 else gained, gained
         best = better
         settled = (foreseen if complete else gained) < max(CONVERGED, CONVERGED_FAR * np.log(max(best.cost, 1.0)))

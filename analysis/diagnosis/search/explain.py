@@ -46,8 +46,8 @@ def fits_on_short_recordings(
     timeless: Sequence[Hypothesis],
     timed: Sequence[Hypothesis],
 ) -> list[Fitted]:
-    """On all samples, the best first. timed: what hangs on when a sample was taken, which short recordings cannot
-    judge."""
+    """First fits on all samples, the best first, screened on short recordings. timed: hypotheses that depend on
+    sampling times, which short recordings cannot judge."""
     short, guard = short_form.context, context.guard
     there = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
     known = sensitivity_at(short, base.deviations, base.hypothesis)
@@ -70,14 +70,14 @@ def fits_on_short_recordings(
 def _keep_promising(
     base: Fitted, fits: Sequence[Fitted], screened: Sequence[ScreenedHypothesis]
 ) -> list[ScreenedHypothesis]:
-    """Those that foresee as much of the best gain so far as a first fit asks for."""
+    """The screened hypotheses whose predicted gain is enough beside the best gain so far."""
     best = max((base.cost - law.cost for law in fits), default=0.0)
     return [law for law in screened if base.cost - law.cost >= max(WORTH_FITTING * best, 0.0)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Statistic:
-    """What candidates were compared by where waveforms cannot be predicted: a statistic of the response."""
+    """A statistic of the response, by which candidates are compared where waveforms cannot be predicted."""
 
     words: str
     chance: FloatArray
@@ -89,15 +89,15 @@ class Statistic:
 @dataclass(frozen=True, slots=True, eq=False)
 class Explanation:
     before: FittedCandidate
-    """The model as given,"""
+    """The model as given."""
     retuned: FittedCandidate
-    """re-tuned within its tolerances,"""
+    """The model re-tuned within its tolerances."""
     after: FittedCandidate
-    """and with what was found; the same as re-tuned where nothing was."""
+    """The model with the effects found; the same as re-tuned where none was."""
     rounds: tuple[tuple[FittedCandidate, ...], ...]
     """The candidates for the first effect, the second, …; the best first. The last may have brought nothing."""
     steps: tuple[FittedCandidate, ...]
-    """What stood after each effect that was added."""
+    """The fit after each effect that was added."""
     statistic: Statistic | None = None
     """None where samples were compared, in units of their noise."""
     ended_early: bool = False
@@ -111,8 +111,8 @@ class Explanation:
 
     @property
     def plain(self) -> FittedCandidate:
-        """Without new physics, what foretells the held-out samples better: re-tuning may follow what was fitted to, and
-        what is found must not be measured by the harm that it undoes."""
+        """The better of the given and the re-tuned model on held-out samples: re-tuning may overfit, and effects must
+        not be credited with undoing that."""
         return min(self.retuned, self.before, key=lambda candidate: candidate.held_out)
 
     @property
@@ -123,7 +123,8 @@ class Explanation:
 def explain(
     context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget = always
 ) -> Explanation:
-    """time_left: asked before each piece of the search for effects; what was found when it says no is kept."""
+    """Re-tunes the model and adds effects one by one. time_left: asked before each piece of the search; what was found
+    when it says no is kept."""
     before = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
     retuned = _retune(context, before)
@@ -162,7 +163,7 @@ def explain(
 
 
 def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:
-    """With a hypothesis that is certain, whether or not it lowers the error."""
+    """The fit with a certain hypothesis added, whether or not that lowers the error."""
     start = evaluate_fit(
         context.measure, context.tuning, base.fitted.deviations, combine(base.fitted.hypothesis, hypothesis)
     )

@@ -1,4 +1,4 @@
-"""A crash of one effect does not end a search: the effect is left out, and the answer says so.
+"""Crash isolation: an effect that crashes is left out of the search, and the answer says so.
 
 Off, as it is unless asked for, every crash is an error: so tests, benchmarks and banks see it.
 """
@@ -45,7 +45,7 @@ class Guard:
     """So far."""
 
     def over(self, map_: Mapper, doing: str) -> Mapper:
-        """The same map, over effects, hypotheses or fits of them; what crashes is noted, and has no result."""
+        """A map over effects, hypotheses or fits that notes crashes and leaves their results out."""
         if not self.on:
             return map_
 
@@ -69,8 +69,8 @@ class Guard:
         instead: Result,
         answers: tuple[type[Exception], ...] = (),
     ) -> Result:
-        """Of a piece of the work that can be left out. what: an effect's name, or words. answers: errors that say
-        something to a user, and are no crashes."""
+        """The result of a piece of work, or `instead` where it crashes. what: an effect's name, or words. answers:
+        exceptions that say something to a user, and are raised."""
         found = _try(what, doing, work, answers) if self.on else (work(),)
         if isinstance(found, Crash):
             self.crashes.append(found)
@@ -78,7 +78,7 @@ class Guard:
         return found[0]
 
     def parts(self, map_: Mapper, pieces: Sequence[Part]) -> list[Any]:
-        """The results of pieces that need nothing of each other."""
+        """The results of independent pieces of work."""
 
         def tried(piece: Part) -> tuple[Any] | Crash:
             return _try(piece.what, piece.doing, piece.work) if self.on else (piece.work(),)
@@ -118,7 +118,7 @@ def _sentence(what: str, crashes: Iterable[Crash]) -> str:
 
 
 def _effect_of(item: object) -> str:
-    """The newest effect of what is tried."""
+    """Name of the newest effect of an effect, a hypothesis or a fit."""
     if isinstance(item, Effect):
         return item.name
     hypothesis = item if isinstance(item, Hypothesis) else getattr(item, "hypothesis", None)

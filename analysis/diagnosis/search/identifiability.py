@@ -51,8 +51,8 @@ def final_errors(context: SearchContext, found: Explanation) -> FloatArray:
 
 
 def keep_identifiable(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """The same where all numbers are determined; else without the effects whose numbers are not, or with an explanation
-    that is as good and whose numbers are determined."""
+    """The explanation without effects whose parameters are not identifiable, or another that is as good and
+    identifiable; unchanged where all parameters are identifiable."""
     if not found.steps:
         return found
     found = _with_profile_errors(context, found, time_left)
@@ -76,7 +76,7 @@ def keep_identifiable(context: SearchContext, found: Explanation, time_left: Tim
 
 
 def _find_replacement(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation | None:
-    """The next explanation that is as good and whose numbers are determined."""
+    """Another single effect that is as good and identifiable; None = there is none."""
     best = found.rounds[0][0]
     others = tuple(candidate for candidate in found.rounds[0] if candidate.newest != best.newest)
     as_good = {candidate.newest: candidate for candidate in reversed(others) if both_stand(best, candidate)}
@@ -96,9 +96,9 @@ def _without_effects(found: Explanation) -> Explanation:
 
 
 def _with_profile_errors(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """With the standard errors of the final fit; those of an effect's only number from its profile, where the
-    linearised interval holds none, and the profile tells it from none. The profile of an effect before the last fits
-    those after it anew, which is left out where no time is left."""
+    """The explanation with the standard errors of the final fit. Where the linearised interval of an effect's only
+    number includes no effect but its profile does not, the error is the profile's. The profile of an effect before the
+    last refits those after it, which is left out where no time is left."""
     errors = final_errors(context, found).copy()
     first = len(context.tuning.names)
     for effect, own in enumerate(_numbers_with_none(found, errors[first:])):
@@ -118,7 +118,7 @@ def _with_profile_errors(context: SearchContext, found: Explanation, time_left: 
 
 
 def _numbers_with_none(found: Explanation, errors: FloatArray) -> Iterator[list[tuple[Number, int, float, float]]]:
-    """Per effect, its numbers that have a value meaning no effect: with place, coordinate and standard error."""
+    """Per effect, its numbers that have a value meaning no effect, with place, coordinate and standard error."""
     hypothesis, first = found.after.fitted.hypothesis, 0
     each = list(zip(hypothesis.numbers, range(len(errors)), hypothesis.point.tolist(), errors.tolist(), strict=True))
     for claim in hypothesis.claims:
@@ -141,14 +141,14 @@ def _is_open(number: Number, at: float, error: float) -> bool:
 
 
 def _reach(number: Number, at: float, error: float) -> tuple[float, float]:
-    """Of the interval to one side, and of the value from none."""
+    """Half width of the number's interval, and the distance of its value from no effect."""
     value, none = number.value(at), number.parameter.none or 0.0
     return 1.96 * INTERVAL_FACTOR * abs(number.value(at + error) - value), abs(value - none)
 
 
 def distance_from_none(context: SearchContext, found: Explanation, effect: int) -> float:
-    """How many standard errors an effect's only number is away from none, over those that an interval spans; above 1,
-    the interval does not hold none. effect: its place."""
+    """Distance of an effect's only number from no effect, in half widths of its profile interval; above 1, the interval
+    excludes no effect. effect: its place."""
     with_it = found.steps[-1].fitted
     fewer = found.retuned if len(found.steps) == 1 else without_effect(context, found, effect).steps[-1]
     # The re-tuned model is kept as it is on all samples.
@@ -163,7 +163,7 @@ def distance_from_none(context: SearchContext, found: Explanation, effect: int) 
 
 
 def _stretches(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
-    """(stretches,): sums of squares of what is left where it is fitted."""
+    """(stretches,): sums of squares of the residuals on the fit samples."""
     sums: list[float] = []
     for record, left in zip(measure.records, fitted.residuals, strict=True):
         square = np.sum(left[record.fit] ** 2, axis=1)

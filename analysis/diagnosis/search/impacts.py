@@ -34,20 +34,21 @@ from equalizer.signals.signal import FloatArray
 
 WORDS = "band power of the response"
 SIMULATIONS = 4
-"""Simulations of one hypothesis: their spread is what chance does, their mean what the last fit compares."""
+"""Simulations of one hypothesis: their spread is the chance variation, their mean is compared by the last fit."""
 WIDTHS = np.geomspace(0.02, 5.0, 13)
 """Gaps that are tried, over the estimated one."""
 FIRST_ROUNDS, ROUNDS, STEPS = 5, 4, 2
-"""Of the first fit without the model's numbers; linearisations of the last; and its steps for each."""
+"""Steps of the first fit, without the model's numbers; linearisations of the last fit; and its steps for each."""
 GAINED = 0.02
-"""Of a cost, that a linearisation must gain to be followed by another."""
+"""Relative decrease of the cost by a linearisation below which it is the last."""
 RIVAL = "loose_joint"
 
 
 def explain_impacts(
     context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor], catalogue: Sequence[Effect]
 ) -> Explanation | None:
-    """None where the response is regular, or where play does not explain it."""
+    """The explanation by play, compared by band power; None where the response is regular, or play does not explain
+    it."""
     effects = {effect.name: effect for effect in catalogue}
     if "backlash" not in effects or not isinstance(context.whole, FreeSimulation):
         return None
@@ -89,7 +90,7 @@ def _is_model(trial: BandPowerFit) -> bool:
 
 
 def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
-    """Own and the model's numbers together: with play, the model's numbers do something else than without."""
+    """The fit of the hypothesis's and the model's numbers together: play changes the sensitivity to the model's."""
     view = _with_chance(view, start)
     best = evaluate_hypothesis(view, start.deviations, start.hypothesis)
     for _ in range(ROUNDS):
@@ -103,7 +104,7 @@ def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
 
 
 def _with_chance(view: View, at: BandPowerFit) -> View:
-    """With the spread of each band between simulations, and ready to average over as many."""
+    """The view with each band's chance variation between simulations, and averaging over as many."""
 
     def course(number: int) -> FloatArray:
         return view.predict(at.deviations, perturb(at.hypothesis, number))
@@ -113,7 +114,7 @@ def _with_chance(view: View, at: BandPowerFit) -> View:
 
 
 def _by_deviations(view: View, at: BandPowerFit) -> FloatArray:
-    """(t, stretches, bands, c): a forward difference of one tolerance: a shorter one would drown in chance."""
+    """(t, stretches, bands, c): sensitivity by forward differences of one standard deviation, large against chance."""
     ways = np.eye(len(at.deviations))
 
     def moved(number: int) -> FloatArray:
@@ -125,7 +126,7 @@ def _by_deviations(view: View, at: BandPowerFit) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Comparison:
-    """Compares candidates by band power on all samples, the sealed ones included."""
+    """Compares candidates by band power on all samples, held-out ones included."""
 
     context: SearchContext
     power: BandPower

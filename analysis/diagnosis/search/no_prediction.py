@@ -1,4 +1,5 @@
-"""Explanations without predictive power: an effect that stops the simulated device can fit better than a wrong one."""
+"""Detects explanations without predictive power: an effect that stops the simulated device can fit better than a wrong
+one."""
 
 import numpy as np
 
@@ -15,7 +16,7 @@ _TINY = 1e-300
 
 
 def is_without_prediction(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
-    """Whether in no channel, on the samples to fit and choose by, the prediction is better than none."""
+    """Whether the prediction is better than none in no channel, on the samples to fit and to choose by."""
     return bool((_residual_rms(measure, candidate.fitted) >= NO_PREDICTION_SHARE * _signal_rms(measure)).all())
 
 

@@ -37,7 +37,7 @@ def excludes(held: Claim, other: Claim) -> bool:
 
 
 def plainest_first(fitted_candidates: Sequence[FittedCandidate]) -> tuple[FittedCandidate, ...]:
-    """fitted_candidates: by their errors, the best first. The same, with the preferred candidate moved to the front."""
+    """The candidates with the preferred one moved to the front. fitted_candidates: by error, the best first."""
     if not fitted_candidates:
         return ()
     chosen = fitted_candidates[0]

@@ -1,4 +1,4 @@
-"""What an explanation gains on clean recordings, where its effect is absent: a baseline for its gain elsewhere."""
+"""The gain of a hypothesis on clean recordings, where its effect is absent: a baseline for its gain elsewhere."""
 
 from dataclasses import dataclass, field
 
@@ -42,7 +42,7 @@ class ReferenceRecording:
         return np.asarray(np.log(without) - np.log(np.maximum(with_it, np.finfo(float).tiny)))
 
     def _starts(self, wanted: Hypothesis) -> list[Hypothesis]:
-        """Where the recordings to diagnose have it, and where this one's own course suggests it for the last claim."""
+        """Starting points: the wanted hypothesis, and the last claim's starting values from this recording."""
         last = wanted.claims[-1]
         own = [hypothesis for hypothesis in candidates([last.effect], self.evidence) if hypothesis.claims == (last,)]
         held = without_claim(wanted, len(wanted.claims) - 1)
@@ -57,7 +57,7 @@ class ReferenceRecording:
 class ReferenceRecordings:
     each: tuple[ReferenceRecording, ...]
     beyond: float
-    """A gain counts by what is more than so many times that on the reference ones: the fewer, the more."""
+    """Factor on the largest gain of the reference recordings, which a gain must exceed: the fewer, the larger."""
     seen: dict[object, FloatArray] = field(default_factory=dict)
 
     def gain_on_clean(self, hypothesis: Hypothesis) -> FloatArray:

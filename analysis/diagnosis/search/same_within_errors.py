@@ -1,4 +1,4 @@
-"""Whether the data separate two explanations."""
+"""Tells whether the data separate two explanations."""
 
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import AS_GOOD_GAIN, AS_GOOD_SHARE, NOISE_KNOWN_TO
@@ -10,6 +10,7 @@ def excess(candidate: FittedCandidate) -> float:
 
 
 def inseparable(best: FittedCandidate, other: FittedCandidate) -> bool:
-    """Also where the difference is smaller than what both gain on clean recordings, where neither effect is present."""
+    """Whether two candidates' errors do not differ enough; also where the difference is smaller than what both gain on
+    clean recordings, where neither effect is present."""
     worse = other.score.mean_log_error - best.score.mean_log_error
     return worse <= max(AS_GOOD_GAIN, AS_GOOD_SHARE * excess(best), min(other.usual, best.usual))

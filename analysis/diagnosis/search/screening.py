@@ -29,7 +29,7 @@ def screen(
     suggested: Sequence[Hypothesis],
     map_: Mapper,
 ) -> tuple[ScreenedHypothesis, ...]:
-    """The best first."""
+    """The hypotheses with their predicted costs, the best first. known: sensitivity to the model's own numbers."""
     model = tuning.tune(base.deviations)
     errors = residuals_to_fit(measure, base.residuals)
 

@@ -1,4 +1,5 @@
-"""The search without clean recordings; repeated with half of the sealed samples where only they show a mismatch."""
+"""Runs the search without clean recordings; repeats it with half of the held-out samples where only they show a
+mismatch."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -32,7 +33,7 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
 
 
 def _drop_former(context: SearchContext, found: Explanation) -> Explanation:
-    """Of two effects, the later alone where it does as well: the earlier may have stood in for it."""
+    """Of two effects only the later, where it fits as well alone: the earlier may have stood in for it."""
     alone = without_effect(context, found, 0)
     kept = is_worthwhile(alone.steps[-1], found.steps[-1]) or not np.isfinite(alone.steps[-1].fitted.cost)
     return found if kept else alone
@@ -64,7 +65,7 @@ ONLY_REFINES = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Unconfirmed:
-    """What was found and is not named."""
+    """An effect that was found and is not named."""
 
     hypothesis: Hypothesis
     gain: float
@@ -79,7 +80,7 @@ class SearchResult:
     context: SearchContext
     """With the samples as they were used in the end."""
     found: Explanation
-    judged: Judgement
+    judgement: Judgement
     remarks: tuple[str, ...] = ()
     errors: FloatArray | None = None
     """`final_errors`, where the search needed them."""
@@ -94,11 +95,12 @@ def search_effects(
     time_left: TimeBudget = always,
     beyond: Callable[[SearchResult], SearchResult] = lambda seen: seen,
 ) -> SearchResult:
-    """beyond: what is tried where the catalogue leaves something, before sealed samples are opened for it."""
+    """The search for effects with its verdict. beyond: tried where the catalogue leaves a mismatch, before held-out
+    samples are used."""
     found = _prune_guarded(context, explain(context, catalogue, progress, time_left), time_left)
     judged = _judge_with_prediction(context, found)
     tried = beyond(SearchResult(context, found, judged, _remarks(found)))
-    if found.ended_early or found.barred or tried.judged.named or not _shows_in_test_alone(found):
+    if found.ended_early or found.barred or tried.judgement.named or not _shows_in_test_alone(found):
         return tried
     half = context.open_half()
     again = _prune_guarded(half, explain(half, catalogue, progress, time_left), time_left)
@@ -106,11 +108,11 @@ def search_effects(
     if second.named:
         return SearchResult(half, again, second, (TEST_HALF_USED, *_remarks(again)), unconfirmed=tried.unconfirmed)
     judged = replace(judged, verdict="unexplained")
-    return replace(tried, judged=judged, remarks=(NOT_SHOWN, *tried.remarks))
+    return replace(tried, judgement=judged, remarks=(NOT_SHOWN, *tried.remarks))
 
 
 def _prune_guarded(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """Nothing is named whose last look crashes."""
+    """`prune`, which names nothing where it crashes."""
     nothing = replace(found, after=found.retuned, steps=())
     newest = found.steps[-1].newest if found.steps else ""
     return context.guard.part(newest, "its last look", lambda: prune(context, found, time_left), nothing)

@@ -1,4 +1,4 @@
-"""What all fits share, and the first fits of the hypotheses that passed the screening."""
+"""The shared state of all fits of a search, and the first fits of hypotheses that passed the screening."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -20,9 +20,9 @@ from equalizer.signals.signal import FloatArray
 
 FIRST_ROUNDS = 3
 STARTING, SCREENING, FITTING = "its starting values", "its screening", "its fit"
-"""What is done once for each effect."""
+"""Steps of the work on each effect, in words."""
 SENSED_SHARE = 0.06
-"""Change of an axis's channel, as a share of the largest that any number makes there."""
+"""Sensitivity of an axis's channel to a number, over the largest one there, from which on it counts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,12 +46,12 @@ class FittedCandidate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchContext:
-    """What all fits share."""
+    """The measures, the open numbers and the rules that all fits of a search share."""
 
     measure: ErrorMeasure
-    """Of the samples to fit and to choose by,"""
+    """On the samples to fit and to choose by."""
     whole: ErrorMeasure
-    """and with the sealed samples."""
+    """With the held-out samples, too."""
     tuning: Tuning
     map_: Mapper
     barred: frozenset[str] = frozenset()
@@ -62,19 +62,19 @@ class SearchContext:
     certain: tuple[Hypothesis, ...] = ()
     """Faults that a recording shows by itself (`model_free_faults`): added without a search."""
     guard: Guard = field(default_factory=Guard)
-    """Of what is done once for each effect."""
+    """Isolates crashes of single effects."""
 
     def open_half(self) -> "SearchContext":
-        """With the first half of every sealed stretch to fit and to choose by."""
+        """With the first half of every held-out stretch to fit and to choose by."""
         whole = self.whole.with_records(tuple(record.unseal_half() for record in self.whole.records))
         return replace(self, measure=whole.shorten(), whole=whole)
 
     def candidate(self, fitted: Fitted) -> FittedCandidate:
-        """On the samples to fit and to choose by; its `test` is NaN."""
+        """The fit scored on the samples to fit and to choose by; its `test` is NaN."""
         return self._score(fitted, self.measure)
 
     def with_test_score(self, candidate: FittedCandidate) -> FittedCandidate:
-        """With the sealed samples."""
+        """The candidate scored on all samples, held-out ones included."""
         fitted = evaluate_fit(self.whole, self.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
         return self._score(fitted, self.whole)
 
@@ -89,7 +89,7 @@ class SearchContext:
 def first_fits(
     context: SearchContext, base: Fitted, known: Sensitivity, screened: Sequence[ScreenedHypothesis]
 ) -> list[Fitted]:
-    """Of those that the screening foresees a gain of, the best first."""
+    """Fits of the hypotheses with the largest predicted gains, the best first."""
     measure, tuning = context.measure, context.tuning
 
     def first(entry: ScreenedHypothesis) -> Fitted:
@@ -105,8 +105,8 @@ def first_fits(
 def sensitivity_at(
     context: SearchContext, deviations: np.ndarray, hypothesis: Hypothesis, with_forces: bool = False
 ) -> Sensitivity:
-    """Of the prediction to the model's own numbers. Motion-dependent forces are left out first: simulations are quick
-    without them, and small forces hardly change the sensitivity."""
+    """Sensitivity of the prediction to the model's own numbers. Motion-dependent forces are left out first: simulations
+    are quick without them, and small forces hardly change the sensitivity."""
     kept = hypothesis
     for number in reversed(range(len(hypothesis.claims))):
         if isinstance(hypothesis.claims[number].effect.acts, (AxisForce, JointForce)):
@@ -136,7 +136,7 @@ def _interleave_starts(screened: Sequence[ScreenedHypothesis]) -> list[ScreenedH
     return [entry for _, entry in sorted(ranked, key=lambda pair: pair[0])]
 
 
-# Which of a model's numbers a force at an axis can feel: those that change how that axis moves.
+# Selects the model's numbers that matter for a force at an axis: those that change how that axis moves.
 def sensitive_parameters(
     measure: ErrorMeasure, tuning: Tuning, plain: Sensitivity, hypothesis: Hypothesis
 ) -> list[int]:

@@ -1,7 +1,7 @@
-"""A shorter stand-in for the recordings, laws are compared on it first: of a periodic segment one settled period.
+"""Shortens periodic recordings to one settled period per segment, on which laws are compared first.
 
 The further periods of a segment repeat the first but for noise. What is kept is joined end to end and simulated as one
-course; before each kept stretch a run-in lets the model forget where it came from (Pintelon and Schoukens 2012, System
+recording; a run-in before each kept stretch lets initial transients decay (Pintelon and Schoukens 2012, System
 Identification, ch. 2: transients of periodic excitation).
 """
 
@@ -36,9 +36,9 @@ class _Cut:
     kept: Places
     """Samples of one record."""
     fit: Mask
-    """Which of all are fitted to,"""
+    """(n,): samples to fit among all of the record."""
     instead: Places
-    """and for each of all the one that repeats it and is."""
+    """(n,): for each sample, the fitted one of which it is a repeat."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +51,7 @@ class ShortRecordings:
     """(samples to fit of the long measure,): which of the kept samples to fit stands for each."""
 
     def repeat_sensitivity(self, known: Sensitivity) -> Sensitivity:
-        """As it is on the long measure: what one period does, all of them do."""
+        """The sensitivity on the long measure, from that on one period of each segment."""
         times = np.sqrt(np.bincount(self.stands_in, minlength=self._samples)).repeat(
             known.columns.shape[1] // self._samples
         )
@@ -63,7 +63,7 @@ class ShortRecordings:
         return sum(int(record.fit.sum()) for record in self.context.measure.records)
 
     def of(self, evidence: Evidence) -> Evidence:
-        """The first record's, at the kept samples."""
+        """The first record's evidence at the kept samples."""
         kept, n = self.kept[0], len(evidence.command)
         fit = np.concatenate([record.fit for record in self.context.measure.records])[: len(kept)]
         cut = {
@@ -79,8 +79,8 @@ class ShortRecordings:
 
 
 def short_recordings_of(context: SearchContext, held: Hypothesis) -> ShortRecordings | None:
-    """None where little would be saved, where what is held hangs on when a sample was taken, and where the first
-    record, of which evidence is taken, has nothing to fit."""
+    """The shortened recordings; None where little would be saved, where held effects depend on sampling times, and
+    where the first record, of which evidence is taken, has nothing to fit."""
     measure = context.measure
     if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
         return None
@@ -108,8 +108,8 @@ def _replacements(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
 
 
 def _run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) -> tuple[float, float]:
-    """Seconds before and behind a stretch that its errors hang on. A simulation forgets as the model comes to rest; a
-    force that was needed hangs on the motion before and after, as far as the model's inverse rings."""
+    """Seconds before and after a stretch that its errors depend on: a simulation's transients decay with the model; a
+    needed force depends on the motion before and after, as far as the model's inverse rings."""
     if isinstance(measure, FreeSimulation):
         return RUN_IN_CONSTANTS / max(-growth_rate(model), np.finfo(float).tiny), 0.0
     rates = np.abs(zeros_of(model, 2 * np.pi * measure.band_hz).real)
@@ -134,14 +134,14 @@ def _cut(record: Observed, around_s: tuple[float, float]) -> _Cut:
 
 
 def _splice(measure: FreeSimulation, cut: Sequence[_Cut]) -> FreeSimulation:
-    """End to end, as one course."""
+    """The measure on the kept samples, joined end to end."""
     pairs = zip(measure.records, cut, strict=True)
     return measure.with_records(tuple(_piece(record, each.kept, each.fit) for record, each in pairs if len(each.kept)))
 
 
 def _cut_in_pieces(measure: PredictedForce, cut: Sequence[_Cut]) -> PredictedForce | None:
-    """Each stretch a record of its own; None where one drives an axis that the whole record drives, but it does not:
-    errors count over what is commanded."""
+    """The measure with each kept stretch as a record of its own; None where a stretch does not drive an axis that the
+    whole record drives, for errors are relative to the command."""
     records, motions = [], []
     for record, motion, each in zip(measure.records, measure.motions, cut, strict=True):
         driven = np.abs(record.command).max(axis=0) > 0

@@ -21,11 +21,12 @@ WITHIN: dict[str, dict[str, Literal["travel", "command"]]] = {
     "force_deadband": {"width": "command"},
     "force_saturation": {"limit": "command"},
 }
-"""Numbers that cannot be larger than what was recorded."""
+"""Parameters that cannot be larger than the recorded travel or command."""
 
 
 def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = map) -> tuple[Hypothesis, ...]:
-    """In the catalogue's order; an effect whose estimator finds no starting value is left out."""
+    """Hypotheses of single effects, in the catalogue's order; an effect whose estimator finds no starting value is left
+    out."""
 
     def of_effect(effect: Effect) -> list[Hypothesis]:
         sensed = place_of_effect(effect) == "sensor"
@@ -97,7 +98,7 @@ def clock_drift_by_trial(catalogue: Sequence[Effect], evidence: Evidence) -> tup
 
 
 def _best_drift(evidence: Evidence) -> float:
-    """0 where nothing is better than no drift."""
+    """The drift in ppm with the least misfit on a grid; 0 where none is better than no drift."""
     used, noise = evidence.used > 0, evidence.noise
     n, step = len(used), _middle_period(evidence) / CLOCK_TRIALS_PER_PERIOD
     furthest = min(int(1e-6 * LARGEST_PPM * n / step), MOST_CLOCK_TRIALS)

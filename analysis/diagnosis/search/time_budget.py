@@ -1,4 +1,4 @@
-"""Time limit of a search: what was found until then is the result."""
+"""Time limits of a search; what was found until then is the result."""
 
 from collections.abc import Callable, Iterable
 from functools import wraps
@@ -21,7 +21,7 @@ def always() -> bool:
 
 
 class CountedBudget:
-    """TimeBudget until it was asked so often: the same pieces on every machine, however busy."""
+    """A TimeBudget that ends after so many questions, so that the same work is done on every machine."""
 
     def __init__(self, most: int) -> None:
         self._most, self._asked = most, count()

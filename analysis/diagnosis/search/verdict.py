@@ -33,7 +33,7 @@ class Judgement:
 
 
 def judge(found: Explanation) -> Judgement:
-    """By the samples to fit and to choose by; the sealed ones can only withdraw a name, or `explained`."""
+    """The verdict by the samples to fit and to choose by; held-out ones can only withdraw a name, or `explained`."""
     if not found.after.fitted.hypothesis.claims or not _is_confirmed(found):
         if found.before.score.worst_channel <= NOISE_ALONE:
             return Judgement("no_mismatch", False)
@@ -48,7 +48,7 @@ def judge(found: Explanation) -> Judgement:
 
 
 def as_good_as_noise(found: Explanation) -> bool:
-    """On the samples to fit and to choose by."""
+    """Whether little more than noise is left, on the samples to fit and to choose by."""
     worst = found.after.score.worst_channel
     if worst <= EXPLAINED_ERROR:
         return True
@@ -56,14 +56,14 @@ def as_good_as_noise(found: Explanation) -> bool:
 
 
 def worth_naming(found: Explanation) -> bool:
-    """Beside a remainder; on the samples to fit and to choose by."""
+    """Whether the effects are worth a name beside a remainder, on the samples to fit and to choose by."""
     taken = found.retuned.score.mean_log_error - found.after.score.mean_log_error
     share = share_of_mismatch(found.retuned, found.after)
     return found.after.score.worst_channel <= NAMED_ERROR or share >= NAMED_SHARE or taken >= NAMED_GAIN
 
 
 def _is_confirmed(found: Explanation) -> bool:
-    """Whether the sealed samples confirm the explanation; yes where nothing was sealed."""
+    """Whether the held-out samples confirm the explanation; yes where nothing was held out."""
     without, with_it = (np.log(candidate.score.test) for candidate in (found.retuned, found.after))
     whole, left = float(np.mean(without)), float(np.mean(with_it))
     if not np.isfinite(whole):
@@ -72,7 +72,7 @@ def _is_confirmed(found: Explanation) -> bool:
 
 
 def share_of_mismatch(without: FittedCandidate, with_it: FittedCandidate) -> float:
-    """Between 0 and 1: how far the errors came down from where they were to the noise, in logarithms of power."""
+    """Relative decrease of the excess log error power over the noise, between 0 and 1."""
     whole = excess(without)
     return min(max(1 - excess(with_it) / whole, 0.0), 1.0) if whole > 0 else 0.0
 

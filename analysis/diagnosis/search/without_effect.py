@@ -10,8 +10,8 @@ from analysis.diagnosis.search.search_context import FittedCandidate, SearchCont
 
 
 def without_effect(context: SearchContext, found: Explanation, number: int) -> Explanation:
-    """number: of the effect, in the order in which they were found; those after it are fitted anew. There must be
-    another."""
+    """The explanation without one effect; those after it are refitted. number: of the effect, in the order in which
+    they were found. There must be another."""
     earlier, later = found.steps[:number], list(found.steps[number + 1 :])
     if not later:
         return replace(found, after=context.with_test_score(earlier[-1]), rounds=found.rounds[:number], steps=earlier)

@@ -134,7 +134,7 @@ def gains_half(monkeypatch):
 @pytest.mark.parametrize("name", ["sensor_nonlinearity", "slew_limit", "transport_delay", "force_gain"])
 def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
     seen = unname_doubtful_effects(searched_to(name))
-    assert seen.judged == Judgement("unexplained", False)
+    assert seen.judgement == Judgement("unexplained", False)
     assert not seen.found.steps
     (told,) = seen.unconfirmed
     assert (told.hypothesis.claims, told.gain, told.why_not) == ((name,), 0.5, ONLY_BESIDE_CALIBRATION)

@@ -95,7 +95,7 @@ def joined(recording):
 
 def test_a_proved_law_explains(seed=7):
     seen = joined(recorded((DRAG,), seed))
-    assert seen.judged.verdict == "explained"
+    assert seen.judgement.verdict == "explained"
     assert [claim.effect.name for claim in seen.found.after.fitted.hypothesis.claims] == ["discovered_law"]
     assert has_law(seen)
     assert "louder commands and another kind of command" in seen.remarks[0]
@@ -105,7 +105,7 @@ def test_a_proved_law_explains(seed=7):
 def test_without_a_test_of_another_kind_a_law_is_a_candidate(seed=8):
     plan = (*PLAN[:3], ("multisine", 1.5, "test"))
     seen = joined(recorded((DRAG,), seed, plan=plan))
-    assert not seen.judged.named
+    assert not seen.judgement.named
     law = laws_of(seen.unconfirmed[0].hypothesis)[0]
     assert law is not None
     assert "abs(vx)**1.5" in law.expression

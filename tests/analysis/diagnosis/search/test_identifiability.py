@@ -93,7 +93,7 @@ def test_what_has_no_number_that_could_be_none_is_not_judged(rubbing):
 def test_it_is_said_that_numbers_were_left_open(rubbing, monkeypatch):
     monkeypatch.setattr("analysis.diagnosis.search.identifiability.INTERVAL_FACTOR", 1e6)
     seen = search_effects(rubbing, [EFFECTS["coulomb_friction"]], lambda what, share: None)
-    assert (seen.judged.verdict, seen.judged.named) == ("unexplained", False)
+    assert (seen.judgement.verdict, seen.judgement.named) == ("unexplained", False)
     assert seen.remarks == (
         "An explanation by dry friction is not named: these recordings leave its numbers as good as open.",
     )
