@@ -30,10 +30,9 @@ def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: F
     m, p = model.inputs, model.outputs
     z = np.exp(2j * np.pi * frequency_hz / sample_rate_hz)
     rows = np.vstack([steps.motion[: 2 * m], steps.response, steps.position])
-    direct = np.vstack([np.zeros((2 * m, m)), steps.response_by_axis_force, np.zeros((p, m))])
+    seen = _frequency_response(steps.advance, steps.by_axis_force, rows, z)
     # A force counts from the next sample on; what it does at once is seen one sample late.
-    seen = _frequency_response(steps.advance, steps.by_axis_force, rows, z) + direct / z[:, None, None]
-    response = seen[:, 2 * m : 2 * m + p]
+    response = seen[:, 2 * m : 2 * m + p] + steps.response_by_axis_force * (1 / z)[:, None, None]
     if model.sensor.bandwidth_hz > 0:
         decay = np.exp(-2 * np.pi * model.sensor.bandwidth_hz / sample_rate_hz)
         response = response * ((1 - decay) / (1 - decay / z))[:, None, None]

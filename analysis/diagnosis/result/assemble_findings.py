@@ -49,10 +49,8 @@ def assemble_findings(
     recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.placed_effects()
     said, (improved, retuned) = labels_of(recording, tuning.model), _models(result, recording)
     channels, errors = channel_names(recording, len(measure.noise)), _standard_errors(result)
-    maps, courses = (
-        mismatch_maps(measure, found.stages, floors, learned, context.map_),
-        _time_series(measure, found, names),
-    )
+    maps = mismatch_maps(measure, found.stages, floors, learned, context.map_)
+    courses = _time_series(measure, found, names)
     looked = looks_of(result, floors[0], maps)
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
     document = _document(result, errors, (maps, looked.local), proposal)

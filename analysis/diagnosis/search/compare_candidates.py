@@ -113,11 +113,13 @@ def _refine_from_both_starts(
     context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
     """The refined fit and its sensitivity; where more than noise is left, also started from the calibrated model,
-    because re-tuning may have absorbed the missing effect and ended in another minimum."""
+    because re-tuning may have absorbed the missing effect and ended in another minimum. Not where a sensitivity is
+    known: the law that it is of was started from there, and moves the device nearly alike."""
+    shared = known is not None
     # A gain of all that there is counts as the one before: what is shared may have to be computed anew.
     here, known = _refine_from(context, fitted, known, 1.0)
     here, known = _refine_similar(context, here, known)
-    if context.candidate(here).score.worst_channel <= NO_SECOND_START:
+    if shared or context.candidate(here).score.worst_channel <= NO_SECOND_START:
         return here, known
     calibrated = evaluate_fit(context.measure, context.tuning, np.zeros_like(here.deviations), here.hypothesis)
     there, beside = _refine_from(context, calibrated, known)
