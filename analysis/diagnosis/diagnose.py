@@ -200,8 +200,7 @@ def _judge_beside_model(
 def _search_context(
     recording: Recording, look: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchContext:
-    """The shared state of the search. recording: as given; where forces are compared, the measure's own recordings have
-    forces for responses."""
+    """The shared state of the search. recording: as given; where forces are compared, the measure's own differ."""
     measure = look.chosen.measure
     model = with_units_of(look.model, recording.command.units, recording.response.units, time_unit(recording))
     tuning = tuning_of(model, recording.command.channels)

@@ -53,9 +53,8 @@ def assemble_findings(
     courses = _time_series(measure, found, names)
     looked = looks_of(result, floors[0], maps)
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
-    document = _document(result, errors, (maps, looked.local), proposal)
     return Findings(
-        diagnosis=document,
+        diagnosis=_document(result, errors, (maps, looked.local), proposal),
         explanation=found,
         given=tuning.model,
         improved=improved,
