@@ -16,10 +16,11 @@ from analysis.diagnosis.balance.law import (
     smooth_sign,
 )
 from analysis.diagnosis.balance.motion import Motion
+from equalizer.effects.simulation.along_motion import RESTS
 from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
-SHARP = 0.01
+SHARP = RESTS
 """Width of the smoothed sign of a dry friction, over the rms speed, where nothing shows a wider one."""
 
 

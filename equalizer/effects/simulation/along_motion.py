@@ -13,6 +13,9 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
+RESTS = 0.01
+"""Of the rms speed: slower than that an axis without a mass to speak of may rest."""
+
 Motion = tuple[FloatArray, FloatArray, FloatArray]
 """Positions, velocities and accelerations of the driven axes, (n, m) each."""
 
@@ -45,6 +48,7 @@ def force_along(
             _own_axis_rows(steps.motion_by_axis_force[2 * len(axes) :]),
         ]
     )
+    _hold_light_axes(per_newton, motion[1], commands, 1 / sample_rate_hz)
     force = np.array(pushing, dtype=np.float64, order="C")
     position, velocity, acceleration = (np.ascontiguousarray(each) for each in motion)
     run_laws_along(
@@ -53,6 +57,19 @@ def force_along(
         per_newton, force, 1 / sample_rate_hz,
     )  # fmt: skip
     return force
+
+
+def _hold_light_axes(per_newton: FloatArray, velocity: FloatArray, commands: FloatArray, step_s: float) -> None:
+    """per_newton: (3, m), what 1 N over a step adds to position, velocity and acceleration; in place.
+
+    Where the commands could move an axis within a step by more than it ever moves, its mass is none: the floor of a
+    model without one, or of a recording without time. Friction would then be at rest everywhere, and would balance
+    whatever is missing. So the motion is taken as it was measured, and the axis rests only where that does.
+    """
+    force, speed = (np.sqrt(np.mean(each**2, axis=0)) for each in (commands, velocity))
+    light = (per_newton[2] * step_s * force > speed) & (speed > 0)
+    held = RESTS * speed[light] / force[light]
+    per_newton[:, light] = held * np.array([[step_s / 2], [1.0], [1 / step_s]])
 
 
 def _own_axis_rows(per_newton: FloatArray) -> FloatArray:

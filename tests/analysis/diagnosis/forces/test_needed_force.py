@@ -7,6 +7,7 @@ from analysis.diagnosis.forces.needed_force import band_motion, needed_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.along_motion import force_along
+from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import filter_low_pass
@@ -77,6 +78,27 @@ def test_what_sticks_answers_to_what_pushes_against_it() -> None:
     along = force_along(body(), rubbing, (still, still, still), (pushing, pushing), RATE_HZ)
     settled = slice(50, None)
     assert np.allclose(along[settled], -np.minimum(pushing, 1.5)[settled], atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("coulomb_friction", {"level": 20.0}), ("presliding_hysteresis", {"level": 20.0, "stiffness": 2e3})],
+)
+def test_without_a_mass_friction_follows_the_motion_and_not_what_is_missing(name, values) -> None:
+    """What is missing is less than the level everywhere, and not in the least that friction's force."""
+    omega = 2 * np.pi * 1.3
+    x, v = (0.03 * course[:, None] for course in (np.sin(omega * TIME_S), omega * np.cos(omega * TIME_S)))
+    missing = 5.0 * np.sin(2 * np.pi * 0.9 * TIME_S)[:, None]
+    light = body(mass=1e-6, damping=0.0)
+    commands = 300.0 * x + missing
+
+    along = force_along(
+        light, (PlacedEffect(EFFECTS[name], (0,), values),), (x, v, -(omega**2) * x), (commands, missing), RATE_HZ
+    )
+
+    bent = np.sign(v[:, 0]) if name == "coulomb_friction" else bristle_bend(x[:, 0], 0.01)
+    inside = np.abs(v[:, 0]) > 0.05 * v.max()
+    assert np.std((along[:, 0] + 20.0 * bent)[inside]) < 0.5
 
 
 @pytest.mark.parametrize("quantity", ["position", "velocity", "acceleration"])
