@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import stdtr
+from scipy.special import chdtrc, stdtr
 
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
@@ -61,7 +61,7 @@ def mismatch_maps(
 
 def whole_mismatch(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tuple[Mismatch, ...]:
     """One row for the worst channel over the whole band, where no place stands out. Its p-value is that of more than
-    noise, in the mean over stretches (one-sided t test)."""
+    noise, in the mean over stretches (one-sided t test) or in their sum."""
     record = measure.records[0].recording
     errors = np.fmax(np.maximum(score.fit, score.choose), score.test)
     worst = int(np.argmax(errors))
@@ -74,7 +74,12 @@ def whole_mismatch(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tu
 
 
 def _p_value_of_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> float:
-    """p-value of a larger error power than noise's, over stretches of time: within one, errors hang together."""
+    """p-value of a larger error power than noise's, over stretches of time: within one, errors hang together.
+
+    By what stretches have in common (t test), or by their sum, were each stretch a single sample of noise (chi-square):
+    where a few of them err by far, their spread hides from the first what the second shows. Twice the smaller of the
+    two (Bonferroni).
+    """
     powers = []
     for record, residuals in zip(measure.records, fitted.residuals, strict=True):
         left = residuals[record.fit | record.choose | record.test, channel]
@@ -84,7 +89,8 @@ def _p_value_of_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> fl
     if len(known) < len(over) or len(known) < 2 or np.ptp(known) == 0:
         return 0.0 if not known.size or known.mean() > 1 else 1.0
     score = (known.mean() - 1.0) / (known.std(ddof=1) / np.sqrt(len(known)))
-    return float(stdtr(len(known) - 1, -score))
+    in_common, in_sum = float(stdtr(len(known) - 1, -score)), float(chdtrc(len(known), known.sum()))
+    return min(2 * min(in_common, in_sum), 1.0)
 
 
 def cells_of(
