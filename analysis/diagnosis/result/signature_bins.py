@@ -32,7 +32,11 @@ def bin_means(
 
 
 def bin_law_means(at: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Bin means of a law over finer bins, without standard errors. at, values: (n,)"""
+    """Bin means of a law over finer bins, without standard errors; none where its model runs away. at, values: (n,)"""
+    known = np.isfinite(at) & np.isfinite(values)
+    at, values = at[known], values[known]
+    if not len(at):
+        return at, values
     bin_of = np.digitize(at, _edges(at, _LAW_BINS)[1:-1])
     count = np.bincount(bin_of)
     full = count >= 3

@@ -6,6 +6,7 @@ from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.result.signature_bins import bin_law_means
 from analysis.diagnosis.result.signature_curves import Names, signature_of
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
@@ -82,3 +83,11 @@ def test_where_nothing_is_missing_the_dots_stay_far_from_a_law_that_is_claimed(s
     one = signature("coulomb_friction", {"level": 0.2}, there=False)
     assert np.abs(law_at_the_dots(one)).mean() > 0.15
     assert np.abs(one.measured).max() < 0.02
+
+
+def test_a_law_whose_model_runs_away_has_the_curve_of_what_is_finite():
+    at = np.append(np.linspace(-1, 1, 500), [np.inf, -np.inf])
+    places, means = bin_law_means(at, at**3)
+    assert np.isfinite(places).all() and len(places) > 10
+    np.testing.assert_allclose(means, places**3, atol=0.01)
+    assert [len(each) for each in bin_law_means(at[-2:], at[-2:])] == [0, 0]
