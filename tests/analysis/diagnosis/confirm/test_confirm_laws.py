@@ -71,7 +71,7 @@ def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_be
 
     monkeypatch.setattr(by_balance, "_steps", steps)
     monkeypatch.setattr(by_balance, "numbers_beside_laws", lambda tuning, balances, laws: np.array([1.0, -2.0]))
-    context = SimpleNamespace(tuning=None, confirmed=lambda candidate: candidate)
+    context = SimpleNamespace(tuning=None, with_test_score=lambda candidate: candidate)
     _, after = _from_starts(context, (), (ends_at(8.0), ends_at(8.0)), ())
     assert after.score.test[0] == end
     assert len(tried) == starts
@@ -93,14 +93,14 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
     balance = SimpleNamespace(named=(law,), search=SimpleNamespace(regression=regression))
     patched = {
         "can_be_played": lambda own, weighed: True, "constants_of": lambda balances: SimpleNamespace(claims=()),
-        "refitted": lambda balances, named: named, "evaluated": lambda *of: given, "refine": lambda *of: 4.0,
-        "final_errors": lambda *of: np.zeros(1), "_vague": lambda *of: None,
+        "refit_laws": lambda balances, named: named, "evaluate_fit": lambda *of: given, "refine": lambda *of: 4.0,
+        "final_errors": lambda *of: np.zeros(1), "_find_vague_law": lambda *of: None,
         "_from_starts": lambda *of: ([ends_at(1.1)], ends_at(1.1)),
     }  # fmt: skip
     for name, stand_in in patched.items():
         monkeypatch.setattr(by_balance, name, stand_in)
     context = SimpleNamespace(
-        measure=None, tuning=SimpleNamespace(names=()), candidate=ends_at, confirmed=lambda each: each
+        measure=None, tuning=SimpleNamespace(names=()), candidate=ends_at, with_test_score=lambda each: each
     )
     found = by_balance.search_by_balance(context, (balance,), False)
     assert (found is not None) == is_named
@@ -121,7 +121,7 @@ def searched_to(*names):
     retuned = candidate()
     steps = tuple(candidate(*names[: place + 1]) for place in range(len(names)))
     found = Explanation(retuned, retuned, steps[-1], (), steps)
-    context = SimpleNamespace(whole=None, confirmed=lambda each: each)
+    context = SimpleNamespace(whole=None, with_test_score=lambda each: each)
     return SearchResult(context, found, Judgement("partly_explained", True))
 
 

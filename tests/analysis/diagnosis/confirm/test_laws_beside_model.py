@@ -92,7 +92,7 @@ def test_chance_is_no_gain():
 
 
 def searched(after, rival=None):
-    context = SimpleNamespace(whole=MEASURE, confirmed=lambda each: each)
+    context = SimpleNamespace(whole=MEASURE, with_test_score=lambda each: each)
     rounds = ((after, *(() if rival is None else (rival,))),)
     found = SimpleNamespace(steps=(after,), plain=candidate(NOISE), after=after, rounds=rounds)
     return SimpleNamespace(context=context, found=found)
