@@ -71,7 +71,7 @@ def test_repeat_and_device_go_together(run, files, part):
 def test_repeating_needs_a_model_that_says_its_spring(run, files):
     code, _, err = run(*files, "--repeat", 3, "--device", "simulated")
     assert code == 1
-    assert "Nothing was repeated" in err
+    assert "Nothing was played" in err
     assert not files[-1].exists()
 
 
