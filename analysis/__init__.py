@@ -35,7 +35,7 @@ _HOME = {
     "analyse_study": "analysis.psychophysics.study_analysis:analyse_study",
     "diagnose": "analysis.diagnosis.diagnose_values:diagnose_values",
     "diagnosis_pictures": "analysis.figures.diagnosis_pictures:diagnosis_pictures",
-    "first_structure": "analysis.diagnosis.first_model.choose_structure:first_structure",
+    "first_structure": "analysis.diagnosis.first_model.choose_structure:choose_structure",
     "overview": "analysis.look.overview:overview",
     "study_pictures": "analysis.figures.study_pictures:study_pictures",
 }

@@ -72,7 +72,7 @@ class DiagnosisSettings:
     without: tuple[str, ...] = ()
     """Effects that are not to be considered."""
     names: tuple[str, ...] = ()
-    """Of the recordings, for the reader."""
+    """Names of the recordings, for the reader."""
     clean: tuple[Recording, ...] = ()
     """Recordings of the device without the fault: its difference from the re-tuned model there is no mismatch."""
     fitted: bool = False
@@ -132,9 +132,8 @@ def _compare_with_clean(
     map_: Mapper,
     progress: Progress,
 ) -> Findings | None:
-    """Findings by comparison with the clean recordings. None where the given model predicts these so well that it is
-    used itself, or where repeats show that noise is small. Where no fault of the comparison explains the difference,
-    the search beside the given model is tried for effects that the comparison does not test."""
+    """Findings by comparison with the clean recordings, or by search where no fault explains the difference. None where
+    the given model predicts the clean ones well enough to be used itself, or repeats show that noise is small."""
     look = FittingMeasure(model, measure_of(recordings, model))
     if not settings.fitted and (noise_is_from_repeats(look.chosen) or foresees(model, settings.clean)):
         return None

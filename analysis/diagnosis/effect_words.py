@@ -102,7 +102,7 @@ class LawWords:
 
     words: EffectWords
     units: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    """By parameter: SI, of a translational and of a rotational model."""
+    """SI units by parameter, of a translational and of a rotational model."""
     place: Place = "mechanism"
 
 

@@ -78,7 +78,7 @@ def probability_text(probability: float) -> str:
 
 
 def share_text(share: float) -> str:
-    """As per cent with two digits; all of them from a hundred on."""
+    """A share as per cent with two digits, or all digits from 100 % on."""
     return f"{100 * share:.2g} %" if 100 * share < 99.5 else f"{100 * share:.0f} %"
 
 

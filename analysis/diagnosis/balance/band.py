@@ -8,7 +8,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
 
 NOISE_SHARE = 0.01
-"""Of the acceleration's mean square that the motion's noise may make: the bias of a mass, as a share of it."""
+"""Noise in the acceleration's mean square at most, as a share: about the relative bias of a mass."""
 WIDEST = 0.2
 """The band's end at most, over the sample rate."""
 NARROWEST_CYCLES = 20.0
@@ -23,8 +23,8 @@ def band_end_hz(samples: Sequence[FloatArray], rate_hz: float, order: int) -> fl
 
 
 def band_begin_hz(samples: Sequence[FloatArray], rate_hz: float) -> float:
-    """Of integrated accelerations: the median over recordings and channels of the lowest beginning from which noise
-    makes a small share of the position's mean square."""
+    """Beginning of the band of integrated accelerations: the median over recordings and channels of the lowest from
+    which noise makes a small share of the position's mean square."""
     begins = []
     for column in (column for each in samples for column in each.T):
         frequency_hz, density, floor = _spectrum(column, rate_hz)

@@ -35,7 +35,7 @@ class Block:
     """Sum of squares of the force about its mean over all fitted samples."""
     motion: int
     rows: npt.NDArray[np.intp]
-    """Of the motion's kept samples."""
+    """Numbers of its samples among the motion's kept ones."""
 
 
 def column_scale(rows: Sequence[FloatArray], fit: Sequence[Mask]) -> FloatArray:

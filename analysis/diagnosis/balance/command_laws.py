@@ -26,7 +26,8 @@ class CommandLaw:
     """A name of the vocabulary, or one written like them for physics that it lacks."""
     values: dict[str, float]
     columns: Callable[[FloatArray, dict[str, float]], FloatArray]
-    """Of a command (n,), (n, weights): their weighted sum is the force; a single one is the force but for its gain."""
+    """Columns (n, weights) of a command (n,): their weighted sum is the force; a single column is the force but for a
+    gain."""
 
     def of(self, command: FloatArray) -> FloatArray:
         return self.columns(command, self.values)

@@ -31,7 +31,7 @@ class GivenBase:
     mass: float
     """That moves along the axis."""
     least: float = 0.0
-    """Of the force's rms, that all laws together must take for any to be looked for."""
+    """Share of the force's rms that all laws together must take for any to be searched."""
 
 
 def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: GivenBase) -> Regression:
@@ -62,7 +62,7 @@ def _sensitive_columns(given: GivenBase) -> list[int]:
 
 
 def _power_per_freedom(plain: Regression) -> float:
-    """Of what the columns leave with the open numbers fitted freely: the sum of squares over its degrees of freedom."""
+    """Residual sum of squares over its degrees of freedom, with the open numbers fitted freely."""
     left = plain.remainder(plain.columns_of(()))
     power, freedom = 0.0, 0.0
     for course, motion in zip(left, plain.motions, strict=True):

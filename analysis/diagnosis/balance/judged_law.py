@@ -18,7 +18,7 @@ class JudgedLaw:
     """One law, its parameters, its gain, and why it is not named."""
 
     place: int
-    """In the regression."""
+    """Its number in the regression."""
     law: Law
     values: dict[str, float]
     gain: float
@@ -26,7 +26,7 @@ class JudgedLaw:
     gain_low: float
     """Lower confidence bound of the gain, at 97.5 %."""
     share: float
-    """Of what all laws together take of the linear model's error."""
+    """Share of the error that all laws together take which this law takes."""
     alike: tuple[str, ...]
     """Effects that fit as well in its place."""
     probability: float

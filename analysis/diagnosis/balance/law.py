@@ -14,8 +14,8 @@ Numbers = tuple[float, ...]
 Columns = Callable[[Motion, Numbers], FloatArray]
 """(n, weights)"""
 Values = Callable[[FloatArray, Numbers, float], dict[str, float] | None]
-"""Of weights (weights,), nonlinear numbers and the moving mass: the effect's parameters; None where no such physics has
-these signs."""
+"""Maps weights (weights,), nonlinear numbers and the moving mass to the effect's parameters; None where the signs are
+not physical."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,14 +23,14 @@ class Law:
     effect: str
     """A name of the vocabulary, or one written like them for physics that it lacks."""
     channel: int
-    """Of the motion; -1 = none."""
+    """Channel of the motion; -1 = none."""
     numbers: Numbers
     columns: Columns
     values: Values
     linear: bool = False
-    """In the motion: a linear model of a higher order could take its place."""
+    """Linear in the motion: a linear model of a higher order could take its place."""
     bounded: tuple[tuple[float, float], ...] = ()
-    """Between which each nonlinear number stays."""
+    """Bounds of each nonlinear number."""
 
     @property
     def key(self) -> tuple[str, int]:
@@ -42,7 +42,7 @@ class BaseTerms:
     """What the base of one axis's balance holds beyond mass, damping and stiffness."""
 
     own: int
-    """Of the measured motions, the one that the force drives."""
+    """Channel of the motion that the force drives."""
     laws: tuple[Law, ...] = ()
     """Linear in the motion."""
     delay_s: float = 0.0
@@ -51,7 +51,7 @@ class BaseTerms:
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """Of one channel's motion where it is fitted."""
+    """Sizes of one channel's motion on the fit samples."""
 
     speed: float
     """rms"""

@@ -40,7 +40,7 @@ class Structure:
 @dataclass(frozen=True, slots=True, eq=False)
 class StructureSearch:
     regression: Regression
-    """With the refined laws of the final structures."""
+    """The regression with the refined laws of the final structures."""
     linear: Structure
     best: Structure
     ranked: tuple[Structure, ...]

@@ -72,9 +72,9 @@ def _select_axis(motion: Motion, axis: int) -> Motion:
 @dataclass(frozen=True, slots=True, eq=False)
 class _BalanceData:
     motion: Motion
-    """Of the driven axes, and the force that entered there."""
+    """The motion of the driven axes, and the actuator's force there."""
     columns: tuple[FloatArray, ...]
-    """As `GivenBase.columns`, per axis."""
+    """Per axis, the columns of `GivenBase`."""
 
 
 def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _BalanceData:

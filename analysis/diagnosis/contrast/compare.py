@@ -37,8 +37,8 @@ in order, halves of which a fault was named had up to 1.53 times; faults that we
 AS_ONE = 0.05
 """Excess of the error of both sets together over that of each by itself, up to which they are of one device."""
 LEAST = 0.05
-"""Of the error power of both sets, that a fault must gain: so much comes of one that adds a tenth to the error power of
-one of them. What is less is not worth a name."""
+"""Share of the error power of both sets that a fault must gain: a fault that adds a tenth to the error power of one set
+gains that much. Smaller ones are not worth a name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +79,7 @@ class Comparison:
     faulty_samples: int
     """The same of the faulty set."""
     held_out: float
-    """As `JudgedFault.held_out`, with nothing undone."""
+    """Cross-validated sum of squares of the faulty set, with nothing undone."""
     faulty_share: float
     """Rms error of the faulty set by a base of its own, over the rms of what is predicted."""
     usual: float

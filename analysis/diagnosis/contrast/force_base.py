@@ -28,7 +28,7 @@ class ForceBase:
     band_hz: float
     turns: bool
     rate_hz: float
-    """Of the rows."""
+    """Sample rate of the rows."""
     lowest_hz: float = 0.0
     """Where the band begins, see `Motion`."""
 

@@ -33,7 +33,7 @@ class _Axis:
     along: Along
     """A part's motion as it was measured."""
     channel: int
-    """Of the motion."""
+    """Channel of the motion."""
     middle: float
     width: float
     sharp: float

@@ -23,7 +23,7 @@ class Part:
     """One part without long gaps; missing samples are interpolated, and not `known`."""
 
     recording: Recording
-    """Of the part: rate, hold, names."""
+    """The part as recorded, for its rate, hold and names."""
     command: FloatArray
     """(n, m)"""
     response: FloatArray

@@ -23,14 +23,14 @@ from equalizer.signals.signal import FloatArray
 Read = Callable[[FloatArray, float], FloatArray]
 """What one channel (n,) would have read, at a rate."""
 WIDELY = (0.5, 1.6)
-"""As AROUND, of faults that act nearly in proportion to their size."""
+"""Range of sizes, as `AROUND`, for faults that act nearly in proportion to their size."""
 GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)
 SHIFTS = (0.03, 0.1, 0.3, 0.7, 1.2)
 """Offsets and drifts, over the channel's rms."""
 BENT = (0.02, 0.06, 0.15, 0.3)
 """Nonlinearity errors at the largest reading, as a share of it."""
 PLAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
-"""As SHIFTS, of a gap before the sensor."""
+"""Gaps before the sensor, over the channel's rms."""
 TURNED = 0.05
 """Share of a gap by which a reading must go back to count as a reversal."""
 FASTEST = 0.05

@@ -37,7 +37,7 @@ class SignalFault:
     place: Place
     channels: tuple[int, ...]
     values: dict[str, float]
-    """Of the largest channel."""
+    """Parameters of the largest channel."""
 
 
 def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:

@@ -24,9 +24,9 @@ LEAST_BY_ITSELF = 256
 ALIKE, DIPPED = 0.98, 0.7
 """Correlation of a command with itself a period later, and to which it must have fallen in between."""
 EXACT = 1e-6
-"""Of its peak, that a command may differ by from one period to the next: rounding of numbers stored in six digits."""
+"""Difference of a command between periods at most, over its peak: rounding of numbers stored with six digits."""
 ROUNDED = 1e-3
-"""Of its rms, that steps of rounding may make where they come about otherwise in another period."""
+"""Rms difference between periods by different rounding at most, over the command's rms."""
 MOST_SAMPLES = 2**19
 
 

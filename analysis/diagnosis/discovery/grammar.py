@@ -23,7 +23,7 @@ _SIGNAL = re.compile(rf"\b(?:[vf]?[{AXES}]|t)\b")
 @dataclass(frozen=True, slots=True)
 class Term:
     shape: str
-    """In the language of laws; its free numbers are p0, p1, …"""
+    """Formula in the language of laws; its free numbers are p0, p1, …"""
     numbers: tuple[float, ...] = ()
     """Where they start."""
     bounds: tuple[tuple[float, float], ...] = ()

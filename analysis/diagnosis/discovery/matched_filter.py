@@ -39,7 +39,7 @@ class FilteredRecord:
     """(n, m), N: the force that the model lacks."""
     rate_hz: float
     length: int
-    """Of the transforms, samples."""
+    """Length of the transforms, samples."""
     force_response: ComplexArray
     """(lines, c, m): frequency response from a force to the residuals, up to the last line with command power."""
     strength: FloatArray

@@ -14,7 +14,7 @@ from analysis.diagnosis.discovery.matched_filter import View
 from equalizer.signals.signal import FloatArray
 
 _DEPENDENT = 1e-6
-"""Of a column's power that must be its own beside the model's numbers."""
+"""Share of a column's power that must be independent of the model's columns."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,7 +21,7 @@ WINDOW_S, OCTAVES = 1.0, 0.5
 LOWEST, HIGHEST = 2.0, 0.48
 """Edges of the bands: over a window's own line, and over the rate."""
 LONGEST_S, LEAST = 8.0, 256
-"""Of a stretch without segments, and samples of any stretch."""
+"""Length of a stretch without segments at most, and samples of any stretch at least."""
 HEARD = 4.0
 """Power of a band over the noise's, from which on it counts."""
 PARTS = ("fit", "choose", "test")

@@ -49,7 +49,7 @@ NO_STATE = (
 class Chosen:
     measure: ErrorMeasure
     floors: tuple[NoiseFloor, ...]
-    """Of what is compared, per record of the measure."""
+    """Noise of what is compared, per record of the measure."""
     remarks: tuple[str, ...]
 
 

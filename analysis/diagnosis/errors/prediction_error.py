@@ -17,7 +17,7 @@ Part = Literal["all", "test"]
 
 @dataclass(frozen=True, slots=True)
 class ChannelRms:
-    """In the unit of the recording."""
+    """Rms signal and rms error of one channel, in the unit of the recording."""
 
     name: str
     unit: str
@@ -60,7 +60,7 @@ def prediction_error(recording: Recording, model: MechanicalModel, part: Part) -
 
 
 def _channels(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[ChannelRms]:
-    """Of the responses, where these are what was compared."""
+    """Errors of the response channels, where responses were compared."""
     signal = recording.response
     if y.shape[1] < len(signal.channels) or not len(y) or not np.isfinite(f).all():
         return

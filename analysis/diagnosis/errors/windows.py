@@ -26,11 +26,11 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _UNSEEN = 1e-9
-"""Of a window's largest direction: what moves the outputs less than that is not fitted."""
+"""Singular value over the largest, below which a direction of the initial state is not fitted."""
 
 
 WINDOW_S = 1.0
-"""Shortest."""
+"""Length of a window at least."""
 STATES = 10.0
 """Readings of a window per number of its state; principle: the state, which is fitted and does not count, then takes a
 tenth of an error at most by chance."""

@@ -33,7 +33,7 @@ UNKNOWN = 1e-4
 class ForceViews:
     measure: PredictedForce
     floors: tuple[NoiseFloor, ...]
-    """Of the views, per record."""
+    """Noise of the views, per record."""
 
 
 def force_views(

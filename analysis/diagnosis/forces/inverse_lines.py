@@ -19,7 +19,7 @@ FEW = 2000
 LEARNED_ON, NEAR = 60, np.array([-1.0, 0.0, 1.0])
 """Lines over the whole range, and about each pole in its half widths, to which the coefficients are fitted."""
 HIGHEST_POWER = 4
-"""Of frequency: an inertia behind a massless coupling."""
+"""Highest power of frequency: that of an inertia behind a massless coupling."""
 FAR = 1e3
 """Times the highest line: a pole beyond it is a power."""
 RIGHT_TO = 1e-8
@@ -41,7 +41,7 @@ def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexAr
 
 
 def inverse_of(model: MechanicalModel, lines: int, highest_hz: float) -> Callable[[FloatArray], ComplexArray]:
-    """As `inverse_lines`, to be asked for so many lines, piece by piece."""
+    """`inverse_lines` as a function of frequency, fast where many lines are asked for."""
     if lines > FEW and (learned := _fit_partial_fractions(model, highest_hz)) is not None:
         return learned
     return lambda frequency_hz: inverse_lines(model, frequency_hz)

@@ -18,7 +18,7 @@ class AxisTransfer:
     """From a force held over each sample along each driven axis; (lines, rows, m)."""
 
     response: ComplexArray
-    """As the sensor reads it."""
+    """To the response, as the sensor reads it."""
     position: ComplexArray
     axis_position: ComplexArray
     axis_velocity: ComplexArray

@@ -24,7 +24,8 @@ class CleanFloor:
         return 1 + 1 / max(self.recordings, 1)
 
     def share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
-        """Of the cell; the largest of the channel's octave where clean recordings never drove this input; else 0."""
+        """Share of a cell; the largest of the channel's octave where clean recordings never drove this input; else
+        0."""
         own = self.shares.get((output, quantity, input, band_hz))
         if own is not None:
             return own

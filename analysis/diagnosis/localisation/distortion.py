@@ -37,7 +37,7 @@ class Distortion:
 
     output: str
     quantity: str
-    """Of the output: position and response channels may share a name."""
+    """Quantity of the output: position and response channels may share a name."""
     input: str
     """Driven inputs, joined by "+"."""
     amplitude: float
@@ -46,7 +46,8 @@ class Distortion:
     """True: all that was driven, not one octave of it."""
     kind: Kind
     rms: float
-    """In the output's unit, over all lines of the band that this kind reaches; 0 where not above the noise."""
+    """Rms distortion in the output's unit, over all lines of the band that this kind reaches; 0 where not above the
+    noise."""
     limit_rms: float
     """Detection limit."""
     signal_rms: float
@@ -149,5 +150,5 @@ def _detection_masks(look: SegmentSpectrum, inside: Mask) -> list[tuple[Kind, Ma
 
 
 def _rms(power: float) -> float:
-    """Of the sum of squared magnitudes of a one-sided spectrum."""
+    """Rms from the sum of squared magnitudes of a one-sided spectrum."""
     return float(np.sqrt(2 * max(power, 0.0)))

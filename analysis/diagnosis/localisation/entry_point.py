@@ -85,7 +85,7 @@ class EntryScore:
     score: float
     """Mean log of unexplained power, noise = 0. Lower is better."""
     share: float
-    """Of the residual's power beyond noise that it explains, median over lines."""
+    """Share of the residual's power beyond noise that it explains, median over lines."""
     p_value: float
     """p-value of explaining as much as the best; 1 for the best and for entries like it."""
     alike: tuple[str, ...]

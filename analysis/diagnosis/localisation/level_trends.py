@@ -17,7 +17,7 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 _SCATTER_DB = 4.343
-"""Of the power on a single line, one standard deviation, where distortion is random over lines."""
+"""Standard deviation of the power on a single line, where distortion is random over lines."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,11 +50,11 @@ class MismatchCell:
     """Driven inputs, joined by "+"."""
     band_hz: Band
     amplitude: float
-    """Of the excitation, in the command's unit."""
+    """Level of the excitation, in the command's unit."""
     rms: float
-    """Of the mismatch, in the output's unit, noise taken out."""
+    """Rms mismatch in the output's unit, noise subtracted."""
     signal_rms: float
-    """Of the response in the cell, or a tenth of the loudest channel's, whichever is larger."""
+    """Rms response in the cell, or a tenth of the loudest channel's, whichever is larger."""
     in_noise: float
     """The residual's rms in units of what noise alone would leave."""
     margin: float
@@ -71,7 +71,7 @@ class MismatchCell:
     signal_in_noise: float = 0.0
     """Power of `signal_rms` over the noise's, mean over the lines."""
     part: int = 0
-    """Of the recordings' parts, in which it lies."""
+    """Number of the recordings' part in which it lies."""
     beyond_noise: bool = False
     """Significant beyond noise and margin, whatever the model's error elsewhere."""
 

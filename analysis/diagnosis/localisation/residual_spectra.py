@@ -41,9 +41,9 @@ def residual_spectra(
     used: Mask | None = None,
     model_error: float = 0.01,
 ) -> ResidualSpectra | None:
-    """Of mean periods; of windows of two seconds where nothing is periodic. None where there is neither, or the noise
-    is not known. used: (n,), the samples that count. model_error: share of the response on each line that the model is
-    not trusted for, counted as noise: else what re-tuning leaves on other axes passes for a second force."""
+    """Spectra of mean periods; of windows of two seconds where nothing is periodic. None where there is neither, or the
+    noise is not known. used: (n,), the samples that count. model_error: share of the response on each line that the
+    model is not trusted for, counted as noise: else what re-tuning leaves on other axes passes for a second force."""
     left = [recording.response.samples - prediction.response]
     noises = [floor.response]
     if recording.position is not None and prediction.position is not None and floor.position is not None:

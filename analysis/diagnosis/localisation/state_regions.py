@@ -28,7 +28,7 @@ _READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 class State:
     kind: StateKind
     symbol: str
-    """As it is to be read: "v", "x", "fx", "ax", "t"."""
+    """The symbol as it is read: "v", "x", "fx", "ax", "t"."""
     unit: str
     values: FloatArray
     """(n,)"""
@@ -54,7 +54,7 @@ class StateRegion:
     by: Literal["size", "sign"]
     """Whether the mismatch is larger there, or has a mean that follows the state."""
     share: float
-    """Of the mismatch's power: inside the region (size), or explained by the means over bins (sign)."""
+    """Share of the mismatch's power: inside the region (size), or explained by the bin means (sign)."""
     occupied: float
     """Share of the samples in the region; 1 for sign."""
     p_value: float

@@ -13,13 +13,13 @@ from equalizer.signals.signal import FloatArray
 SLOWEST_HZ, SLOWEST_SHARE = 1.0, 0.1
 """Where sweeps begin: there, or at such a share of the usual end where the sample rate is low."""
 CYCLES, LONGER = 8.0, 5.0
-"""Of the sweep's beginning: the length of an experiment; and how many times as long the longest is."""
+"""Length of an experiment in cycles of the sweep's lowest frequency, and how many times as long the longest is."""
 USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
 """How far sweeps go: to the first, or such a share of the sample rate."""
 ADDED_SHARE = 0.12
-"""Of the grounded mass: a weight that is known and strapped on."""
+"""Known weight that is strapped on, over the grounded mass."""
 _FADE = 1 / 16
-"""Of an experiment's usual length, at both ends."""
+"""Fade at both ends, over an experiment's usual length."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +29,7 @@ class Experiment:
     commands: FloatArray
     """(n, m)"""
     kind: Literal["sweep", "slow"]
-    """As a recording's segment says it."""
+    """Kind of the recording's segment."""
     added: float = 0.0
     """Mass (or inertia) that is strapped on beforehand."""
     minutes: float = 1.0

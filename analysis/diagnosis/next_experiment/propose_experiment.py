@@ -22,7 +22,7 @@ class Proposal:
     names: tuple[str, str]
     axis: int
     level: float
-    """With which the menu was made."""
+    """Level of the menu's commands."""
     foreseen: tuple[PredictedGain, ...]
     """All of the menu, the best first."""
 

@@ -13,7 +13,7 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 _TRANSIENT_RATIO = 2.0
-"""Of the energy that a period differs by from the last one, first third to last third: above, it still settles."""
+"""Energy of a period's difference from the last one, first third over last third, above which it has not settled."""
 _SHORTEST = 8
 
 
@@ -22,7 +22,7 @@ class Periods:
     """The usable periods of one periodic segment."""
 
     index: int
-    """Of the segment in the recording."""
+    """Number of the segment in the recording."""
     segment: Segment
     starts: tuple[int, ...]
     """First samples of the periods that are whole and settled; one at least."""
@@ -44,8 +44,8 @@ class Periods:
 
 
 def settled_periods(recording: Recording) -> tuple[Periods, ...]:
-    """Of every periodic segment. The first period is left out, and further ones while they still settle; periods with
-    missing samples are left out, too. Segments without a usable period are not among them."""
+    """The usable periods of every periodic segment. The first period is left out, and further ones while they still
+    settle; periods with missing samples are left out, too. Segments without a usable period are not among them."""
     found = []
     for index, segment in enumerate(recording.segments):
         if segment.period < _SHORTEST:

@@ -10,7 +10,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 _LEAST_SAMPLES = 8
-"""Of a window: a recording at less than 32 Hz has none."""
+"""Samples of a window at least: a recording at less than 32 Hz has none."""
 _WINDOW_S = 0.25
 _SILENT = 1e-4
 """Share of the strongest smoothed power of the command that counts as none."""
@@ -18,7 +18,7 @@ _CLEAR = 1.3
 """Times the highest driven line: where the flanks of windows have died away."""
 _LEAST_LINES = 16
 _DIFFERENCE_GAIN, _DIFFERENCE_LOSS = 20.0, 2.31
-"""Of a third difference of white noise: gain of variance, and loss of degrees of freedom by correlation."""
+"""Third differences of white noise: gain of variance, and loss of degrees of freedom by correlation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from equalizer.signals.signal import FloatArray
 _TERMS = np.arange(1, 200)
 _EXAMINED, _HALVES = 20_000, 40
 _TOLERANCE = 1e-3
-"""Of a step: storage as float32 leaves no exact multiples."""
+"""Deviation from multiples of a step at most, over the step: float32 storage leaves no exact multiples."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""What is said of one real recording, as plain values: a row of a table, a section of a page."""
+"""The diagnosis of one real recording as plain values: a row of a table, a section of a page."""
 
 import json
 from dataclasses import asdict
@@ -82,20 +82,20 @@ class PairOutcome:
     returned: tuple[str, ...]
     """Names of the vocabulary: what was named, and what these data cannot tell from it."""
     as_before: float | None
-    """Of the model of before as it is,"""
+    """Error of the model from before, unchanged."""
     gain: float | None
-    """with one factor re-tuned,"""
+    """Error with one gain factor re-tuned."""
     retuned: float | None
-    """re-tuned within its tolerances,"""
+    """Error re-tuned within its tolerances."""
     with_effects: float | None
-    """and with what is named."""
+    """Error with the named effects."""
     expected_left: float | None
-    """What the model misses on the recording from before, too."""
+    """Error of the model on the recording from before."""
 
 
 @dataclass(frozen=True, config=STRICT)
 class DrawnExcerpt:
-    """A held-out stretch in which it shows what was found."""
+    """A held-out stretch that shows the effects found."""
 
     record: str
     channel: str

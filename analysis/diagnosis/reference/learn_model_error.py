@@ -88,7 +88,7 @@ def learn_model_error(
 def learn_model_floor(
     clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
 ) -> CleanFloor:
-    """As `learn_model_error`: what a given model misses of the clean recordings, too; none where they tell nothing."""
+    """The floor of `learn_model_error`; an empty one where the clean recordings cannot be compared."""
     try:
         return learn_model_error(clean, model, diagnosed, map_, progress).floor
     except (NothingLearned, np.linalg.LinAlgError):

@@ -37,10 +37,7 @@ from equalizer.signals.signal import FloatArray
 
 
 def assemble_findings(
-    result: SearchResult,
-    floors: tuple[NoiseFloor, ...],
-    names: Sequence[str],
-    learned: CleanFloor,
+    result: SearchResult, floors: tuple[NoiseFloor, ...], names: Sequence[str], learned: CleanFloor
 ) -> Findings:
     """The findings of a search. result.found.after is the model with the named effects, the same as re-tuned where
     nothing is named. names: of the recordings. learned: the residual of clean recordings, counted as noise."""

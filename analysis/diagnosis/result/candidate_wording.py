@@ -82,7 +82,7 @@ def class_sentence(effect: NamedEffect) -> str:
 
 
 def refinement_sentence(effect: NamedEffect) -> str:
-    """Of laws that hold the named one as a special case; empty where none was weighed."""
+    """A sentence on laws that hold the named one as a special case; empty where none was tested."""
     names = [noun_of(rival.effect) for rival in effect.rivals if rival.why_not == REFINED]
     if not names:
         return ""
@@ -97,7 +97,7 @@ def _family(effect: NamedEffect) -> tuple[str, str] | None:
 
 
 def candidate_title(candidate: Candidate, device: Device | None = None) -> str:
-    """With its numbers."""
+    """A candidate with its place and parameters."""
     place = place_words(candidate.place, candidate.axis, device is not None and device.single)
     numbers = candidate_numbers(candidate, device)
     return f"{noun_of(candidate.effect)} {place}{f', {numbers}' if numbers else ''}"

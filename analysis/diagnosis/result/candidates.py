@@ -152,7 +152,7 @@ def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...]) -> tu
 def balance_errors(
     diagnosis: Diagnosis, balances: Sequence[Balance], channels: tuple[str, ...]
 ) -> tuple[BalanceErrors, ...]:
-    """Of the laws that the document names; see `with_balances`."""
+    """Errors of each axis's balance with the laws that the document names; see `with_balances`."""
     found = []
     for axis, balance in enumerate(balances):
         letter = axis_letter(channels[axis], channels)

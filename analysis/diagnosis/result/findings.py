@@ -105,7 +105,7 @@ class Findings(Summarised):
     """Re-tuned, with the named effects among its `effects`; driven by the commands as they were recorded."""
     named: tuple[PlacedEffect, ...]
     evidence: tuple[Evidence, ...]
-    """Of the re-tuned model, per recording."""
+    """Evidence of the re-tuned model, per recording."""
     courses: tuple[Course, ...]
     noise_rms: Mapping[str, float]
     """By channel, SI."""
@@ -124,7 +124,7 @@ class Findings(Summarised):
     fitted: bool = False
     """`given` was fitted to these recordings by the program: no calibration says how far its numbers may be off."""
     floor: NoiseFloor | None = None
-    """Of the first recording: how the noise was measured, and its spectrum."""
+    """Noise of the first recording: how it was measured, and its spectrum."""
     is_timed: bool = True
     """Whether time is known: where not, what is in hertz is in cycles per sample."""
     tuning: Tuning | None = None
@@ -132,7 +132,7 @@ class Findings(Summarised):
     axes: tuple[str, ...] = ()
     """The driven axes, as a reader calls them; empty = x, y, z."""
     proposal: Proposal | None = None
-    """Of what to record next, where rivals are as good as what is named."""
+    """The next recording proposed, where rivals are as good as what is named."""
     reached: tuple[BalanceErrors, ...] = ()
     """Per axis; empty where no force balance was weighed."""
     state_maps: tuple[StateMaps, ...] = ()

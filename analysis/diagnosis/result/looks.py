@@ -28,7 +28,7 @@ WHERE = "the look at where it sits"
 @dataclass(frozen=True, slots=True, eq=False)
 class Looks:
     evidence: tuple[Evidence, ...]
-    """Of the re-tuned model."""
+    """Evidence of the re-tuned model."""
     local: Localisation
     signatures: tuple[Signature, ...]
     black_box: BlackBox | None
@@ -84,5 +84,5 @@ def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, 
 
 
 def _strength(values: Values) -> float:
-    """By the main number, which comes first."""
+    """Size of the main parameter, which comes first."""
     return abs(next(iter(values.values())))

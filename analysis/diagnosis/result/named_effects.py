@@ -46,7 +46,7 @@ class Labels:
     response_unit: str
     system: UnitSystem
     quantity: str = "acceleration"
-    """Of the response."""
+    """Quantity of the response."""
 
 
 def labels_of(recording: Recording, model: MechanicalModel) -> Labels:

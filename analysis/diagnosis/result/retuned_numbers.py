@@ -17,7 +17,7 @@ _LISTED = 4
 class MovedNumber:
     name: str
     change: float
-    """In `unit`."""
+    """Change of the number, in `unit`."""
     unit: str
     """SI; "1" for a relative change."""
     deviations: float

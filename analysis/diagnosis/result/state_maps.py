@@ -32,7 +32,7 @@ class StateView:
     along: str
     """What the abscissa is: "position"."""
     unit: str
-    """Of the abscissa, SI."""
+    """Unit of the abscissa, SI."""
     cloud_at: FloatArray
     cloud: FloatArray
     """Single samples of the missing force."""
@@ -65,7 +65,7 @@ class StateMaps:
 
     axis: str
     unit: str
-    """Of the force, SI."""
+    """Unit of the force, SI."""
     model: str
     """The model that lacks the force, in words."""
     completed: str

@@ -176,7 +176,7 @@ def share_sentence(effect: NamedEffect) -> str:
 
 
 def gain_sentence(effect: NamedEffect) -> str:
-    """With a space before it; empty where nothing was held out."""
+    """The effect's held-out gain, with a space before it; empty where nothing was held out."""
     gain = effect.held_out_gain
     if gain is None or gain.ci95 is None:
         return ""
@@ -220,5 +220,5 @@ def final_moved_numbers(found: Findings) -> tuple[MovedNumber, ...]:
 
 
 def signature_texts(found: Findings) -> Mapping[str, str]:
-    """By effect, as the catalogue has it."""
+    """What each named effect causes in the data, by effect, as the catalogue says it."""
     return {placed.effect.name: placed.effect.signature for placed in found.named}

@@ -35,7 +35,7 @@ class Part:
     doing: str
     work: Callable[[], Any]
     instead: Any
-    """Of its result, where it crashes."""
+    """The result where it crashes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -129,7 +129,7 @@ def _numbers_with_none(found: Explanation, errors: FloatArray) -> Iterator[list[
 
 
 def _open_effects(context: SearchContext, found: Explanation) -> Iterator[bool]:
-    """By effect: whether the intervals of all its numbers that have a value meaning no effect hold it."""
+    """Whether an effect is open, by effect: the intervals of all its numbers that can mean no effect include it."""
     for own in _numbers_with_none(found, number_errors(context, found)):
         yield bool(own) and all(_is_open(number, at, error) for number, _, at, error in own)
 

@@ -26,7 +26,7 @@ class ReferenceRecording:
     base: Fitted
     """Re-tuned, without any effect."""
     known: Sensitivity
-    """Of the model's numbers, there."""
+    """Sensitivity to the model's numbers there."""
     evidence: Evidence
 
     def gain_on_clean(self, wanted: Hypothesis) -> FloatArray:

@@ -18,7 +18,7 @@ class ScreenedHypothesis:
     hypothesis: Hypothesis
     """Together with what is already held to be true."""
     cost: float
-    """As `Fitted.cost`, predicted by linearisation at the starting values."""
+    """`Fitted.cost` predicted by linearisation at the starting values."""
 
 
 def screen(

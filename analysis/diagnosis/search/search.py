@@ -78,7 +78,7 @@ class Unconfirmed:
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchResult:
     context: SearchContext
-    """With the samples as they were used in the end."""
+    """The search's shared state, with the roles of samples as used in the end."""
     found: Explanation
     judgement: Judgement
     remarks: tuple[str, ...] = ()
