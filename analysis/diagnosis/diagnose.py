@@ -28,9 +28,9 @@ from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.reference.compare_with_reference import (
     HUM,
     contrast_of,
-    foresees,
     hums_low,
     noise_is_from_repeats,
+    predicts_clean,
 )
 from analysis.diagnosis.reference.learn_model_error import NothingLearned, learn_model_error, learn_model_floor
 from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
@@ -135,7 +135,7 @@ def _compare_with_clean(
     """Findings by comparison with the clean recordings, or by search where no fault explains the difference. None where
     the given model predicts the clean ones well enough to be used itself, or repeats show that noise is small."""
     look = FittingMeasure(model, measure_of(recordings, model))
-    if not settings.fitted and (noise_is_from_repeats(look.chosen) or foresees(model, settings.clean)):
+    if not settings.fitted and (noise_is_from_repeats(look.chosen) or predicts_clean(model, settings.clean)):
         return None
     progress("comparing with the clean recordings", 0.1)
     contrast = contrast_of(recordings, settings.clean, frozenset(settings.without), settings.time_left)
@@ -226,8 +226,8 @@ def _by_search(
         may_be_named = []
     if settings.clean:
         learned = learn_model_error(settings.clean, look.model, recordings, map_, progress)
-        told = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
-        context = replace(context, certain=find_sensor_faults(recordings, settings.clean, told))
+        observable = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
+        context = replace(context, certain=find_sensor_faults(recordings, settings.clean, observable))
         beside = search_beside_reference(context, learned, catalogue, progress, settings.time_left)
         found = _Result(beside, learned.floor)
     else:
@@ -269,8 +269,8 @@ def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozen
 
 def _beside_motion(name: str, place: str, imposed: bool) -> bool:
     """Whether an effect of the actuator or sensor cannot be seen by a force balance."""
-    told = name == "body_on_actuator" or (name in TESTED_BY_BALANCE and not imposed)
-    return place in ("actuator", "sensor") and not told
+    tested = name == "body_on_actuator" or (name in TESTED_BY_BALANCE and not imposed)
+    return place in ("actuator", "sensor") and not tested
 
 
 def _assemble(

@@ -101,19 +101,19 @@ def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
     """The result with named effects of actuator and sensor made candidates, unless the signal itself shows them: the
     model was fitted to these recordings, so that a law of the motion that the catalogue lacks may look like a nonlinear
     or late sensor."""
-    found, told = seen.found, []
+    found, demoted = seen.found, []
     doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
     for place in reversed(doubtful):
         gain = held_out_gain(seen.context.whole, found.plain, seen.context.with_test_score(found.steps[place]))
         if gain is not None and gain.gain > 0:
-            told.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, ONLY_BESIDE_CALIBRATION))
+            demoted.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, ONLY_BESIDE_CALIBRATION))
         if len(found.steps) > 1:
             found = without_effect(seen.context, found, place)
         else:
             found = replace(found, after=found.retuned, steps=())
     if not doubtful:
         return seen
-    kept = tuple(sorted(told, key=lambda each: -each.gain))
+    kept = tuple(sorted(demoted, key=lambda each: -each.gain))
     return replace(seen, found=found, judgement=judge(found), errors=None, unconfirmed=(*seen.unconfirmed, *kept))
 
 

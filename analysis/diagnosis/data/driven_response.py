@@ -45,8 +45,8 @@ def response_significance(recordings: Sequence[Recording]) -> float | None:
     if (ANSWER_COHERENCE - expected.mean()) / spread < 2 * ANSWER_DEVIATIONS:
         return None
     sure = float(((found.mean(axis=0) - expected.mean()) / spread).max())
-    told = sure >= ANSWER_DEVIATIONS or not any(_is_predictable(recording) for recording in recordings)
-    return sure if told else None
+    significant = sure >= ANSWER_DEVIATIONS or not any(_is_predictable(recording) for recording in recordings)
+    return sure if significant else None
 
 
 def _is_predictable(recording: Recording) -> bool:

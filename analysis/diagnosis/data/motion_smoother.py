@@ -42,10 +42,10 @@ def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its p
     """out (n, s): the states. advance (s, s), look (c, s), gain (s, c), back (s, s): see `motion_smoother`. pushed
     (n, s): what is added over the step that begins there. seen (n, c): NaN where nothing was."""
     n, s, c = out.shape[0], out.shape[1], look.shape[0]
-    foreseen = np.empty((n, s))
+    predicted = np.empty((n, s))
     state = out[0].copy()
     for k in range(n):
-        foreseen[k] = state
+        predicted[k] = state
         known = True
         for i in range(c):
             known = known and not np.isnan(seen[k, i])
@@ -54,7 +54,7 @@ def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its p
             for i in range(c):
                 total = seen[k, i]
                 for j in range(s):
-                    total -= look[i, j] * foreseen[k, j]
+                    total -= look[i, j] * predicted[k, j]
                 off[i] = total
             for j in range(s):
                 for i in range(c):
@@ -69,7 +69,7 @@ def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its p
         for j in range(s):
             total = 0.0
             for i in range(s):
-                total += back[j, i] * (out[k + 1, i] - foreseen[k + 1, i])
+                total += back[j, i] * (out[k + 1, i] - predicted[k + 1, i])
             state[j] = out[k, j] + total
         out[k] = state
 
@@ -143,26 +143,26 @@ def _smoother_gains(
     """Gains of the Kalman filter (s, c) and of the backward pass (s, s). look: observation matrix of channels in units
     of their noise. Solved in units in which all states have about the same size."""
     eye = np.eye(len(look))
-    scaled, seeing = advance * large[None, :] / large[:, None], look * large[None, :]
-    stirred = np.diag(walk / large**2) + _PROCESS_NOISE * np.eye(len(advance))
-    foreseen = _steady_covariance(scaled, seeing, stirred)
-    gain = np.linalg.solve(seeing @ foreseen @ seeing.T + eye, seeing @ foreseen).T
-    if np.abs(np.linalg.eigvals(scaled - scaled @ gain @ seeing)).max() >= 1:
+    scaled, observed = advance * large[None, :] / large[:, None], look * large[None, :]
+    process_noise = np.diag(walk / large**2) + _PROCESS_NOISE * np.eye(len(advance))
+    predicted = _steady_covariance(scaled, observed, process_noise)
+    gain = np.linalg.solve(observed @ predicted @ observed.T + eye, observed @ predicted).T
+    if np.abs(np.linalg.eigvals(scaled - scaled @ gain @ observed)).max() >= 1:
         raise np.linalg.LinAlgError("a filter for the motion is not stable in floating point")
-    found = foreseen - gain @ seeing @ foreseen
-    back = np.linalg.lstsq(foreseen, scaled @ found, rcond=1e-13)[0].T
+    found = predicted - gain @ observed @ predicted
+    back = np.linalg.lstsq(predicted, scaled @ found, rcond=1e-13)[0].T
     return gain * large[:, None], np.ascontiguousarray(back * large[:, None] / large[None, :])
 
 
-def _steady_covariance(advance: FloatArray, seeing: FloatArray, stirred: FloatArray) -> FloatArray:
+def _steady_covariance(advance: FloatArray, observed: FloatArray, process_noise: FloatArray) -> FloatArray:
     """Steady prediction covariance by the doubling algorithm (Anderson 1978; noise of the channels is 1). Raises
     numpy.linalg.LinAlgError where it does not converge."""
-    along, told, found = advance.T, seeing.T @ seeing, stirred
+    along, information, found = advance.T, observed.T @ observed, process_noise
     for _ in range(_DOUBLINGS):
-        through = np.linalg.solve(np.eye(len(along)) + told @ found, np.hstack([along, told]))
+        through = np.linalg.solve(np.eye(len(along)) + information @ found, np.hstack([along, information]))
         onward, other = through[:, : len(along)], through[:, len(along) :]
         more = along.T @ found @ onward
-        along, told, found = along @ onward, told + along @ other @ along.T, found + (more + more.T) / 2
+        along, information, found = along @ onward, information + along @ other @ along.T, found + (more + more.T) / 2
         if not np.isfinite(found).all():
             break
         if np.abs(more).max() <= 1e-10 * np.abs(found).max():

@@ -137,11 +137,11 @@ def _put_plainest_first(pairs: Sequence[tuple[FittedCandidate, Sum]]) -> list[tu
 
 def _count_numbers(of: Sum) -> int:
     """Free numbers of a sum, without exponents that are whole or half numbers."""
-    told = 0
+    count = 0
     for term in of.terms:
         plain = [k for k in term.exponents if abs(2 * term.numbers[k] - round(2 * term.numbers[k])) < 2 * LAW_NEAR]
-        told += 1 + len(term.numbers) - len(plain)
-    return told
+        count += 1 + len(term.numbers) - len(plain)
+    return count
 
 
 def _starting_fit(context: SearchContext, base: Fitted, each: Sum) -> Fitted | None:

@@ -99,7 +99,7 @@ def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Vie
     """One view per driven axis."""
     model, placed = tuning.tune(fitted.deviations), fitted.hypothesis.placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
-    seen = tuple(_filter_record(measure, record, told) for record, told in zip(measure.records, evidence, strict=True))
+    seen = tuple(_filter_record(measure, record, own) for record, own in zip(measure.records, evidence, strict=True))
     residual = np.concatenate(
         [each.filter_residuals(_zero_missing(left)) for each, left in zip(seen, fitted.residuals, strict=True)]
     )
@@ -164,48 +164,48 @@ def _parameter_force(
     return forces
 
 
-def _filter_record(measure: ErrorMeasure, record: Observed, told: Evidence) -> FilteredRecord:
-    rate_hz, n = told.sample_rate_hz, len(told.command)
+def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) -> FilteredRecord:
+    rate_hz, n = evidence.sample_rate_hz, len(evidence.command)
     length = next_fast_len(n + int(_SETTLING_S * rate_hz), real=True)
     lines = rfftfreq(length, 1 / rate_hz)
-    power = np.cumsum(np.sum(np.abs(rfft(told.command, length, axis=0)) ** 2, axis=1))
+    power = np.cumsum(np.sum(np.abs(rfft(evidence.command, length, axis=0)) ** 2, axis=1))
     last = int(1.1 * np.searchsorted(power, LAW_POWER_KEPT * power[-1])) + 8
     last = min(next_fast_len(last, real=True) + 1, len(lines))
-    through = _force_response(measure, told, lines[:last])
+    through = _force_response(measure, evidence, lines[:last])
     strength = np.sqrt(np.sum(np.abs(through) ** 2, axis=1))
     strength = np.maximum(strength, 1e-9 * strength.max(axis=0))
     share = 2 * (last - 1) / length
     # What a force does near the end is cut off there.
-    end = n - min(_settling_samples(measure, told), n // 4)
+    end = n - min(_settling_samples(measure, evidence), n // 4)
     kept = tuple(slice(int(a * share), int(min(b, end) * share)) for a, b in _blocks(record) if a < end)
-    return FilteredRecord(columns_of(told), told.axis_force, rate_hz, length, through, strength, kept)
+    return FilteredRecord(columns_of(evidence), evidence.axis_force, rate_hz, length, through, strength, kept)
 
 
-def _force_response(measure: ErrorMeasure, told: Evidence, lines: FloatArray) -> ComplexArray:
+def _force_response(measure: ErrorMeasure, evidence: Evidence, lines: FloatArray) -> ComplexArray:
     if isinstance(measure, PredictedForce):
-        m = told.command.shape[1]
+        m = evidence.command.shape[1]
         within = low_pass_gain(lines, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
         return np.asarray(-np.ones((len(lines), 1, 1)) * np.eye(m) * within / measure.unit[:, None], dtype=complex)
-    seen = axis_transfer(told.model, told.sample_rate_hz, lines)
+    seen = axis_transfer(evidence.model, evidence.sample_rate_hz, lines)
     c = len(measure.unit)
     return np.asarray(np.concatenate([seen.response, seen.position], axis=1)[:, :c] / measure.unit[:, None])
 
 
-def _settling_samples(measure: ErrorMeasure, told: Evidence) -> int:
+def _settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
     """Samples until the response to a force has decayed."""
     if isinstance(measure, PredictedForce):
         return 0
-    slowest = float(np.abs(np.linalg.eigvals(linear_steps(told.model, 1 / told.sample_rate_hz).advance)).max())
-    return int(SETTLED_CONSTANTS / -np.log(slowest)) if slowest < 1 else len(told.command)
+    slowest = float(np.abs(np.linalg.eigvals(linear_steps(evidence.model, 1 / evidence.sample_rate_hz).advance)).max())
+    return int(SETTLED_CONSTANTS / -np.log(slowest)) if slowest < 1 else len(evidence.command)
 
 
-def columns_of(told: Evidence) -> Columns:
-    m = told.command.shape[1]
-    found = {"t": np.arange(len(told.command)) / told.sample_rate_hz}
+def columns_of(evidence: Evidence) -> Columns:
+    m = evidence.command.shape[1]
+    found = {"t": np.arange(len(evidence.command)) / evidence.sample_rate_hz}
     for axis, name in zip(range(m), AXES, strict=False):
-        found[name] = told.axis_position[:, axis]
-        found[f"v{name}"] = told.axis_velocity[:, axis]
-        found[f"f{name}"] = told.command[:, axis]
+        found[name] = evidence.axis_position[:, axis]
+        found[f"v{name}"] = evidence.axis_velocity[:, axis]
+        found[f"f{name}"] = evidence.command[:, axis]
     return {name: np.ascontiguousarray(column) for name, column in found.items()}
 
 

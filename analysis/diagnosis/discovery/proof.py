@@ -125,13 +125,13 @@ def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
     for record in records:
         for segment in record.recording.segments:
             part = slice(segment.start, segment.stop)
-            told = _describe_segment(segment, record.command[part])
-            if not told[1]:
+            described = _describe_segment(segment, record.command[part])
+            if not described[1]:
                 continue
             if record.test[part].any():
-                sealed.append(told)
+                sealed.append(described)
             if (record.fit | record.choose)[part].any():
-                found.append(told)
+                found.append(described)
     if not found:
         return ()
     kinds, axes = {kind for kind, _, _ in found}, {driven for _, driven, _ in found}
@@ -184,7 +184,7 @@ def _range_of_motion(context: SearchContext, found: Explanation, names: set[str]
     for axis, letter in enumerate(letters):
         for name, unit in ((letter, length), (f"v{letter}", f"{length}/{time}")):
             if name in names:
-                of = [told.axis_velocity if name != letter else told.axis_position for told in evidence]
+                of = [record.axis_velocity if name != letter else record.axis_position for record in evidence]
                 most = max(float(np.abs(each[:, axis]).max()) for each in of)
                 said.append(f"{name} = ± {most:.3g} {unit}")
     return tuple(said)

@@ -70,9 +70,9 @@ def _channels(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[Ch
 
 def _gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
     size = np.maximum(np.sqrt(np.mean(y[mask] ** 2, axis=0)), np.finfo(float).tiny)
-    foreseen, measured = (f[mask] / size).ravel(), (y[mask] / size).ravel()
-    power = float(foreseen @ foreseen)
-    return float(foreseen @ measured) / power if np.isfinite(power) and power > 0 else None
+    predicted, measured = (f[mask] / size).ravel(), (y[mask] / size).ravel()
+    power = float(predicted @ predicted)
+    return float(predicted @ measured) / power if np.isfinite(power) and power > 0 else None
 
 
 def _share(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:

@@ -116,8 +116,8 @@ class Windows:
         # A fit may try a model that is unstable.
         with np.errstate(over="ignore", invalid="ignore"):
             free = _free_motion(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
-            told = np.isfinite(left).all() and np.isfinite(np.sum(free**2))
-        if not told:
+            finite = np.isfinite(left).all() and np.isfinite(np.sum(free**2))
+        if not finite:
             return left
         whole = n // length * length
         found = left.copy()

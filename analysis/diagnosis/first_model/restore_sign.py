@@ -65,8 +65,8 @@ def _find_signs(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, fl
     rows = _rows(command)
     stretches = _stretches(amount)
     late = np.concatenate([[0.0], np.cumsum(command)])
-    heard = [late[k + 1] - late[max(k + 1 - TAPS // 4, 0)] for k in range(len(command))]
-    best = _with_signs(amount, np.array(heard), stretches)
+    recent = [late[k + 1] - late[max(k + 1 - TAPS // 4, 0)] for k in range(len(command))]
+    best = _with_signs(amount, np.array(recent), stretches)
     for _ in range(ROUNDS):
         signed = _with_signs(amount, _predict_speed(rows, best), stretches)
         if np.array_equal(signed, best):
@@ -100,9 +100,9 @@ def _stretches(amount: FloatArray) -> list[slice]:
     return [slice(begin, end) for begin, end in itertools.pairwise(ends) if end > begin]
 
 
-def _with_signs(amount: FloatArray, foretold: FloatArray, stretches: list[slice]) -> FloatArray:
+def _with_signs(amount: FloatArray, predicted: FloatArray, stretches: list[slice]) -> FloatArray:
     found = amount.copy()
     for part in stretches:
-        if float(amount[part] @ foretold[part]) < 0:
+        if float(amount[part] @ predicted[part]) < 0:
             found[part] = -amount[part]
     return found

@@ -71,7 +71,7 @@ def contrast_of(
     )
 
 
-def foresees(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
+def predicts_clean(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
     errors = [prediction_error(recording, model, "all").as_it_is for recording in clean]
     return all(error is not None and error <= FORESEEN for error in errors)
 
