@@ -69,7 +69,7 @@ def _commands_hold_tone(evidence: Evidence, frequency_hz: float, least: float) -
         np.abs(turn @ evidence.command) / len(turn) / np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-300)
     )
     steady = [_steadiness(command, evidence, frequency_hz) for command in evidence.command.T]
-    return any(each > least and two > STEADY for each, two in zip(share, steady, strict=True))
+    return any(each > least and constancy > STEADY for each, constancy in zip(share, steady, strict=True))
 
 
 def _loudest_channel(residual: FloatArray, evidence: Evidence, line: int) -> int:

@@ -1,6 +1,6 @@
-"""From what is wanted at the handle to what is commanded.
+"""Equalization: from the acceleration wanted at the handle to the forces to be commanded.
 
 `lqr` (the finite-horizon tracker and its oracle) -> `feedforward` (one model, one table of accelerations) -> `bands`
-(three bands, two models), `learning` (corrected from what was measured), `compensation` (known nonlinear physics) ->
+(three bands, two models), `learning` (iterative learning control), `compensation` (known nonlinear physics) ->
 `workspace` (models of several places). Begin at `feedforward/feedforward.py`.
 """

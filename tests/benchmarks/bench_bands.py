@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
@@ -46,9 +46,9 @@ def impact() -> np.ndarray:
 
 def models(seed: int):
     """Middle, wide-band, measured response, rigid."""
-    narrow = transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 30.0, seed),))
+    narrow = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 30.0, seed),))
     middle = identify(narrow, IdentificationSettings(draws=0)).model
-    broad = transfer_estimate((synthetic.sweeps(plants, 1.0, 500.0, 30.0, seed),))
+    broad = estimate_transfer((synthetic.sweeps(plants, 1.0, 500.0, 30.0, seed),))
     wide = identify(broad, IdentificationSettings(band_hz=(5.0, 450.0), order=40, draws=0)).model
     lines = broad.within(1.5, 4.0)
     rigid = fit_rigid_model(lines.frequency_hz, lines.response, plants.RATE_HZ)

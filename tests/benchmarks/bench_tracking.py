@@ -15,7 +15,7 @@ from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.riccati import backward_gains
 from equalizer.tracking.lqr.rotation import normal_basis, rotation_basis
 from equalizer.tracking.lqr.toeplitz import least_squares_forces
-from equalizer.tracking.lqr.tracking_problem import TrackingProblem, TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingProblem, TrackingWeights, make_tracking_problem
 from equalizer.tracking.lqr.turning import TurningTransient, turning_transient
 
 ORDER, SAMPLES = 26, 500
@@ -38,7 +38,7 @@ def problem_of(order: int) -> TrackingProblem:
     model = IdentifiedModel(
         A, draw((order, 3)), draw((3, order)), draw((3, 3)), 1000.0, (5.0, 35.0), "N", "m/s^2", *names
     )
-    return augmented(model, TrackingWeights())
+    return make_tracking_problem(model, TrackingWeights())
 
 
 def plain(problem: TrackingProblem, wanted: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.identify import identify
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
@@ -54,7 +54,7 @@ def equalized(hand: bool, seed: int):
     device = opened(protocol, hand, seed)
     try:
         recordings = [recorded(device, piece) for piece in pieces(protocol, RATE_HZ) if piece.segment.role == "fit"]
-        equalizer = ModelEqualizer(identify(transfer_estimate(recordings)).model)
+        equalizer = ModelEqualizer(identify(estimate_transfer(recordings)).model)
         return quality(np.stack([played(device, equalizer, axis) for axis in range(3)], axis=2))
     finally:
         device.close()

@@ -20,7 +20,7 @@ from analysis.diagnosis.first_model.model_structures import (
     fit_structure,
 )
 from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
-from equalizer.identification.mechanical.mechanical_lines import roles, segment_lines
+from equalizer.identification.mechanical.mechanical_lines import segment_lines, split_fit_and_test
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 

@@ -17,7 +17,7 @@ from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wan
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
-from equalizer.identification.mechanical.open_tolerance import opened
+from equalizer.identification.mechanical.open_tolerance import widen_tolerance
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 
@@ -96,7 +96,10 @@ def fit_first_linear_model(
         "what it could take on itself, such as friction at one level as damping, is not missing from it any more, and "
         "is not named."
     )
-    return opened(fit.model), (said, *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks))
+    return widen_tolerance(fit.model), (
+        said,
+        *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks),
+    )
 
 
 def _require_no_weight(recordings: Sequence[Recording]) -> None:

@@ -15,7 +15,7 @@ from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, join
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
-from equalizer.identification.mechanical.open_tolerance import opened
+from equalizer.identification.mechanical.open_tolerance import widen_tolerance
 from equalizer.plant.effect_vocabulary import matrix_unit
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance, with_units_of
@@ -143,7 +143,7 @@ def fit_modal_structure(
     remarks = (*(f"{text[:1].upper()}{text[1:].rstrip('.')}." for text in fit.remarks),)
     channels = recordings[0].response.channels
     first = recordings[0]
-    model = with_units_of(opened(fit.model), first.command.units, first.response.units)
+    model = with_units_of(widen_tolerance(fit.model), first.command.units, first.response.units)
     return StructureFit(
         kind,
         model,
@@ -201,7 +201,7 @@ def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalMo
         NAME.format(kind), given.recording.response.quantities[0], mass, damping, stiffness, eye, eye,
         tolerance=Tolerance(own[0], own[1], own[2], None), rotational=given.rotational,
     )  # fmt: skip
-    wide = opened(model)
+    wide = widen_tolerance(model)
     assert wide.tolerance is not None
     sizes = wide.tolerance
     stated = Tolerance(sizes.mass_kg, sizes.damping_n_s_per_m or None, sizes.stiffness_n_per_m or None, None)

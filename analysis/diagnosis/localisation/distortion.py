@@ -14,7 +14,7 @@ from analysis.diagnosis.localisation.segment_spectra import SegmentSpectrum, seg
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.noise.periods import Periods, period_spectra, settled_periods
 from analysis.diagnosis.types import Mask
-from equalizer.identification.frequency_response.experiments import instrument_of
+from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 

@@ -11,7 +11,7 @@ from analysis.diagnosis.data.frequency_cells import Band, find_driven_inputs, li
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, mean_spectrum, settled_periods, spectra
 from analysis.diagnosis.types import Mask
-from equalizer.identification.frequency_response.experiments import instrument_of
+from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
@@ -115,11 +115,11 @@ def _of_windows(
     starts = [
         s for s in range(segment.start, segment.stop - length + 1, max(length // 2, 1)) if whole[s : s + length].all()
     ]
-    command = instrument_of(recording)[segment.start : segment.stop]
+    command = instrument_signal(recording)[segment.start : segment.stop]
     if length < 16 or not starts or not np.isfinite(command).all():
         return []
     lines_hz: FloatArray = np.arange(1.0, (length + 1) // 2) * (recording.sample_rate_hz / length)
-    excitation = np.sum(_window_power(instrument_of(recording), starts, length), axis=2)
+    excitation = np.sum(_window_power(instrument_signal(recording), starts, length), axis=2)
     response = _window_power(seen.measured, starts, length)
     residual = _window_power(left, starts, length)
     noise = np.broadcast_to(_noise_power(seen, lines_hz, 1) / length, response.shape)

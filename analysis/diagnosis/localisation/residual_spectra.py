@@ -11,7 +11,7 @@ from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.noise.periods import Periods, period_spectra, settled_periods
 from analysis.diagnosis.types import Mask
-from equalizer.identification.frequency_response.experiments import instrument_of
+from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray

@@ -86,8 +86,8 @@ def _mean_and_errors(
     answer: ComplexArray, floor: FloatArray, rounding: FloatArray
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     looks = len(answer)
-    spread = spread_over_looks(answer) if looks > 1 else floor
-    larger = np.maximum(floor, over_neighbours(spread, _SMOOTHED_LINES))
+    spread = period_variance(answer) if looks > 1 else floor
+    larger = np.maximum(floor, smooth_over_lines(spread, _SMOOTHED_LINES))
     return answer.mean(axis=0), larger / looks + rounding, spread
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.identification.frequency_response.experiments import instrument_of
-from equalizer.identification.frequency_response.noise_floor import SETTLING_S, over_neighbours
+from equalizer.identification.frequency_response.experiments import instrument_signal
+from equalizer.identification.frequency_response.noise_floor import SETTLING_S, smooth_over_lines
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -70,7 +70,7 @@ def rest_noise(recording: Recording, samples: FloatArray, frequency_hz: FloatArr
     if not mean.any(axis=0).all():
         return None
     mean[:2] = mean[2:3]
-    smooth = over_neighbours(mean, 9)
+    smooth = smooth_over_lines(mean, 9)
     density = np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)
     # Windows overlap by half and a Hann window spreads each line over its neighbours: about half of all count.
     return density, float(len(powers) * length / 2)
@@ -81,7 +81,7 @@ def quiet_band_noise(
 ) -> tuple[FloatArray, float] | None:
     """White density (lines, channels) as strong as the median line above all that is driven, and its degrees of
     freedom; None where no band is left above. The median, so that the lines of harmonics do not count."""
-    instrument = instrument_of(recording)
+    instrument = instrument_signal(recording)
     start, stop = _longest_whole(np.hstack([samples, instrument]))
     samples, command = samples[start:stop], instrument[start:stop]
     if len(samples) < 2 * _LEAST_LINES:
@@ -90,7 +90,7 @@ def quiet_band_noise(
     window = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n))
     lines_hz: FloatArray = np.arange(1.0, n // 2) * (recording.sample_rate_hz / n)
     driven = np.abs(np.fft.rfft((command - command.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2
-    smooth = over_neighbours(driven.sum(axis=1, keepdims=True), max(9, n // 500))[:, 0]
+    smooth = smooth_over_lines(driven.sum(axis=1, keepdims=True), max(9, n // 500))[:, 0]
     if smooth.max() == 0:
         return None
     highest_hz = float(lines_hz[np.flatnonzero(smooth > _SILENT * smooth.max())[-1]])
@@ -114,7 +114,7 @@ def _longest_whole(samples: FloatArray) -> tuple[int, int]:
 
 def _rests(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
     """Stretches without excitation, settled. Recordings begin at rest."""
-    driven = ~(instrument_of(recording) == 0).all(axis=1)
+    driven = ~(instrument_signal(recording) == 0).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[True], driven, [True]]).astype(np.int8)))
     settling = round(settling_s * recording.sample_rate_hz)
     rests = zip(edges[::2], edges[1::2], strict=True)

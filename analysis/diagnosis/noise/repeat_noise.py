@@ -14,7 +14,7 @@ from analysis.diagnosis.noise.periods import Periods, period_samples, period_spe
 from analysis.diagnosis.noise.quiet_noise import fast_noise_at_rest
 from analysis.diagnosis.noise.rounding import rounding_step, undo_rounding
 from analysis.diagnosis.types import Mask
-from equalizer.identification.frequency_response.noise_floor import over_neighbours, spread_over_looks
+from equalizer.identification.frequency_response.noise_floor import period_variance, smooth_over_lines
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -41,7 +41,7 @@ def repeat_noise(
     freedom_pooled = weights.sum(axis=0)
     varies = np.asarray(moved & ~counted)
     floor, loud = _no_more_than_rest(recording, samples, pooled, freedom_pooled, np.asarray(varies.any(axis=0)))
-    smooth = over_neighbours(floor, _SMOOTHED_LINES)
+    smooth = smooth_over_lines(floor, _SMOOTHED_LINES)
     smooth *= floor.mean(axis=0) / np.maximum(smooth.mean(axis=0), _TINY)
     whole, rounding = with_rounding(smooth, samples)
     segments = tuple(

@@ -1,4 +1,4 @@
-"""Measured frequency responses, and what can be read from them without a parametric model.
+"""Nonparametric frequency responses: their estimate from recordings, and their resonances and coupling.
 
 `experiments` (periods and windows of a recording) -> `noise_floor` -> `shared_lines` -> `transfer_estimate`
 (`reliable_lines` strikes out) -> `frequency_response`, the value that all others take. Smoothed by `local_polynomial`

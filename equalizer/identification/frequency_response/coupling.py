@@ -1,4 +1,4 @@
-"""How much a response mixes its axes."""
+"""Cross-axis coupling of a frequency response."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from equalizer.signals.signal import FloatArray
 
 
 def worst_coupling(response: ComplexArray) -> FloatArray:
-    """What goes across over what goes along when one axis is pushed, for the worst axis.
+    """Off-axis over on-axis response when one axis is driven, for the worst axis.
 
     response: (..., axes, axes), inputs and outputs in the same frame. Returns (...). Raises ValueError if not square.
     """

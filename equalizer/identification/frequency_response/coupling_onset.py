@@ -1,4 +1,4 @@
-"""The frequency from which pushing one axis moves the others, by a stated rule, with an interval.
+"""Coupling onset: the frequency from which driving one axis moves the others, by a stated rule, with its interval.
 
 Rule: the lowest frequency at which the worst coupling of the smoothed response, averaged over a twelfth of an octave,
 passes a quarter (-12 dB). A single line above is noise; a resonance like the published one near 11 Hz, which couples
@@ -17,8 +17,8 @@ from equalizer.identification.frequency_response.local_polynomial import LocalPo
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
-_LOOKED_BEYOND = 1.5
-"""Times the onset: how far the resampled curves are computed."""
+_HIGHEST_RESAMPLED = 1.5
+"""Times the onset: up to where the resampled curves are computed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,39 +62,45 @@ def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -
     require_equal_axes(response.response)
     lines = response.of_lines(response.reliable)
     local = LocalPolynomial.over(lines, rule.neighbours, 2)
-    smooth = local.of(lines.response)
-    told = _told(lines, local, smooth, rule)
+    smooth = local.apply(lines.response)
+    told = _is_above_noise(lines, local, smooth, rule)
     if not told.any():
         raise ValueError(
             f"coupling cannot be judged: at no line is the noise small against {100 * rule.threshold:g} % of the "
             "response; record more periods, or with a stronger excitation"
         )
-    found = _onset(lines.frequency_hz[told], worst_coupling(smooth[told]), rule)
+    found = _find_onset(lines.frequency_hz[told], worst_coupling(smooth[told]), rule)
     if found is None:
         return CouplingOnset(None, None, False, rule.threshold, rule.sentence)
-    near = lines.frequency_hz <= max(_LOOKED_BEYOND * found, lines.frequency_hz[2 * rule.neighbours])
+    near = lines.frequency_hz <= max(_HIGHEST_RESAMPLED * found, lines.frequency_hz[2 * rule.neighbours])
     known = bool(np.isfinite(lines.noise_variance).all())
-    drawn = _resampled(lines.of_lines(near), smooth[near], told[near], rule) if known else None
-    interval = None if drawn is None else _with_resolution(_bias_corrected(found, drawn), lines.frequency_hz, found)
+    drawn = _bootstrap_onsets(lines.of_lines(near), smooth[near], told[near], rule) if known else None
+    interval = (
+        None
+        if drawn is None
+        else _widen_by_resolution(_bias_corrected_interval(found, drawn), lines.frequency_hz, found)
+    )
     return CouplingOnset(found, interval, bool(found == lines.frequency_hz[told][0]), rule.threshold, rule.sentence)
 
 
-def _told(lines: FrequencyResponse, local: LocalPolynomial, smooth: ComplexArray, rule: OnsetRule) -> BoolArray:
-    """(lines,): where the noise, smoothed, is below a quarter of the threshold. Elsewhere noise alone may pass it."""
+def _is_above_noise(
+    lines: FrequencyResponse, local: LocalPolynomial, smooth: ComplexArray, rule: OnsetRule
+) -> BoolArray:
+    """(lines,): where the smoothed noise is below a quarter of the threshold. Elsewhere noise alone may pass it."""
     noise = np.sqrt(np.nan_to_num(local.power(lines.noise_variance)))
     along = np.maximum(np.einsum("lii->li", np.abs(smooth)), np.finfo(np.float64).tiny)
     told: BoolArray = (np.linalg.norm(noise, axis=1) / along).max(axis=1) < rule.threshold / 4
     return told
 
 
-def _onset(frequency_hz: FloatArray, coupling: FloatArray, rule: OnsetRule) -> float | None:
-    mean = _averaged(frequency_hz, coupling, rule.octaves)
+def _find_onset(frequency_hz: FloatArray, coupling: FloatArray, rule: OnsetRule) -> float | None:
+    mean = _octave_average(frequency_hz, coupling, rule.octaves)
     above = np.flatnonzero(mean > rule.threshold)
-    return _crossing(frequency_hz, mean, int(above[0]), rule.threshold) if len(above) else None
+    return _interpolate_crossing(frequency_hz, mean, int(above[0]), rule.threshold) if len(above) else None
 
 
-def _averaged(frequency_hz: FloatArray, coupling: FloatArray, octaves: float) -> FloatArray:
-    """Over the lines within half of `octaves` to either side."""
+def _octave_average(frequency_hz: FloatArray, coupling: FloatArray, octaves: float) -> FloatArray:
+    """Running mean over the lines within half of `octaves` to either side."""
     first = np.searchsorted(frequency_hz, frequency_hz * 2 ** (-octaves / 2))
     after = np.searchsorted(frequency_hz, frequency_hz * 2 ** (octaves / 2), side="right")
     total = np.concatenate([[0.0], np.cumsum(coupling)])
@@ -102,8 +108,8 @@ def _averaged(frequency_hz: FloatArray, coupling: FloatArray, octaves: float) ->
     return mean
 
 
-def _crossing(frequency_hz: FloatArray, coupling: FloatArray, first: int, threshold: float) -> float:
-    """Between the last line below and the first above."""
+def _interpolate_crossing(frequency_hz: FloatArray, coupling: FloatArray, first: int, threshold: float) -> float:
+    """Frequency of the crossing, interpolated between the last line below and the first above."""
     if first == 0:
         return float(frequency_hz[0])
     below, above = coupling[first - 1], coupling[first]
@@ -111,28 +117,30 @@ def _crossing(frequency_hz: FloatArray, coupling: FloatArray, first: int, thresh
     return float(frequency_hz[first - 1] + share * (frequency_hz[first] - frequency_hz[first - 1]))
 
 
-def _resampled(lines: FrequencyResponse, smooth: ComplexArray, told: BoolArray, rule: OnsetRule) -> FloatArray:
-    """(draws,): noise of the measured size is added to the smoothed curve, smoothed again and judged again."""
+def _bootstrap_onsets(lines: FrequencyResponse, smooth: ComplexArray, told: BoolArray, rule: OnsetRule) -> FloatArray:
+    """(draws,): onsets of a parametric bootstrap: noise of the measured size is added to the smoothed curve."""
     local = LocalPolynomial.over(lines, rule.neighbours, 2)
     size = np.sqrt(lines.noise_variance / 2)
     generator = np.random.default_rng(rule.seed)
     onsets = []
     for _ in range(rule.draws):
         noise = generator.standard_normal((2, *size.shape)) * size
-        drawn = smooth + local.of(noise[0] + 1j * noise[1])
-        onset = _onset(lines.frequency_hz[told], worst_coupling(drawn[told]), rule)
+        drawn = smooth + local.apply(noise[0] + 1j * noise[1])
+        onset = _find_onset(lines.frequency_hz[told], worst_coupling(drawn[told]), rule)
         onsets.append(float(lines.frequency_hz[-1]) if onset is None else onset)
     return np.array(onsets)
 
 
-def _with_resolution(interval_hz: tuple[float, float], frequency_hz: FloatArray, found: float) -> tuple[float, float]:
+def _widen_by_resolution(
+    interval_hz: tuple[float, float], frequency_hz: FloatArray, found: float
+) -> tuple[float, float]:
     at = int(np.clip(np.searchsorted(frequency_hz, found), 1, len(frequency_hz) - 1))
     half = float(frequency_hz[at] - frequency_hz[at - 1]) / 2
     return interval_hz[0] - half, interval_hz[1] + half
 
 
-def _bias_corrected(found: float, onsets: FloatArray) -> tuple[float, float]:
-    """Percentiles, shifted for what noise does to the estimate: it lets a curve pass earlier (Efron 1981)."""
+def _bias_corrected_interval(found: float, onsets: FloatArray) -> tuple[float, float]:
+    """Bias-corrected percentile interval (Efron 1981), because noise lets a curve pass the threshold earlier."""
     below = np.clip(np.mean(onsets < found), 0.5 / len(onsets), 1 - 0.5 / len(onsets))
     low, high = np.quantile(onsets, ndtr(2 * ndtri(below) + ndtri(np.array([0.025, 0.975]))))
     return float(low), float(high)

@@ -1,7 +1,8 @@
-"""What a recording holds of repeated looks at the plant: spectra of whole periods, or of windows where nothing repeats.
+"""Experiments in a recording: spectra of whole periods, or of windows where nothing repeats.
 
-An experiment is one excitation, seen one or more times. Spectra are rfft / length without the mean and without half the
-rate, so that white noise of variance s² has s² / length per line, whatever window was laid over it.
+An experiment is one excitation with one or more looks, the periods over which it repeats. Spectra are rfft / length
+without the lines at zero and at half the rate, so that white noise of variance s² has s² / length per line, with any
+window.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from equalizer.signals.signal import FloatArray
 
 BROADBAND_KINDS = ("sweep", "multisine", "noise", "binary")
 TRANSIENT_S = 5.0
-"""Of a first period. Ten time constants of the slowest pole that a model may have: e^-10 of the transient is left."""
+"""Length of a transient: ten time constants of the slowest pole that a model may have, which leaves e^-10 of it."""
 _DRIVEN_KINDS = (*BROADBAND_KINDS, "sine", "slow", "step", "impact")
 
 
@@ -38,7 +39,7 @@ class Experiment:
 
     @property
     def independent_looks(self) -> float:
-        """So many would have a mean as good."""
+        """Number of independent looks whose mean would have the same variance."""
         if not self.borrowed:
             return float(self.looks)
         return 1 / ((1 - self.borrowed) / self.looks + self.borrowed / (self.looks - 1))
@@ -52,20 +53,20 @@ class Experiment:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Looks:
-    """All experiments, and what had to be done to have them."""
+class ExperimentSet:
+    """All experiments of some recordings, with remarks on what was left out."""
 
     experiments: tuple[Experiment, ...]
     remarks: tuple[str, ...]
     periodic: bool
 
 
-def instrument_of(recording: Recording) -> FloatArray:
-    """(n, inputs)"""
+def instrument_signal(recording: Recording) -> FloatArray:
+    """(n, inputs): the instrument of the estimate, which is the excitation where it was recorded, else the command."""
     return (recording.command if recording.excitation is None else recording.excitation).samples
 
 
-def periodic_looks(recordings: Sequence[Recording]) -> Looks:
+def periodic_experiments(recordings: Sequence[Recording]) -> ExperimentSet:
     """Whole periods of every periodic broadband segment that is not kept for testing. Of the first, the transient is
     left out and what comes after it is used, unless it is the only one; periods with missing samples are dropped."""
     experiments: list[Experiment] = []
@@ -80,35 +81,37 @@ def periodic_looks(recordings: Sequence[Recording]) -> Looks:
             counted = [start for start in whole if start != segment.start] or whole
             alone += counted == [segment.start]
             if counted:
-                one = _experiment(recording, counted, segment.period, np.ones(segment.period))
+                experiment = _make_experiment(recording, counted, segment.period, np.ones(segment.period))
                 over = round(TRANSIENT_S * recording.sample_rate_hz)
                 first_too = segment.start in whole and counted != whole and segment.period >= 2 * over
-                experiments.append(_with_first(recording, one, counted, segment.start, over) if first_too else one)
+                experiments.append(
+                    _add_first_period(recording, experiment, counted, segment.start, over) if first_too else experiment
+                )
     remarks = []
     if alone:
-        remarks.append(f"{_segments(alone)} had one usable period only: it was kept, with its transient.")
+        remarks.append(f"{_count_segments(alone)} had one usable period only: it was kept, with its transient.")
     if gaps:
-        remarks.append(f"{_periods(gaps)} left out, because samples are missing in it.")
-    return Looks(tuple(experiments), tuple(remarks), periodic=True)
+        remarks.append(f"{_count_periods(gaps)} left out, because samples are missing in it.")
+    return ExperimentSet(tuple(experiments), tuple(remarks), periodic=True)
 
 
-def windowed_looks(recordings: Sequence[Recording], window_s: float) -> Looks:
+def window_experiments(recordings: Sequence[Recording], window_s: float) -> ExperimentSet:
     """Hann windows that overlap by half, over everything that drives the plant."""
     experiments: list[Experiment] = []
     for recording in recordings:
         length = max(8, round(window_s * recording.sample_rate_hz))
         hann = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length)
-        for segment in _driven(recording):
+        for segment in _driven_segments(recording):
             starts = range(segment.start, segment.stop - length + 1, length // 2)
             whole = [start for start in starts if _is_whole(recording, start, length)]
             window = hann / np.sqrt(np.mean(hann**2))
             # Unlike periods, windows are not alike: each is an experiment of its own.
-            experiments += [_experiment(recording, [start], length, window) for start in whole]
+            experiments += [_make_experiment(recording, [start], length, window) for start in whole]
     remark = f"No periodic excitation: averaged over Hann windows of {window_s:g} s (H1), which blur narrow resonances."
-    return Looks(tuple(experiments), (remark,), periodic=False)
+    return ExperimentSet(tuple(experiments), (remark,), periodic=False)
 
 
-def _driven(recording: Recording) -> list[Segment]:
+def _driven_segments(recording: Recording) -> list[Segment]:
     if not recording.segments:
         return [Segment(0, len(recording), "noise")]
     return [segment for segment in recording.segments if segment.kind in _DRIVEN_KINDS and segment.role != "test"]
@@ -116,11 +119,11 @@ def _driven(recording: Recording) -> list[Segment]:
 
 def _is_whole(recording: Recording, start: int, length: int) -> bool:
     there = slice(start, start + length)
-    signals = (recording.command.samples, recording.response.samples, instrument_of(recording))
+    signals = (recording.command.samples, recording.response.samples, instrument_signal(recording))
     return all(bool(np.isfinite(samples[there]).all()) for samples in signals)
 
 
-def _experiment(recording: Recording, starts: Sequence[int], length: int, window: FloatArray) -> Experiment:
+def _make_experiment(recording: Recording, starts: Sequence[int], length: int, window: FloatArray) -> Experiment:
     def spectra(samples: FloatArray) -> ComplexArray:
         looks = np.stack([samples[start : start + length] for start in starts])
         looks = (looks - looks.mean(axis=1, keepdims=True)) * window[:, None]
@@ -130,15 +133,15 @@ def _experiment(recording: Recording, starts: Sequence[int], length: int, window
         length,
         spectra(recording.command.samples),
         spectra(recording.response.samples),
-        spectra(instrument_of(recording)),
+        spectra(instrument_signal(recording)),
     )
 
 
-def _with_first(
+def _add_first_period(
     recording: Recording, experiment: Experiment, counted: Sequence[int], first: int, over: int
 ) -> Experiment:
-    """The first period as one more look. Until its transient is over it borrows the mean of the others: linear as the
-    plant is, command and response then are those of the steady state throughout."""
+    """Add the first period as one more look. During its transient it takes the mean of the others: for a linear plant,
+    command and response are then those of the steady state throughout."""
 
     def spectra(samples: FloatArray) -> ComplexArray:
         look = samples[first : first + experiment.length].copy()
@@ -150,14 +153,14 @@ def _with_first(
         experiment.length,
         np.concatenate([experiment.command, spectra(recording.command.samples)]),
         np.concatenate([experiment.response, spectra(recording.response.samples)]),
-        np.concatenate([experiment.instrument, spectra(instrument_of(recording))]),
+        np.concatenate([experiment.instrument, spectra(instrument_signal(recording))]),
         borrowed=over / experiment.length,
     )
 
 
-def _segments(count: int) -> str:
+def _count_segments(count: int) -> str:
     return "One segment" if count == 1 else f"{count} segments"
 
 
-def _periods(count: int) -> str:
+def _count_periods(count: int) -> str:
     return "One period was" if count == 1 else f"{count} periods were"

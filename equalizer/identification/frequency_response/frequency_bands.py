@@ -1,4 +1,4 @@
-"""Which way of driving the device suits which frequencies (the published figure 1)."""
+"""Frequency bands and the control method that suits each (the published figure 1)."""
 
 from dataclasses import dataclass
 

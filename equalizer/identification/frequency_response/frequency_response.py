@@ -1,4 +1,4 @@
-"""A measured frequency response: what came out per what entered, line by line, with what is known of its error."""
+"""A measured frequency response, line by line, with its noise variance and coherence."""
 
 from dataclasses import dataclass
 

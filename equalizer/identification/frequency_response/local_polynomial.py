@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalPolynomial:
-    """What each line takes from its neighbours: fixed by the lines and their weights, linear in the values."""
+    """Smoothing weights of each line's neighbours: fixed by the lines and their noise, linear in the values."""
 
     window: npt.NDArray[np.int64]
     """(lines, taken)"""
@@ -27,7 +27,7 @@ class LocalPolynomial:
 
     @classmethod
     def over(cls, response: FrequencyResponse, neighbours: int, order: int) -> Self:
-        """Raises ValueError where there are fewer lines than a polynomial takes."""
+        """Weights for a response's lines. Raises ValueError where there are fewer lines than a polynomial takes."""
         taken, lines = 2 * neighbours + 1, len(response)
         if order < 0 or taken < order + 2:
             raise ValueError(f"a polynomial of order {order} needs more than {taken} lines; let neighbours be larger")
@@ -39,21 +39,21 @@ class LocalPolynomial:
         fitted = np.linalg.pinv(powers * weight[:, :, None])[:, 0, :] * weight
         return cls(window, fitted, order)
 
-    def of(self, values: ComplexArray) -> ComplexArray:
-        """values: (lines, ...)."""
+    def apply(self, values: ComplexArray) -> ComplexArray:
+        """Smoothed values (lines, ...)."""
         smooth: ComplexArray = np.einsum("lk,lk...->l...", self.rows, values[self.window])
         return smooth
 
     def power(self, powers: FloatArray) -> FloatArray:
-        """What becomes of the power of independent errors. powers: (lines, ...)."""
+        """Variance after smoothing of independent errors with variances `powers` (lines, ...)."""
         smooth: FloatArray = np.einsum("lk,lk...->l...", self.rows**2, powers[self.window])
         return smooth
 
 
-def smoothed(
+def smooth_response(
     response: FrequencyResponse, neighbours: int = 8, order: int = 2, about: ComplexArray | None = None
 ) -> FrequencyResponse:
-    """Each line from itself and `neighbours` lines on either side; near the ends from as many, further on one side.
+    """Smooth each line over itself and `neighbours` lines on either side; near the ends over as many, one-sided.
 
     about: (lines, outputs, inputs), of a model that is nearly right: only the difference to it is averaged, so that a
     resonance narrower than the neighbourhood is not blunted.
@@ -65,7 +65,7 @@ def smoothed(
     local = LocalPolynomial.over(response, neighbours, order)
     known = 0.0 if about is None else about
     rest = replace(response, response=np.asarray(response.response - known, dtype=np.complex128))
-    smooth = np.asarray(local.of(rest.response) + known, dtype=np.complex128)
+    smooth = np.asarray(local.apply(rest.response) + known, dtype=np.complex128)
     noise = local.power(response.noise_variance)
     scatter = _scatter(rest, local) * np.sum(local.rows**2, axis=1)[:, None, None]
     remark = f"Smoothed: order {order} over {2 * neighbours + 1} lines."
@@ -75,7 +75,7 @@ def smoothed(
 
 
 def _weights(response: FrequencyResponse) -> FloatArray:
-    """(lines,): of the lines against each other, by their noise; alike where it is not known."""
+    """(lines,): relative weights by the lines' noise; equal where it is not known."""
     power = response.noise_variance.sum(axis=(1, 2))
     if not (np.isfinite(power) & (power > 0)).all():
         return np.ones(len(response))
@@ -84,7 +84,7 @@ def _weights(response: FrequencyResponse) -> FloatArray:
 
 
 def _powers(frequency_hz: FloatArray, window: npt.NDArray[np.int64], order: int) -> FloatArray:
-    """(lines, taken, order + 1), of the distance from the line itself."""
+    """(lines, taken, order + 1): powers of the distance from the line itself."""
     away = frequency_hz[window] - frequency_hz[:, None]
     powers: FloatArray = (away / np.abs(away).max(axis=1, keepdims=True))[:, :, None] ** np.arange(order + 1)
     return powers

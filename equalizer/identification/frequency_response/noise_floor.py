@@ -1,10 +1,10 @@
-"""How large the errors of an estimate are: from periods that should be alike, from rest, or from line to line."""
+"""Noise of a frequency response estimate: from differences between periods, from rest, or from scatter of lines."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from equalizer.identification.frequency_response.experiments import instrument_of
+from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -16,15 +16,16 @@ _THIRD_DIFFERENCE_GAIN = 20.0
 """1² + 3² + 3² + 1²: how much larger the variance of a third difference is than that of a line."""
 
 
-def spread_over_looks(residuals: ComplexArray) -> FloatArray:
-    """Noise power of one look, from what differs between looks. residuals: (looks, lines, outputs), looks >= 2."""
+def period_variance(residuals: ComplexArray) -> FloatArray:
+    """Noise power of a single look (lines, outputs): sample variance over looks. residuals: (looks, lines, outputs),
+    looks >= 2."""
     around = residuals - residuals.mean(axis=0)
     power: FloatArray = np.sum(np.abs(around) ** 2, axis=0) / (len(residuals) - 1)
     return power
 
 
-def scatter_over_lines(response: ComplexArray) -> FloatArray:
-    """Expected |error|² per entry, from what neighbouring lines do not share: a smooth curve has no third difference.
+def line_scatter(response: ComplexArray) -> FloatArray:
+    """Expected |error|² per entry, from third differences between neighbouring lines, which a smooth curve lacks.
 
     Catches what repeats exactly, too (friction in a sweep). Where resonances are as narrow as the lines are apart it
     is too large. response: (lines, ...). NaN everywhere for less than five lines.
@@ -37,7 +38,7 @@ def scatter_over_lines(response: ComplexArray) -> FloatArray:
     return padded
 
 
-def over_neighbours(power: FloatArray, lines: int) -> FloatArray:
+def smooth_over_lines(power: FloatArray, lines: int) -> FloatArray:
     """Running mean over an odd number of lines. power: (lines, ...)."""
     if not len(power):
         return power
@@ -68,13 +69,13 @@ def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> Flo
     mean = np.mean(spectra, axis=0)
     # Next to the mean, a window of half a second sees the drift that was taken out of it.
     mean[:2] = mean[2:3]
-    smooth = over_neighbours(mean, 9)
+    smooth = smooth_over_lines(mean, 9)
     return np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)
 
 
 def _rests(recording: Recording) -> list[tuple[int, int]]:
-    """Stretches without excitation, settled. Recordings begin at rest."""
-    driven = ~(instrument_of(recording) == 0).all(axis=1)
+    """Intervals (start, stop) without excitation, after settling. Recordings begin at rest."""
+    driven = ~(instrument_signal(recording) == 0).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[True], driven, [True]]).astype(np.int8)))
     settling = round(SETTLING_S * recording.sample_rate_hz)
     rests = zip(edges[::2], edges[1::2], strict=True)

@@ -1,4 +1,4 @@
-"""Neighbouring lines taken together, in bins of equal width in octaves."""
+"""Averages of a frequency response over bins of equal width in octaves."""
 
 from dataclasses import dataclass
 
@@ -28,7 +28,7 @@ class OctaveBins:
 
 
 def octave_bins(response: FrequencyResponse, octaves: float) -> OctaveBins:
-    """octaves: width of a bin. The response must have lines."""
+    """Average a response over bins of this width in octaves. It must have lines."""
     number = np.floor(np.log2(response.frequency_hz / response.frequency_hz[0]) / octaves).astype(np.int64)
     _, starts, counts = np.unique(number, return_index=True, return_counts=True)
     lines = counts.astype(np.float64)

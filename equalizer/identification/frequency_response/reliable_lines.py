@@ -1,4 +1,4 @@
-"""Which lines of an estimate should not be used, and why, in sentences."""
+"""Reliability of the lines of an estimate: which should not be used, and why, in sentences."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Judgement:
 def judge_lines(
     frequency_hz: FloatArray, excited: BoolArray, coherence: FloatArray, spring_hz: float, rules: ReliabilityRules
 ) -> Judgement:
-    """excited: (lines,), by `excited_lines`. coherence: (lines, outputs). spring_hz: 0 = no spring."""
+    """Judge each line. excited: (lines,), by `excited_lines`. coherence: (lines, outputs). spring_hz: 0 = no spring."""
     remarks = []
     stiff = frequency_hz < rules.spring_margin * spring_hz
     if stiff.any():
@@ -57,7 +57,7 @@ def judge_lines(
 
 
 def excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_energy_db: float) -> BoolArray:
-    """Where the experiments with energy point in as many directions as there are inputs.
+    """Lines at which the excitations span as many directions as there are inputs.
 
     excitation: (lines, inputs, experiments). Returns (lines,).
     """
@@ -72,7 +72,7 @@ def excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_ener
 
 
 def spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
-    """The stiffest virtual spring that any recording names; 0 where none does."""
+    """Highest natural frequency of a virtual spring named in the recordings' meta data; 0 where there is none."""
     found = [0.0]
     for meta in metas:
         feedback = meta.get("feedback")

@@ -1,4 +1,4 @@
-"""Resonances of a measured response: peaks of its gain or of what goes off axis, with a mode fitted to each."""
+"""Resonances of a measured response: peaks of its gain or of its coupling, with a mode fitted to each."""
 
 from dataclasses import dataclass, replace
 
@@ -48,7 +48,7 @@ class _Peak:
 
 
 def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None = None) -> tuple[Resonance, ...]:
-    """In rising order, between the first and the last reliable line. response: as estimated, not smoothed.
+    """Resonances in rising order, between the first and the last reliable line. response: as estimated, not smoothed.
 
     A peak that no single mode fits, or whose mode is the same as that of a more prominent peak, is not a resonance of
     its own. Coupling is looked at where inputs and outputs are equally many.
@@ -59,19 +59,21 @@ def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None 
     ends = np.flatnonzero(response.reliable)[[0, -1]]
     lines = response.of_lines(np.isin(np.arange(len(response)), np.arange(ends[0], ends[1] + 1)))
     found: list[Resonance] = []
-    for peak in sorted(_peaks(octave_bins(lines, search.bin_octaves), search), key=lambda peak: -peak.prominence_db):
-        resonance = _fitted(lines, peak, search)
+    for peak in sorted(
+        _find_peaks(octave_bins(lines, search.bin_octaves), search), key=lambda peak: -peak.prominence_db
+    ):
+        resonance = _fit_resonance(lines, peak, search)
         if resonance is None:
             continue
-        known = next((other for other in found if _same(other, resonance)), None)
+        known = next((other for other in found if _is_same_mode(other, resonance)), None)
         if known is None:
             found.append(resonance)
         elif peak.seen_in not in known.seen_in:
-            found[found.index(known)] = _also_seen(known, peak.seen_in)
+            found[found.index(known)] = _add_evidence(known, peak.seen_in)
     return tuple(sorted(found, key=lambda resonance: resonance.frequency_hz))
 
 
-def _peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
+def _find_peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
     curves = {GAIN: np.linalg.norm(binned.response, ord=2, axis=(1, 2))}
     if binned.response.shape[1] == binned.response.shape[2]:
         off_axis = binned.response * (1 - np.eye(binned.response.shape[1]))
@@ -85,8 +87,8 @@ def _peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
     return found
 
 
-def _fitted(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearch) -> Resonance | None:
-    """None where no single mode fits, or where it is not told by its noise."""
+def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearch) -> Resonance | None:
+    """Fit a mode to a peak; None where no single mode fits, or where it is not distinct from noise."""
     factor = 2**search.reach_octaves
     near = lines.within(peak.frequency_hz / factor, peak.frequency_hz * factor)
     # A hundred points are plenty for one mode; averages of more lines say the same sooner.
@@ -119,10 +121,10 @@ def _interval(drawn: FloatArray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _same(one: Resonance, other: Resonance) -> bool:
-    """Closer than a third of the wider one: peaks of gain and of coupling lie a little to either side of a mode."""
-    return abs(one.frequency_hz - other.frequency_hz) < max(one.width_hz, other.width_hz) / 3
+def _is_same_mode(first: Resonance, second: Resonance) -> bool:
+    """Closer than a third of the wider width: peaks of gain and of coupling lie a little to either side of a mode."""
+    return abs(first.frequency_hz - second.frequency_hz) < max(first.width_hz, second.width_hz) / 3
 
 
-def _also_seen(resonance: Resonance, where: str) -> Resonance:
+def _add_evidence(resonance: Resonance, where: str) -> Resonance:
     return replace(resonance, seen_in=tuple(sorted((*resonance.seen_in, where))))

@@ -1,4 +1,4 @@
-"""The estimate at the lines that one set of experiments shares, with its errors.
+"""Instrumental-variable estimate of the response at the lines that a set of experiments shares, with its errors.
 
 G = Y R^H (U R^H)^-1 at each line, with one column per experiment: U the total commands, Y the responses, R the
 excitations as instruments. A feedback that adds to the excitation moves U and Y together and drops out.
@@ -12,15 +12,15 @@ import numpy as np
 from equalizer.identification.frequency_response.experiments import Experiment
 from equalizer.identification.frequency_response.frequency_response import BoolArray
 from equalizer.identification.frequency_response.noise_floor import (
-    over_neighbours,
-    scatter_over_lines,
-    spread_over_looks,
+    line_scatter,
+    period_variance,
+    smooth_over_lines,
 )
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _RANK_TOLERANCE = 1e-6
-"""Of the strongest line's amplitude: below it is rounding, not excitation."""
+"""Of the strongest line's amplitude: less is rounding, not excitation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +38,7 @@ class SharedLines:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Columns:
-    """One per experiment, weighted by the root of the samples behind it: noise then has its density as power."""
+    """A column per experiment, weighted by the root of its number of samples: noise then has its density as power."""
 
     command: ComplexArray
     """(lines, inputs, experiments)"""
@@ -54,31 +54,32 @@ def solve_shared_lines(
     rest_density: FloatArray | None,
     noise_lines: int,
 ) -> SharedLines:
-    """experiments: all with exactly these lines. rest_density: (lines, outputs) by `rest_floor`.
+    """Estimate at the given lines. experiments: all with exactly these lines. rest_density: (lines, outputs) by
+    `rest_floor`.
 
     Lines at which the experiments are not independent are left out.
     """
     every = _columns(experiments)
-    kept = _independent(every)
+    kept = _has_full_rank(every)
     columns = _Columns(every.command[kept], every.response[kept], every.instrument[kept], every.power[kept])
     adjoint = np.conj(columns.instrument.swapaxes(1, 2))
     solution = adjoint @ np.linalg.inv(columns.command @ adjoint)
     response = columns.response @ solution
-    density = _density_of_looks(experiments, kept, response)
+    density = _density_from_periods(experiments, kept, response)
     if density is None:
-        density = _density_of_residuals(columns, response)
+        density = _density_from_residuals(columns, response)
     if density is not None:
-        density = over_neighbours(density, noise_lines)
+        density = smooth_over_lines(density, noise_lines)
         variance: FloatArray = np.einsum("lpe,lem->lpm", density, np.abs(solution) ** 2)
         noise = density.sum(axis=2)
     else:
-        variance = over_neighbours(scatter_over_lines(response), noise_lines)
+        variance = smooth_over_lines(line_scatter(response), noise_lines)
         if rest_density is not None:
             gain = np.sum(np.abs(solution) ** 2, axis=1)
             variance = np.fmax(variance, rest_density[kept][:, :, None] * gain[:, None, :])
         noise = np.einsum("lpm,lme->lp", variance, np.abs(columns.command) ** 2)
     with np.errstate(invalid="ignore", divide="ignore"):  # of an output that is always zero nothing is known
-        coherence = np.clip(1 - noise / over_neighbours(columns.power, noise_lines), 0.0, 1.0)
+        coherence = np.clip(1 - noise / smooth_over_lines(columns.power, noise_lines), 0.0, 1.0)
     return SharedLines(frequency_hz[kept], response, variance, coherence, columns.instrument)
 
 
@@ -94,8 +95,8 @@ def _columns(experiments: Sequence[Experiment]) -> _Columns:
     return _Columns(stacked("command"), stacked("response"), stacked("instrument"), np.asarray(power))
 
 
-def _independent(columns: _Columns) -> BoolArray:
-    """(lines,): where excitations and commands both have as many directions as there are inputs."""
+def _has_full_rank(columns: _Columns) -> BoolArray:
+    """(lines,): where excitations and commands both have full rank, the number of inputs."""
     inputs, experiments = columns.command.shape[1:]
     kept = np.full(len(columns.command), experiments >= inputs)
     if experiments >= inputs and len(kept):
@@ -105,14 +106,16 @@ def _independent(columns: _Columns) -> BoolArray:
     return kept
 
 
-def _density_of_looks(experiments: Sequence[Experiment], kept: BoolArray, response: ComplexArray) -> FloatArray | None:
-    """(lines, outputs, experiments), from what differs between looks once the command is accounted for. Experiments
-    with one look take the mean of the others; None where all have one."""
+def _density_from_periods(
+    experiments: Sequence[Experiment], kept: BoolArray, response: ComplexArray
+) -> FloatArray | None:
+    """Noise density (lines, outputs, experiments) from the residuals' variance between looks. Experiments with a single
+    look take the mean of the others; None where all have one."""
     found: list[FloatArray | None] = []
     for experiment in experiments:
         residuals = experiment.response[:, kept] - np.einsum("lpm,klm->klp", response, experiment.command[:, kept])
         found.append(
-            experiment.length * spread_over_looks(residuals) / experiment.spread_seen if experiment.looks > 1 else None
+            experiment.length * period_variance(residuals) / experiment.spread_seen if experiment.looks > 1 else None
         )
     known = [density for density in found if density is not None]
     if not known:
@@ -121,8 +124,9 @@ def _density_of_looks(experiments: Sequence[Experiment], kept: BoolArray, respon
     return np.stack([mean if density is None else density for density in found], axis=2)
 
 
-def _density_of_residuals(columns: _Columns, response: ComplexArray) -> FloatArray | None:
-    """(lines, outputs, experiments), alike for all experiments; None where there is none to spare."""
+def _density_from_residuals(columns: _Columns, response: ComplexArray) -> FloatArray | None:
+    """Noise density (lines, outputs, experiments) from the residuals between experiments, the same for all; None where
+    there are fewer than two more experiments than inputs."""
     inputs, experiments = columns.command.shape[1:]
     if experiments < inputs + 2:
         return None

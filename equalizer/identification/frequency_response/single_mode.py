@@ -1,4 +1,4 @@
-"""One resonance fitted to lines round a peak: all entries share the pole, each has residues of its own."""
+"""Fit of a single resonance to the lines around a peak: all entries share the pole, each has its own residues."""
 
 import numpy as np
 
@@ -23,45 +23,49 @@ def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[Fl
     over: ComplexArray = np.ones((len(entries), len(s)), dtype=np.complex128)
     for _ in range(_STARTING_ROUNDS):
         basis = _basis(numerator, over)
-        known, first, second = (_left(basis, entries * (factor * over)[:, :, None]) for factor in (s**2, s, 1.0))
-        c1, c0 = _two_unknowns(first, second, -known)
-        over = _over(s, c1, c0)
+        known, first, second = (_project_out(basis, entries * (factor * over)[:, :, None]) for factor in (s**2, s, 1.0))
+        c1, c0 = _solve_two_unknowns(first, second, -known)
+        over = _inverse_denominator(s, c1, c0)
     for _ in range(_NEWTON_ROUNDS):
         basis = _basis(numerator, over)
-        remainder = _left(basis, entries)
+        remainder = _project_out(basis, entries)
         fitted = (entries - remainder) * over[:, :, None]
-        step1, step0 = _two_unknowns(_left(basis, fitted * s[:, None]), _left(basis, fitted), -remainder)
+        step1, step0 = _solve_two_unknowns(
+            _project_out(basis, fitted * s[:, None]), _project_out(basis, fitted), -remainder
+        )
         c1, c0 = c1 + np.clip(step1, -0.05, 0.05), c0 + np.clip(step0, -0.05, 0.05)
-        over = _over(s, c1, c0)
+        over = _inverse_denominator(s, c1, c0)
     root = np.sqrt(np.maximum(c0, np.finfo(np.float64).tiny))
     natural, damping = middle * root, c1 / (2 * root)
     fits = (c1 > 0) & (natural > frequency_hz[0]) & (natural < frequency_hz[-1])
     return np.where(fits, natural, np.nan), np.where(fits, damping, np.nan)
 
 
-def _over(s: ComplexArray, c1: FloatArray, c0: FloatArray) -> ComplexArray:
-    """(draws, lines): one over the denominator."""
+def _inverse_denominator(s: ComplexArray, c1: FloatArray, c0: FloatArray) -> ComplexArray:
+    """(draws, lines): 1 over the denominator s² + c1 s + c0."""
     over: ComplexArray = 1 / (s**2 + c1[:, None] * s + c0[:, None])
     return over
 
 
 def _basis(numerator: ComplexArray, over: ComplexArray) -> ComplexArray:
-    """(draws, lines, 3), orthonormal: what numerators over the denominator can make."""
+    """(draws, lines, 3): orthonormal basis of all numerators over the denominator."""
     basis: ComplexArray = np.linalg.qr(numerator * over[:, :, None])[0]
     return basis
 
 
-def _left(basis: ComplexArray, values: ComplexArray) -> ComplexArray:
-    """What no numerator can take up."""
+def _project_out(basis: ComplexArray, values: ComplexArray) -> ComplexArray:
+    """Residual of values (draws, lines, entries) after projection on the basis."""
     remainder: ComplexArray = values - basis @ (np.conj(basis.swapaxes(1, 2)) @ values)
     return remainder
 
 
-def _two_unknowns(first: ComplexArray, second: ComplexArray, right: ComplexArray) -> tuple[FloatArray, FloatArray]:
+def _solve_two_unknowns(
+    first: ComplexArray, second: ComplexArray, right: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
     """Real least squares of first x + second y = right, draw by draw."""
 
-    def dot(one: ComplexArray, other: ComplexArray) -> FloatArray:
-        product: FloatArray = np.sum((np.conj(one) * other).real, axis=(1, 2))
+    def dot(left: ComplexArray, other: ComplexArray) -> FloatArray:
+        product: FloatArray = np.sum((np.conj(left) * other).real, axis=(1, 2))
         return product
 
     aa, ab, bb = dot(first, first), dot(first, second), dot(second, second)

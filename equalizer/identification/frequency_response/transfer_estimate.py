@@ -1,4 +1,4 @@
-"""The transfer functions of all channels, from everything that was recorded (the published figure 4).
+"""Estimate of the transfer functions of all channels from all recordings (the published figure 4).
 
 Each line uses every experiment whose period holds it, weighted by the samples behind it. Experiments of different
 periods thus meet at the lines that they share; a line that only some have is made from those.
@@ -9,7 +9,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from equalizer.identification.frequency_response.experiments import Experiment, Looks, periodic_looks, windowed_looks
+from equalizer.identification.frequency_response.experiments import (
+    Experiment,
+    ExperimentSet,
+    periodic_experiments,
+    window_experiments,
+)
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.noise_floor import rest_floor
 from equalizer.identification.frequency_response.reliable_lines import (
@@ -36,12 +41,12 @@ class EstimateSettings:
     """Of the windows where nothing is periodic: lines are 1 / window_s apart."""
 
 
-def transfer_estimate(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
+def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
     """From total command to response. Raises TransferEstimateError where the recordings do not belong together, or
     hold fewer independent experiments than there are inputs."""
     settings = settings or EstimateSettings()
     _check_alike(recordings)
-    looks = _looks(recordings, settings)
+    looks = _collect_experiments(recordings, settings)
     if not looks.experiments:
         raise TransferEstimateError(
             "no segment drives the device with more than single sinusoids for a whole period or window; "
@@ -50,16 +55,16 @@ def transfer_estimate(recordings: Sequence[Recording], settings: EstimateSetting
     _refuse_still_outputs(recordings)
     rate_hz = recordings[0].sample_rate_hz
     parts = []
-    for frequency_hz, experiments in _by_shared_lines(looks.experiments, rate_hz):
+    for frequency_hz, experiments in _group_by_lines(looks.experiments, rate_hz):
         rest = rest_floor(recordings, frequency_hz)
         parts.append(solve_shared_lines(experiments, frequency_hz, rest, settings.noise_lines))
-    return _joined([part for part in parts if len(part.frequency_hz)], recordings, looks, settings)
+    return _join_parts([part for part in parts if len(part.frequency_hz)], recordings, looks, settings)
 
 
-def _looks(recordings: Sequence[Recording], settings: EstimateSettings) -> Looks:
-    looks = periodic_looks(recordings)
+def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSettings) -> ExperimentSet:
+    looks = periodic_experiments(recordings)
     if not looks.experiments:
-        looks = windowed_looks(recordings, settings.window_s)
+        looks = window_experiments(recordings, settings.window_s)
     remarks = list(looks.remarks)
     if looks.experiments and all(experiment.looks == 1 for experiment in looks.experiments) and looks.periodic:
         remarks.append(
@@ -74,10 +79,8 @@ def _looks(recordings: Sequence[Recording], settings: EstimateSettings) -> Looks
     return replace(looks, remarks=tuple(remarks))
 
 
-def _by_shared_lines(
-    experiments: Sequence[Experiment], rate_hz: float
-) -> Iterator[tuple[FloatArray, list[Experiment]]]:
-    """Lines that the same experiments have, with those experiments cut down to them."""
+def _group_by_lines(experiments: Sequence[Experiment], rate_hz: float) -> Iterator[tuple[FloatArray, list[Experiment]]]:
+    """Groups of lines that the same experiments hold, with those experiments reduced to them."""
     lengths = sorted({experiment.length for experiment in experiments})
     # Lines as whole numbers: k / length is the same line in every period that holds it.
     common = int(np.lcm.reduce(np.array(lengths, dtype=np.int64)))
@@ -88,14 +91,14 @@ def _by_shared_lines(
         shared = every[(holders == pattern).all(axis=1)]
         chosen = {length for length, holds in zip(lengths, pattern, strict=True) if holds}
         cut = [
-            _cut(experiment, shared // (common // experiment.length) - 1)
+            _select_lines(experiment, shared // (common // experiment.length) - 1)
             for experiment in experiments
             if experiment.length in chosen
         ]
         yield shared * (rate_hz / common), cut
 
 
-def _cut(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Experiment:
+def _select_lines(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Experiment:
     return Experiment(
         experiment.length,
         experiment.command[:, lines],
@@ -105,12 +108,12 @@ def _cut(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype[np.int64
     )
 
 
-def _joined(
-    parts: Sequence[SharedLines], recordings: Sequence[Recording], looks: Looks, settings: EstimateSettings
+def _join_parts(
+    parts: Sequence[SharedLines], recordings: Sequence[Recording], looks: ExperimentSet, settings: EstimateSettings
 ) -> FrequencyResponse:
     command, response = recordings[0].command, recordings[0].response
     if not parts:
-        raise TransferEstimateError(_too_few(len(command.channels), looks))
+        raise TransferEstimateError(_too_few_experiments_text(len(command.channels), looks))
     order = np.argsort(np.concatenate([part.frequency_hz for part in parts]))
     frequency_hz = np.concatenate([part.frequency_hz for part in parts])[order]
     excited = np.concatenate(
@@ -169,7 +172,7 @@ def _unit(signal: Signal) -> str:
     return signal.unit if isinstance(signal.unit, str) else ", ".join(signal.unit)
 
 
-def _too_few(inputs: int, looks: Looks) -> str:
+def _too_few_experiments_text(inputs: int, looks: ExperimentSet) -> str:
     return (
         f"{inputs} inputs need {inputs} independent experiments at each line, but the {len(looks.experiments)} that "
         "were found are not: at no line do they drive the inputs in so many directions. Record every axis by itself, "

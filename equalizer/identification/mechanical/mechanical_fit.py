@@ -1,5 +1,5 @@
-"""A linear mechanical model where none is given: masses, dampers and springs at the driven axes, and as many
-oscillators on them as the recordings ask for."""
+"""Fit of a linear mechanical model to recordings: masses, dampers and springs at the driven axes, and as many
+oscillators on them as the data support."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -14,15 +14,26 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
     OrderTried,
 )
 from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
-from equalizer.identification.mechanical.mechanical_lines import SegmentLines, of_band, roles, segment_lines
+from equalizer.identification.mechanical.mechanical_lines import (
+    SegmentLines,
+    segment_lines,
+    select_band,
+    split_fit_and_test,
+)
 from equalizer.identification.mechanical.mechanical_misfit import LineGroup, line_groups
 from equalizer.identification.mechanical.mechanical_model_of import readable_model
-from equalizer.identification.mechanical.mechanical_order import LEAST_GAIN, across_a_joint, by_stages, simplest, stages
-from equalizer.identification.mechanical.mechanical_refinement import Refined, refined
-from equalizer.identification.mechanical.mechanical_refusals import refuse_noise, refuse_unfit, refuse_unstable
+from equalizer.identification.mechanical.mechanical_order import (
+    LEAST_GAIN,
+    choose_simplest,
+    grow_across_joint,
+    grow_by_stages,
+    stage_ends,
+)
+from equalizer.identification.mechanical.mechanical_refinement import RefinedFit, refine_unknowns
+from equalizer.identification.mechanical.mechanical_refusals import refuse_noise, refuse_unstable, refuse_unsuitable
 from equalizer.identification.mechanical.mechanical_start import rigid_start
 from equalizer.identification.mechanical.mechanical_structure import Structure
-from equalizer.identification.mechanical.modal_order import choose_modes, in_balance
+from equalizer.identification.mechanical.modal_order import balance_fit, choose_modes
 from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -32,55 +43,55 @@ ELSEWHERE = 1.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Chosen:
-    """Which kind of structure: sensors that move with what the commands push, or sensors elsewhere."""
+class StructureChoice:
+    """The chosen structure: sensors collocated with the commands, or sensors elsewhere."""
 
-    best: Refined[Structure] | Refined[ModalStructure]
+    best: RefinedFit[Structure] | RefinedFit[ModalStructure]
     tried: tuple[OrderTried, ...]
     reason: str
 
 
-def choose(
+def choose_structure(
     groups: Sequence[LineGroup],
-    starts: Sequence[Refined[Structure]],
+    starts: Sequence[RefinedFit[Structure]],
     band_hz: tuple[float, float],
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
-) -> Chosen:
-    """Oscillators on the driven axes, if they explain the lines; else what sees each mode in a way of its own, if that
-    explains more. starts: fits of the driven axes alone to the first of `stages`, from several beginnings."""
-    best = simplest(starts)
+) -> StructureChoice:
+    """Oscillators on the driven axes, if they explain the lines; else modes with free shapes at the sensors, if those
+    explain more. starts: fits of the driven axes alone up to the first of `stage_ends`, from several initial values."""
+    best = choose_simplest(starts)
     if settings.joint:
-        return Chosen(*across_a_joint(groups, best, band_hz, settings, on_progress))
+        return StructureChoice(*grow_across_joint(groups, best, band_hz, settings, on_progress))
     if settings.sensors_elsewhere:
-        return _elsewhere(groups, best, band_hz, settings, on_progress)
-    here = Chosen(*by_stages(groups, best, band_hz, settings, lambda share: on_progress(share / 2)))
+        return _fit_sensors_elsewhere(groups, best, band_hz, settings, on_progress)
+    here = StructureChoice(*grow_by_stages(groups, best, band_hz, settings, lambda share: on_progress(share / 2)))
     if here.best.error < ELSEWHERE or settings.sensors_elsewhere is False:
         return here
-    other = _elsewhere(groups, best, band_hz, settings, lambda share: on_progress(0.5 + share / 2))
+    other = _fit_sensors_elsewhere(groups, best, band_hz, settings, lambda share: on_progress(0.5 + share / 2))
     tried = (*here.tried, *(replace(each, what=f"sensors elsewhere: {each.what}") for each in other.tried))
     better = other.best.left_out < (1 - LEAST_GAIN) * here.best.left_out
     return replace(other if better else here, tried=tried)
 
 
-def _elsewhere(
+def _fit_sensors_elsewhere(
     groups: Sequence[LineGroup],
-    best: Refined[Structure],
+    best: RefinedFit[Structure],
     band_hz: tuple[float, float],
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
-) -> Chosen:
+) -> StructureChoice:
     if not any(group.transient for group in groups):
-        return Chosen(*choose_modes(groups, best.structure, band_hz, settings, on_progress))
+        return StructureChoice(*choose_modes(groups, best.structure, band_hz, settings, on_progress))
     structure = replace(best.structure, shared=True)
-    begun = replace(best, structure=structure, unknowns=best.structure.carried_over(best.unknowns, structure))
-    return Chosen(*by_stages(groups, begun, band_hz, settings, on_progress))
+    begun = replace(best, structure=structure, unknowns=best.structure.transfer_unknowns(best.unknowns, structure))
+    return StructureChoice(*grow_by_stages(groups, begun, band_hz, settings, on_progress))
 
 
 LINES_TO_CHOOSE_BY, IN_ALL = 400, 1600
 """Of each group at most, and of all; the chosen structure is then fitted to all."""
 _LOW_PARTS = (0.25, 0.5, 1.0)
-"""Of the band in octaves, from its beginning: modes above would draw the start away from the rigid body."""
+"""Of the band in octaves, from its beginning: modes above would bias the start of the rigid body."""
 
 
 def fit_mechanical_model(
@@ -89,31 +100,31 @@ def fit_mechanical_model(
     on_progress: Callable[[float], None] = lambda share: None,
     name: str = "fitted to recordings",
 ) -> MechanicalFit:
-    """From the total command to the response. Response i must be the motion where and along which command i acts; what
-    more there are may lie anywhere. Raises MechanicalFitRefused.
+    """Fit a model from the total command to the response. Response i must be the motion where and along which command i
+    acts; further responses may lie anywhere. `on_progress` takes the share done, 0 to 1.
 
-    `on_progress(share)`.
+    Raises MechanicalFitRefused where the recordings do not carry a model.
     """
     settings = settings or MechanicalFitSettings()
-    refuse_unfit(recordings)
-    fit, test = roles(recordings)
-    lines = [one for each in fit if (one := segment_lines(*each)) is not None]
-    segments = of_band(lines, settings.band_hz)
+    refuse_unsuitable(recordings)
+    fit, test = split_fit_and_test(recordings)
+    lines = [spectra for each in fit if (spectra := segment_lines(*each)) is not None]
+    segments = select_band(lines, settings.band_hz)
     if sum(len(segment.frequency_hz) for segment in segments) < 8:
         raise MechanicalFitRefused(
             "the commands drive fewer than eight lines in the band: they are constant, or the recording is too short; "
             "record a sweep, noise or a multisine along every axis"
         )
-    band = _band(segments)
+    band = _covered_band(segments)
     groups = line_groups(segments, settings.floor)
-    structure = _structure(recordings[0], settings, band)
-    fewer = [group.thinned(min(LINES_TO_CHOOSE_BY, -(-IN_ALL // len(groups)))) for group in groups]
-    starts = _rigid_fits(segments, fewer, structure, band, settings)
-    chosen = choose(fewer, starts, band, settings, on_progress)
-    every = [group.of(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
-    final = _refitted(_nothing_left_out(every), chosen.best, band)
+    structure = _rigid_structure(recordings[0], settings, band)
+    fewer = [group.thin_out(min(LINES_TO_CHOOSE_BY, -(-IN_ALL // len(groups)))) for group in groups]
+    starts = _fit_rigid_starts(segments, fewer, structure, band, settings)
+    chosen = choose_structure(fewer, starts, band, settings, on_progress)
+    every = [group.of_lines(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
+    final = _refit(_include_all_lines(every), chosen.best, band)
     refuse_unstable(final)
-    tested = [one for each in test if (one := segment_lines(*each)) is not None]
+    tested = [spectra for each in test if (spectra := segment_lines(*each)) is not None]
     on_progress(1.0)
     model = readable_model(final, name)
     errors = _channel_errors(model, lines, tested, band, recordings[0].response.channels)
@@ -137,7 +148,8 @@ def _channel_errors(
     band: tuple[float, float],
     channels: tuple[str, ...],
 ) -> tuple[ChannelError, ...]:
-    """The last one is over all channels. Raises MechanicalFitRefused where nothing is explained."""
+    """Errors per channel; the last entry is over all channels. Raises MechanicalFitRefused where nothing is
+    explained."""
     error, noise = simulation_errors(model, fitted, band)
     refuse_noise(error, channels)
     held = simulation_errors(model, tested, band)[0] if tested else None
@@ -152,28 +164,28 @@ def _channel_errors(
     )
 
 
-def _rigid_fits(
+def _fit_rigid_starts(
     segments: Sequence[SegmentLines],
     groups: Sequence[LineGroup],
     structure: Structure,
     band: tuple[float, float],
     settings: MechanicalFitSettings,
-) -> list[Refined[Structure]]:
-    found: list[Refined[Structure]] = []
-    first = stages(band)[0]
-    lower = [part for group in groups if len((part := group.of(group.frequency_hz <= first)).frequency_hz)]
+) -> list[RefinedFit[Structure]]:
+    found: list[RefinedFit[Structure]] = []
+    first = stage_ends(band)[0]
+    lower = [part for group in groups if len((part := group.of_lines(group.frequency_hz <= first)).frequency_hz)]
     for share in _LOW_PARTS:
         end = band[0] * (first / band[0]) ** share
-        low = of_band(segments, (band[0], end))
+        low = select_band(segments, (band[0], end))
         if sum(len(each.frequency_hz) for each in low) < 8 * structure.inputs and (found or share != _LOW_PARTS[-1]):
             continue
         for delayed in (False, True)[: 1 + settings.fit_delay]:
             begun, unknowns = rigid_start(low, replace(structure, delayed=delayed), settings.floor)
-            found.append(refined(lower, begun, unknowns, (band[0], first)))
+            found.append(refine_unknowns(lower, begun, unknowns, (band[0], first)))
     return found
 
 
-def _structure(recording: Recording, settings: MechanicalFitSettings, band: tuple[float, float]) -> Structure:
+def _rigid_structure(recording: Recording, settings: MechanicalFitSettings, band: tuple[float, float]) -> Structure:
     inputs, outputs = len(recording.command.channels), len(recording.response.channels)
     quantity, units = recording.response.quantities[0], (*recording.response.units, *recording.command.units)
     return Structure(
@@ -190,27 +202,27 @@ def _structure(recording: Recording, settings: MechanicalFitSettings, band: tupl
     )
 
 
-def _band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
+def _covered_band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
     return (
         float(min(segment.frequency_hz[0] for segment in segments)),
         float(max(segment.frequency_hz[-1] for segment in segments)),
     )
 
 
-def _refitted(
-    groups: Sequence[LineGroup], best: Refined[Structure] | Refined[ModalStructure], band: tuple[float, float]
-) -> Refined[Structure] | Refined[ModalStructure]:
+def _refit(
+    groups: Sequence[LineGroup], best: RefinedFit[Structure] | RefinedFit[ModalStructure], band: tuple[float, float]
+) -> RefinedFit[Structure] | RefinedFit[ModalStructure]:
     if isinstance(best.structure, ModalStructure):
-        return in_balance(refined(groups, best.structure, best.unknowns, band, most_steps=6))
-    return refined(groups, best.structure, best.unknowns, band)
+        return balance_fit(refine_unknowns(groups, best.structure, best.unknowns, band, most_steps=6))
+    return refine_unknowns(groups, best.structure, best.unknowns, band)
 
 
-def _nothing_left_out(groups: Sequence[LineGroup]) -> list[LineGroup]:
+def _include_all_lines(groups: Sequence[LineGroup]) -> list[LineGroup]:
     return [replace(group, left_out=np.zeros(len(group.left_out), dtype=bool)) for group in groups]
 
 
 def _remarks(
-    final: Refined[Structure] | Refined[ModalStructure], channels: tuple[str, ...], tested: bool
+    final: RefinedFit[Structure] | RefinedFit[ModalStructure], channels: tuple[str, ...], tested: bool
 ) -> tuple[str, ...]:
     structure = final.structure
     own = ", ".join(channels[: structure.inputs])

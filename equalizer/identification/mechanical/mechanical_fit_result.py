@@ -1,4 +1,4 @@
-"""What a fit of a mechanical model found, how well it predicts, and why it stopped where it did."""
+"""Settings and result of a mechanical fit: the model, its errors, and the structures that were tried."""
 
 from dataclasses import dataclass, field
 

@@ -1,7 +1,7 @@
-"""How far a mechanical model's free simulation is from measured segments, channel by channel.
+"""Simulation error of a mechanical model on measured segments, channel by channel.
 
-By spectra: the answer to the commands plus that of the state at the segment's beginning, which is fitted. By Parseval's
-theorem that is the simulation's error over the segment, its mean left out.
+Computed from spectra: the response to the commands plus that of the initial state, which is fitted. By Parseval's
+theorem that is the free simulation's error over the segment, without its mean.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _STATE_LINES = 3000
-"""Tell the state at the beginning well enough."""
+"""Lines from which the initial state is fitted at most."""
 
 
 def simulation_errors(
@@ -39,7 +39,7 @@ def simulation_errors(
 
 
 def simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> ComplexArray:
-    """(lines, p)"""
+    """(lines, p): measured minus simulated spectrum, with the initial state that fits best."""
     response = sampled_response(model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold)
     misfit = segment_lines.response - np.einsum("lpm,lm->lp", response, segment_lines.command)
     if not segment_lines.transient:

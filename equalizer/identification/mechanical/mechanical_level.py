@@ -1,4 +1,4 @@
-"""What a linear fit has taken from friction, told from two levels: a damper that shrinks as the force grows."""
+"""Friction's share in the damping of a linear fit, from recordings at two levels: it falls as the force grows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,20 +13,20 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 RIGID_OCTAVES = 3.0
-"""Of the band from its beginning: there the device moves as one piece, and friction shows most."""
+"""Octaves of the band, from its beginning, in which the device moves as a rigid body and friction shows most."""
 LEAST_MASS, LEAST_DAMPING = 0.02, 0.05
-"""Of the value: as well as a laboratory knows it."""
+"""Smallest relative tolerances: how well a laboratory knows mass and damping."""
 OF_FRICTION = 0.2
-"""Of what was taken off for friction, that may be wrong."""
+"""Relative tolerance of the damping that was subtracted for friction."""
 MOST_OFF = 0.8
-"""Of the damping that a fit has found."""
+"""Largest share of the fitted damping that is subtracted."""
 SPRING = 0.03
-"""Of the inertia's force at the band's beginning, that a spring below it may hide behind."""
+"""Largest undetected stiffness, relative to the inertial force at the band's lower end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AsOnePiece:
-    """The device where it moves as one piece, at the stronger level."""
+class RigidBody:
+    """The device in the band where it moves as a rigid body, at the stronger level."""
 
     up_to_hz: float
     mass: FloatArray
@@ -39,18 +39,18 @@ class AsOnePiece:
     """Of the whole model without it."""
 
 
-def as_one_piece(
+def fit_rigid_body(
     fit: MechanicalFit, strong: Recording, weaker: Recording, settings: MechanicalFitSettings
-) -> AsOnePiece:
-    """From rigid fits at the two levels. Friction's equivalent is as 1 / amplitude: strong = true + c, weaker = true +
-    c ratio."""
+) -> RigidBody:
+    """Rigid fits at two levels. Friction's equivalent damping goes with 1 / amplitude: strong = true + c, weaker = true
+    + c ratio."""
     low, high = fit.band_hz
     up_to_hz = min(high, low * 2**RIGID_OCTAVES)
     rigid = replace(
         settings, band_hz=(low, up_to_hz), most_modes=0, joint=False, fit_delay=False, sensors_elsewhere=False
     )
     ratio = _amplitude(strong) / _amplitude(weaker)
-    mine, other = (_driven(fit_mechanical_model([each], rigid).model) for each in (strong, weaker))
+    mine, other = (_axis_values(fit_mechanical_model([each], rigid).model) for each in (strong, weaker))
     mass, damping, _ = mine
     of_friction = np.clip((other[1] - damping) / max(ratio - 1, 1e-3), 0.0, MOST_OFF * damping)
     own = fit.model.tolerance or Tolerance()
@@ -63,17 +63,17 @@ def as_one_piece(
         stiffness_n_per_m=max(SPRING * heaviest * (2 * np.pi * low) ** 2, own.stiffness_n_per_m or 0.0),
         modes=own.modes,
     )
-    return AsOnePiece(up_to_hz, mass, damping, of_friction, tolerance)
+    return RigidBody(up_to_hz, mass, damping, of_friction, tolerance)
 
 
-def without_friction(model: MechanicalModel, of_friction: FloatArray) -> MechanicalModel:
-    """of_friction: (m,), taken off the dampers to the ground at the driven axes."""
+def remove_friction_damping(model: MechanicalModel, of_friction: FloatArray) -> MechanicalModel:
+    """The model without friction's equivalent damping of_friction (m,), at the driven axes."""
     along = driven_axes(model)
     return replace(model, damping=model.damping - (along * of_friction) @ along.T)
 
 
-def _driven(model: MechanicalModel) -> FloatArray:
-    """(3, m)"""
+def _axis_values(model: MechanicalModel) -> FloatArray:
+    """(3, m): mass, damping and stiffness at each driven axis."""
     parts: Sequence[FloatArray] = (model.mass, model.damping, model.stiffness)
     return np.array([np.diag(part)[: model.inputs] for part in parts])
 

@@ -1,4 +1,4 @@
-"""What a mechanical model is fitted to: spectra of commands and responses, segment by segment, with their noise.
+"""Spectra of commands and responses, segment by segment, with their noise: the data of a mechanical fit.
 
 Periodic segments give the mean of their periods: what does not repeat with the excitation (a feedback's share of the
 noise too) averages out, so that the excitation serves as the instrument. Others give the spectrum of the whole segment,
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from equalizer.identification.frequency_response.frequency_response import BoolArray
-from equalizer.identification.frequency_response.noise_floor import over_neighbours, spread_over_looks
+from equalizer.identification.frequency_response.noise_floor import period_variance, smooth_over_lines
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import FloatArray
@@ -76,8 +76,8 @@ class SegmentLines:
 
 
 def segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None:
-    """None for what drives nothing, or has missing samples throughout."""
-    starts, length = _looks(recording, segment)
+    """Spectra of a segment; None where it is not excited, or has missing samples throughout."""
+    starts, length = _whole_periods(recording, segment)
     if not starts or length < 8:
         return None
     rate = recording.sample_rate_hz
@@ -89,39 +89,39 @@ def segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None
         return None
     command, response = (spectrum.mean(axis=0) for spectrum in spectra)
     if len(starts) > 1:
-        noise = over_neighbours(spread_over_looks(spectra[1]), _NOISE_LINES) / len(starts)
+        noise = smooth_over_lines(period_variance(spectra[1]), _NOISE_LINES) / len(starts)
     else:
         noise = local_noise(command, response)
     if transient:  # what a segment holds between its own lines counts as driven too
-        size = np.sqrt(over_neighbours(size**2, _NOISE_LINES))
+        size = np.sqrt(smooth_over_lines(size**2, _NOISE_LINES))
     frequency = np.arange(1, len(command) + 1) * rate / length
     excited = size > EXCITED * size.max()
     return SegmentLines(frequency, command, response, noise, excited, transient, rate, recording.hold)
 
 
-def of_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | None) -> tuple[SegmentLines, ...]:
+def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | None) -> tuple[SegmentLines, ...]:
     """The excited lines of the band, its ends included: of segments that repeat alike, the same lines for all; of one
     that does not repeat, no more than a model needs."""
     low, high = band_hz or (0.0, np.inf)
     found = []
     for segment in segments:
-        alike = [other.excited for other in segments if repeat_alike(segment, other)]
+        alike = [other.excited for other in segments if have_same_lines(segment, other)]
         excited = segment.excited if segment.transient else np.any(alike, axis=0)
         chosen = np.flatnonzero(excited & (segment.frequency_hz >= low) & (segment.frequency_hz <= high))
         if segment.transient and len(chosen) > MOST_LINES:
             chosen = chosen[:: -(-len(chosen) // MOST_LINES)]
         if len(chosen):
-            found.append(_taken(segment, chosen))
+            found.append(_select_lines(segment, chosen))
     return tuple(found)
 
 
-def repeat_alike(one: SegmentLines, other: SegmentLines) -> bool:
-    return not (one.transient or other.transient) and (one.rate_hz, one.hold, len(one.frequency_hz)) == (
-        other.rate_hz, other.hold, len(other.frequency_hz),
+def have_same_lines(first: SegmentLines, second: SegmentLines) -> bool:
+    return not (first.transient or second.transient) and (first.rate_hz, first.hold, len(first.frequency_hz)) == (
+        second.rate_hz, second.hold, len(second.frequency_hz),
     )  # fmt: skip
 
 
-def _taken(lines: SegmentLines, chosen: npt.NDArray[np.int64]) -> SegmentLines:
+def _select_lines(lines: SegmentLines, chosen: npt.NDArray[np.int64]) -> SegmentLines:
     return SegmentLines(
         lines.frequency_hz[chosen],
         lines.command[chosen],
@@ -134,10 +134,12 @@ def _taken(lines: SegmentLines, chosen: npt.NDArray[np.int64]) -> SegmentLines:
     )
 
 
-def roles(recordings: Sequence[Recording]) -> tuple[list[tuple[Recording, Segment]], list[tuple[Recording, Segment]]]:
-    """What to fit, and what to keep for a test: by the segments' roles; else the last of several segments, or the last
-    third of the only one."""
-    driven = [(recording, segment) for recording in recordings for segment in _driven(recording)]
+def split_fit_and_test(
+    recordings: Sequence[Recording],
+) -> tuple[list[tuple[Recording, Segment]], list[tuple[Recording, Segment]]]:
+    """Segments to fit, and segments to keep for a test: by their roles; else the last of several segments, or the last
+    third of a single one."""
+    driven = [(recording, segment) for recording in recordings for segment in _driven_segments(recording)]
     test = [(recording, segment) for recording, segment in driven if segment.role == "test"]
     fit = [(recording, segment) for recording, segment in driven if segment.role != "test"]
     if test or not fit:
@@ -155,7 +157,7 @@ def roles(recordings: Sequence[Recording]) -> tuple[list[tuple[Recording, Segmen
     return fit, []
 
 
-def _driven(recording: Recording) -> Iterator[Segment]:
+def _driven_segments(recording: Recording) -> Iterator[Segment]:
     if not recording.segments:
         yield Segment(0, len(recording), "noise")
     for segment in recording.segments:
@@ -163,8 +165,9 @@ def _driven(recording: Recording) -> Iterator[Segment]:
             yield segment
 
 
-def _looks(recording: Recording, segment: Segment) -> tuple[list[int], int]:
-    """Where whole periods begin, the first left out where others are there; or the longest part without gaps."""
+def _whole_periods(recording: Recording, segment: Segment) -> tuple[list[int], int]:
+    """Starts and length of the whole periods, without the first where there are others; or of the longest part without
+    gaps."""
     signals = [recording.command.samples, recording.response.samples]
     if recording.excitation is not None:
         signals.append(recording.excitation.samples)
@@ -182,7 +185,7 @@ def _looks(recording: Recording, segment: Segment) -> tuple[list[int], int]:
 
 
 def _spectra(samples: FloatArray, starts: Sequence[int], length: int) -> ComplexArray:
-    """(looks, lines, channels)"""
+    """Spectra (looks, lines, channels), one look per start."""
     looks = np.stack([samples[start : start + length] for start in starts])
     looks = looks - looks.mean(axis=1, keepdims=True)
     return np.asarray(np.fft.rfft(looks, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)

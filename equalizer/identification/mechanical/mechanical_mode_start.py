@@ -1,7 +1,7 @@
-"""Where a mode is missing, and where its fit starts.
+"""Starting values of a further mode: a grid search over frequency and damping.
 
-A small oscillator changes the response in proportion to its mass, so that a grid over frequency and damping shows what
-each would explain once everything else has been adjusted to it.
+A small oscillator changes the response in proportion to its mass, so that linear least squares shows what it would
+explain once all other unknowns are adjusted to it.
 """
 
 from collections.abc import Sequence
@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equalizer.identification.mechanical.mechanical_misfit import LineGroup, jacobian, misfits, stacked
-from equalizer.identification.mechanical.mechanical_refinement import Refined
+from equalizer.identification.mechanical.mechanical_misfit import LineGroup, misfits, numerical_jacobian, stack_real
+from equalizer.identification.mechanical.mechanical_refinement import RefinedFit
 from equalizer.identification.mechanical.mechanical_response import sampled_response, sensor_response
-from equalizer.identification.mechanical.mechanical_start import pairs, scaled_least_squares, symmetric
+from equalizer.identification.mechanical.mechanical_start import solve_scaled, symmetric_matrix, triangle_pairs
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.lockin import ComplexArray
@@ -22,7 +22,7 @@ _GRID = 60
 _RATIOS = (0.01, 0.05, 0.25)
 _MOST_ROWS = 6000
 _SMALL_START = 0.02
-"""Root of an added mass over the whole, where the linear estimate says nothing."""
+"""Root of the mode's mass over the whole, where the linear estimate gives none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,49 +35,49 @@ class ModeStart:
 
 
 def mode_starts(
-    groups: Sequence[LineGroup], now: Refined[Structure], band_hz: tuple[float, float], most: int = 2
+    groups: Sequence[LineGroup], now: RefinedFit[Structure], band_hz: tuple[float, float], most: int = 2
 ) -> tuple[ModeStart, ...]:
-    """The most promising frequencies for one more oscillator, best first."""
-    thinned = [_thinned(group.without_left_out(), len(groups)) for group in groups]
+    """Starts for one more oscillator at the frequencies that explain most, best first."""
+    thinned = [_thin_group(group.without_left_out(), len(groups)) for group in groups]
     model = now.structure.model(now.unknowns)
-    misfit = stacked(misfits(thinned, model))
-    known = _known_directions(thinned, now, misfit)
+    misfit = stack_real(misfits(thinned, model))
+    known = _tangent_basis(thinned, now, misfit)
     misfit = misfit - known @ (known.T @ misfit)
-    moving = [_moving(group, model, now.structure) for group in thinned]
+    moving = [_model_motion(group, model, now.structure) for group in thinned]
     found = []
     for frequency_hz in np.geomspace(band_hz[0] / 1.5, band_hz[1] * 1.5, _GRID):
         for ratio in _RATIOS:
             columns = _mode_columns(moving, now.structure, 2 * np.pi * frequency_hz, ratio)
             columns = columns - known @ (known.T @ columns)
-            strengths = scaled_least_squares(columns, misfit)
+            strengths = solve_scaled(columns, misfit)
             explained = float(misfit @ misfit - np.sum((misfit - columns @ strengths) ** 2))
             found.append((explained, float(frequency_hz), ratio, strengths))
     chosen: list[tuple[float, float, float, FloatArray]] = []
     for candidate in sorted(found, key=lambda each: -each[0]):
         if all(abs(np.log(candidate[1] / other[1])) > 0.1 for other in chosen):
             chosen.append(candidate)
-    return tuple(_started(now, *candidate) for candidate in chosen[:most])
+    return tuple(_make_start(now, *candidate) for candidate in chosen[:most])
 
 
-def _known_directions(groups: Sequence[LineGroup], now: Refined[Structure], misfit: FloatArray) -> FloatArray:
-    """Orthonormal: what the present unknowns could still change."""
+def _tangent_basis(groups: Sequence[LineGroup], now: RefinedFit[Structure], misfit: FloatArray) -> FloatArray:
+    """Orthonormal basis of the residual changes that the present unknowns can make."""
     high = np.full(now.structure.parameters, np.inf)
-    slope = jacobian(
-        lambda unknowns: stacked(misfits(groups, now.structure.model(unknowns))), now.unknowns, misfit, high
+    slope = numerical_jacobian(
+        lambda unknowns: stack_real(misfits(groups, now.structure.model(unknowns))), now.unknowns, misfit, high
     )
     return np.asarray(np.linalg.qr(slope / np.maximum(np.linalg.norm(slope, axis=0), 1e-300))[0])
 
 
-def _thinned(group: LineGroup, groups: int) -> LineGroup:
+def _thin_group(group: LineGroup, groups: int) -> LineGroup:
     rows = 2 * group.target[0].size * len(group.frequency_hz)
     chosen = np.zeros(len(group.frequency_hz), dtype=bool)
     chosen[:: max(1, rows * groups // _MOST_ROWS)] = True
-    return group.of(chosen)
+    return group.of_lines(chosen)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Moving:
-    """How the present model moves on a group's lines."""
+class _ModelMotion:
+    """Motion of the present model at a group's lines."""
 
     group: LineGroup
     s: ComplexArray
@@ -85,12 +85,12 @@ class _Moving:
     response: ComplexArray
     """(lines, p, m)"""
     shown: ComplexArray
-    """(lines,): what a response shows of a position."""
+    """(lines,): response of a sensor to a position."""
     moved: ComplexArray
     """(lines, m, m): positions of the driven axes."""
 
 
-def _moving(group: LineGroup, model: MechanicalModel, structure: Structure) -> _Moving:
+def _model_motion(group: LineGroup, model: MechanicalModel, structure: Structure) -> _ModelMotion:
     order = DERIVATIVE_OF_QUANTITY[structure.quantity]
     s = np.asarray(2j * np.pi * group.frequency_hz, dtype=np.complex128)
     z = np.exp(s / group.rate_hz)
@@ -98,11 +98,11 @@ def _moving(group: LineGroup, model: MechanicalModel, structure: Structure) -> _
     late = (1.0 if order == 2 else 0.5) if group.hold.value == "zero-order" else 0.0
     shown = sensor_response(model.sensor.bandwidth_hz, z, group.rate_hz) * z ** (-late) * s**order
     moved = response[:, : structure.inputs] * np.array(structure.signs)[:, None] / shown[:, None, None]
-    return _Moving(group, s, response, shown, moved)
+    return _ModelMotion(group, s, response, shown, moved)
 
 
-def _mode_columns(moving: Sequence[_Moving], structure: Structure, speed: float, ratio: float) -> FloatArray:
-    """Misfit's change per entry of L Lᵀ (pairs), then per entry of (what a response sees) Lᵀ."""
+def _mode_columns(moving: Sequence[_ModelMotion], structure: Structure, speed: float, ratio: float) -> FloatArray:
+    """Change of the residuals per entry of L Lᵀ (pairs), then per entry of (sensor shape) Lᵀ."""
     m, p = structure.inputs, structure.outputs
     parts = []
     for lines in moving:
@@ -114,7 +114,7 @@ def _mode_columns(moving: Sequence[_Moving], structure: Structure, speed: float,
             + (0 if row == column else 1)
             * -heavier[:, None, None]
             * np.einsum("lp,lm->lpm", response[:, :, column], moved[:, row])
-            for row, column in pairs(m)
+            for row, column in triangle_pairs(m)
         ]
         for seen in range(0 if structure.shared else m, p):
             for axis in range(m):
@@ -123,20 +123,20 @@ def _mode_columns(moving: Sequence[_Moving], structure: Structure, speed: float,
                 changes.append(change)
         columns = [-np.einsum("lpem,lpm->lpe", lines.group.root, change) for change in changes]
         parts.append(columns)
-    flat = [stacked([part[k] for part in parts]) for k in range(len(parts[0]))]
+    flat = [stack_real([part[k] for part in parts]) for k in range(len(parts[0]))]
     return -np.stack(flat, axis=1)
 
 
-def _started(
-    now: Refined[Structure], explained: float, frequency_hz: float, ratio: float, strengths: FloatArray
+def _make_start(
+    now: RefinedFit[Structure], explained: float, frequency_hz: float, ratio: float, strengths: FloatArray
 ) -> ModeStart:
     structure, m = now.structure, now.structure.inputs
     grown = replace(structure, modes=structure.modes + 1)
-    unknowns = structure.carried_over(now.unknowns, grown)
+    unknowns = structure.transfer_unknowns(now.unknowns, grown)
     own_entries = m * (m + 1) // 2
-    own, others = symmetric(strengths[:own_entries], m), strengths[own_entries:].reshape(-1, m)
+    own, others = symmetric_matrix(strengths[:own_entries], m), strengths[own_entries:].reshape(-1, m)
     root = np.sqrt(structure.mass_scale)
-    # One direction for both: what drives the mode. The other responses count by what they show at the mode itself.
+    # A single direction serves both: the one that drives the mode. Other responses count by their shape at the mode.
     along = (
         np.linalg.svd(np.concatenate([own / root**2, others]))[2][0] if len(others) else np.linalg.eigh(own)[1][:, -1]
     )

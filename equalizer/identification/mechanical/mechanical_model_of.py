@@ -1,47 +1,47 @@
-"""A fitted structure as a mechanical model for others to read, with oscillators in their own right and tolerances."""
+"""Conversion of a fitted structure to a mechanical model in absolute coordinates, with tolerances."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from equalizer.identification.mechanical.mechanical_misfit import jacobian
-from equalizer.identification.mechanical.mechanical_refinement import Refined
+from equalizer.identification.mechanical.mechanical_misfit import numerical_jacobian
+from equalizer.identification.mechanical.mechanical_refinement import RefinedFit
 from equalizer.identification.mechanical.mechanical_structure import Structure
-from equalizer.identification.mechanical.modal_structure import ModalStructure, at_driven_axes
+from equalizer.identification.mechanical.modal_structure import ModalStructure, to_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
 LEAST_TOLERANCE = 0.01
-"""Of the value: no calibration is better than its force sensor or current loop."""
+"""Smallest relative tolerance: no calibration is better than its force sensor or current loop."""
 
 
-AnyFit = Refined[Structure] | Refined[ModalStructure]
+AnyFit = RefinedFit[Structure] | RefinedFit[ModalStructure]
 
 
 def readable_model(fit: AnyFit, name: str) -> MechanicalModel:
-    """With a tolerance; absolute coordinates for the oscillators, so that their masses stand on the diagonal."""
+    """Mechanical model of a fit with its tolerance, in absolute coordinates: oscillators' masses are diagonal."""
     model = fit.structure.model(fit.unknowns, name)
     if isinstance(fit.structure, ModalStructure):
-        model = at_driven_axes(model)
+        model = to_driven_axes(model)
     else:
-        model = _absolute(model, fit.structure.inputs, fit.structure.joint)
+        model = _to_absolute_coordinates(model, fit.structure.inputs, fit.structure.joint)
     return replace(model, tolerance=tolerance_of(fit))
 
 
 def tolerance_of(fit: AnyFit) -> Tolerance:
-    """One standard deviation by the misfit's own size, the largest over the driven axes; of modes with shapes of their
-    own only their frequencies', for how hard each is pushed where no sensor sits is not told by the data."""
+    """Standard deviations from the residuals' size, the largest over the driven axes. Of modes with free shapes only
+    the frequencies': the data do not tell how strongly each is driven where there is no sensor."""
     if isinstance(fit.structure, ModalStructure):
         structure = fit.structure
         logs = np.sqrt(np.diag(_covariance(fit))).reshape(structure.modes, -1)[:, 0]
         return Tolerance(modes=max(float(np.median(logs)), LEAST_TOLERANCE))
-    return _of_oscillators(fit.structure, fit)
+    return _oscillator_tolerance(fit.structure, fit)
 
 
-def _of_oscillators(structure: Structure, fit: AnyFit) -> Tolerance:
-    here = _driven_axes(structure, fit.unknowns)
-    slope = jacobian(
-        lambda unknowns: _driven_axes(structure, unknowns), fit.unknowns, here, np.full(structure.parameters, np.inf)
+def _oscillator_tolerance(structure: Structure, fit: AnyFit) -> Tolerance:
+    here = _axis_values(structure, fit.unknowns)
+    slope = numerical_jacobian(
+        lambda unknowns: _axis_values(structure, unknowns), fit.unknowns, here, np.full(structure.parameters, np.inf)
     )
     covariance = _covariance(fit)
     spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
@@ -54,7 +54,7 @@ def _of_oscillators(structure: Structure, fit: AnyFit) -> Tolerance:
     return Tolerance(mass, damping, stiffness, of_modes)
 
 
-def _driven_axes(structure: Structure, unknowns: FloatArray) -> FloatArray:
+def _axis_values(structure: Structure, unknowns: FloatArray) -> FloatArray:
     """(3 m,): masses, damping and stiffness to the ground at each."""
     return np.concatenate([np.diag(part) for part in structure.grounded_parts(unknowns)])
 
@@ -67,7 +67,7 @@ def _covariance(fit: AnyFit) -> FloatArray:
     return np.asarray(left * inverse / np.outer(size, size))
 
 
-def _absolute(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
+def _to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
     """e = |L| (z - hᵀ x): z is where an oscillator of mass |L|² is, along its direction h."""
     n, carrier, rest = model.coordinates, slice(m, 2 * m) if joint else slice(0, m), slice(2 * m if joint else m, None)
     participation = model.mass[rest, carrier]

@@ -1,4 +1,4 @@
-"""How many coordinates the data need: one more unknown thing is kept while lines that were not fitted gain by it."""
+"""Order selection of a mechanical model: structures grow while the error on held-out lines falls."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -8,52 +8,53 @@ import numpy as np
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings, OrderTried
 from equalizer.identification.mechanical.mechanical_misfit import LineGroup
 from equalizer.identification.mechanical.mechanical_mode_start import mode_starts
-from equalizer.identification.mechanical.mechanical_refinement import Refined, refined
-from equalizer.identification.mechanical.mechanical_structure import Structure, begun_joint, without_mode
+from equalizer.identification.mechanical.mechanical_refinement import RefinedFit, refine_unknowns
+from equalizer.identification.mechanical.mechanical_structure import Structure, remove_mode, start_joint
 
 LEAST_GAIN = 0.08
-"""Of the left-out squares: less is not worth a mode on a device that no linear model fits."""
+"""Smallest relative fall of the left-out squares that a mode must bring, on a device that no linear model fits."""
 PER_UNKNOWN = 4.0
-"""Times what an unknown gains from noise alone, in the mean squares."""
+"""Smallest gain per unknown, in units of what noise alone gives in the mean squares."""
 REACHED = 1.1
 """Left-out error in units of what noise and floor expect: nothing more to explain."""
 FIRST_STAGE, LEAST_STAGE, STAGE = 6.0, 0.05, 1.5
-"""How far the band reaches at first, times its beginning, or of its end; then times the last stage."""
+"""Upper end of the first stage: times the band's lower end, but at least this share of its upper end; then the ratio
+from stage to stage."""
 CLEAR_DELAY = 4.0
-"""Times smaller must the left-out squares be for a delay to be taken before any mode is."""
+"""Ratio by which a delay must reduce the left-out squares to be taken before any mode."""
 SIMPLER = 1.02
-"""So much worse may the left-out squares be without springs to the ground."""
+"""Ratio by which the left-out squares may rise without springs to the ground."""
 BELOW_JOINT = 0.5
-"""Of the band: where a joint above it is not looked for yet."""
+"""Share of the band up to which a joint is not yet included."""
 ALLOWED = (
     "What is left on lines that were not fitted is no more than noise, what differs between levels, and the share that "
     "no linear model is expected to explain."
 )
 JOINT_BEGUN = (1.1, 1.6)
-"""Times the band's end: where its resonance is sought from."""
+"""Starting frequencies of the joint's resonance, times the band's upper end."""
 
 
-def by_stages(
+def grow_by_stages(
     groups: Sequence[LineGroup],
-    best: Refined[Structure],
+    best: RefinedFit[Structure],
     band_hz: tuple[float, float],
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
     whole: bool = True,
-) -> tuple[Refined[Structure], tuple[OrderTried, ...], str]:
-    """The band grows upwards, for what is fitted below tells where what lies above begins. whole: at its end also small
-    things beside modes are tried."""
-    tried = [_tried("the driven axes alone", best, best.structure, True)]
-    ends = stages(band_hz)
+) -> tuple[RefinedFit[Structure], tuple[OrderTried, ...], str]:
+    """Grow a structure while the band is widened upwards, so that modes below are fitted before those above. whole: at
+    the full band, delay, sensor rotation and sensor shapes are tried too."""
+    tried = [_record_trial("the driven axes alone", best, best.structure, True)]
+    ends = stage_ends(band_hz)
     for number, end in enumerate(ends):
         on_progress(0.9 * number / len(ends))
         band = (band_hz[0], end)
-        lower = [part for group in groups if len((part := group.of(group.frequency_hz <= end)).frequency_hz)]
-        best = refined(lower, best.structure, best.unknowns, band)
+        lower = [part for group in groups if len((part := group.of_lines(group.frequency_hz <= end)).frequency_hz)]
+        best = refine_unknowns(lower, best.structure, best.unknowns, band)
         if number == 0 and best.structure.grounded:
-            best = _without_ground(lower, best, band, tried)
+            best = _try_without_ground(lower, best, band, tried)
         last = number == len(ends) - 1
-        best, reason = _grown(
+        best, reason = _grow_structure(
             lower, best, band, _Limits(settings.most_modes, settings.fit_delay, whole and last), tried
         )
     return best, tuple(tried), reason
@@ -66,36 +67,36 @@ class _Limits:
     whole_band: bool
 
 
-def stages(band_hz: tuple[float, float]) -> tuple[float, ...]:
-    """Ends of the growing band, hertz."""
+def stage_ends(band_hz: tuple[float, float]) -> tuple[float, ...]:
+    """Upper ends of the growing band in hertz."""
     low, high = band_hz
     first = min(high, max(low * FIRST_STAGE, high * LEAST_STAGE))
     count = int(np.ceil(np.log(high / first) / np.log(STAGE))) + 1
     return tuple(float(end) for end in np.geomspace(first, high, count))
 
 
-def _without_ground(
-    groups: Sequence[LineGroup], best: Refined[Structure], band_hz: tuple[float, float], tried: list[OrderTried]
-) -> Refined[Structure]:
+def _try_without_ground(
+    groups: Sequence[LineGroup], best: RefinedFit[Structure], band_hz: tuple[float, float], tried: list[OrderTried]
+) -> RefinedFit[Structure]:
     structure = replace(best.structure, grounded=False)
-    free = refined(groups, structure, best.structure.carried_over(best.unknowns, structure), band_hz)
+    free = refine_unknowns(groups, structure, best.structure.transfer_unknowns(best.unknowns, structure), band_hz)
     simpler = free.left_out <= SIMPLER * best.left_out
-    tried.append(_tried("without springs to the ground", free, structure, simpler))
+    tried.append(_record_trial("without springs to the ground", free, structure, simpler))
     return free if simpler else best
 
 
-def _grown(
+def _grow_structure(
     groups: Sequence[LineGroup],
-    best: Refined[Structure],
+    best: RefinedFit[Structure],
     band_hz: tuple[float, float],
     limits: "_Limits",
     tried: list[OrderTried],
-) -> tuple[Refined[Structure], str]:
-    """With all that earns its place in this band, and why no more."""
+) -> tuple[RefinedFit[Structure], str]:
+    """Add to a structure whatever improves it enough in this band; returns the fit, and why it stopped there."""
     while best.error >= REACHED:
-        for what, larger in _larger(groups, best, band_hz, limits):
-            better = earns_its_place(best, larger)
-            tried.append(_tried(f"{what}, up to {band_hz[1]:.3g} Hz", larger, larger.structure, better))
+        for what, larger in _larger_structures(groups, best, band_hz, limits):
+            better = improves_enough(best, larger)
+            tried.append(_record_trial(f"{what}, up to {band_hz[1]:.3g} Hz", larger, larger.structure, better))
             if better:
                 best = larger
                 break
@@ -109,69 +110,72 @@ def _grown(
     return best, ALLOWED
 
 
-def across_a_joint(
+def grow_across_joint(
     groups: Sequence[LineGroup],
-    best: Refined[Structure],
+    best: RefinedFit[Structure],
     band_hz: tuple[float, float],
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
-) -> tuple[Refined[Structure], tuple[OrderTried, ...], str]:
-    """Below half of the band a joint hardly shows, and oscillators are found without it."""
-    half = max(BELOW_JOINT * band_hz[1], stages(band_hz)[0])
-    lower = [part for group in groups if len((part := group.of(group.frequency_hz <= half)).frequency_hz)]
-    below, tried, _ = by_stages(lower, best, (band_hz[0], half), settings, lambda s: on_progress(0.5 * s), whole=False)
+) -> tuple[RefinedFit[Structure], tuple[OrderTried, ...], str]:
+    """Grow a structure with an elastic joint: oscillators are found without it in the lower half of the band, where it
+    hardly shows."""
+    half = max(BELOW_JOINT * band_hz[1], stage_ends(band_hz)[0])
+    lower = [part for group in groups if len((part := group.of_lines(group.frequency_hz <= half)).frequency_hz)]
+    below, tried, _ = grow_by_stages(
+        lower, best, (band_hz[0], half), settings, lambda s: on_progress(0.5 * s), whole=False
+    )
     structure = replace(below.structure, joint=True)
     found = list(tried)
     fits = []
     for number, times in enumerate(JOINT_BEGUN):
-        begun = begun_joint(structure, below.structure.carried_over(below.unknowns, structure), times * band_hz[1])
-        fits.append(refined(groups, structure, begun, band_hz))
+        begun = start_joint(structure, below.structure.transfer_unknowns(below.unknowns, structure), times * band_hz[1])
+        fits.append(refine_unknowns(groups, structure, begun, band_hz))
         on_progress(0.5 + 0.1 * (number + 1))
-        found.append(_tried(f"with a joint begun at {times * band_hz[1]:.3g} Hz", fits[-1], structure, True))
-    joined = _needed(groups, min(fits, key=lambda each: each.left_out), band_hz, found)
-    grown, reason = _grown(
+        found.append(_record_trial(f"with a joint begun at {times * band_hz[1]:.3g} Hz", fits[-1], structure, True))
+    joined = _drop_spare_modes(groups, min(fits, key=lambda each: each.left_out), band_hz, found)
+    grown, reason = _grow_structure(
         groups, joined, band_hz, _Limits(settings.most_modes, fit_delay=False, whole_band=False), found
     )
     return grown, tuple(found), reason
 
 
-def _needed(
-    groups: Sequence[LineGroup], now: Refined[Structure], band_hz: tuple[float, float], tried: list[OrderTried]
-) -> Refined[Structure]:
-    """Without oscillators that stood in for the joint."""
+def _drop_spare_modes(
+    groups: Sequence[LineGroup], now: RefinedFit[Structure], band_hz: tuple[float, float], tried: list[OrderTried]
+) -> RefinedFit[Structure]:
+    """Remove oscillators that had substituted the joint."""
     for mode in reversed(range(now.structure.modes)):
-        fewer, unknowns = without_mode(now.structure, now.unknowns, mode)
-        fit = refined(groups, fewer, unknowns, band_hz)
-        simpler = not earns_its_place(fit, now)
-        tried.append(_tried(f"without mode {mode + 1}", fit, fewer, simpler))
+        fewer, unknowns = remove_mode(now.structure, now.unknowns, mode)
+        fit = refine_unknowns(groups, fewer, unknowns, band_hz)
+        simpler = not improves_enough(fit, now)
+        tried.append(_record_trial(f"without mode {mode + 1}", fit, fewer, simpler))
         now = fit if simpler else now
     return now
 
 
-def simplest(starts: Sequence[Refined[Structure]]) -> Refined[Structure]:
-    """The best of those with the fewest unknowns, unless more of them earn their place."""
+def choose_simplest(starts: Sequence[RefinedFit[Structure]]) -> RefinedFit[Structure]:
+    """The best fit of those with the fewest unknowns, unless more unknowns reduce the error clearly."""
     fewest = min(each.structure.parameters for each in starts)
     best = min((each for each in starts if each.structure.parameters == fewest), key=lambda each: each.left_out)
     richer = min(starts, key=lambda each: each.left_out)
     return richer if CLEAR_DELAY * richer.left_out < best.left_out else best
 
 
-def earns_its_place(now: Refined[Structure], larger: Refined[Structure]) -> bool:
+def improves_enough(now: RefinedFit[Structure], larger: RefinedFit[Structure]) -> bool:
     gain = now.left_out - larger.left_out
     unknowns = larger.structure.parameters - now.structure.parameters
     by_chance = unknowns * larger.left_out / max(larger.left_out_count, 1)
     return gain > max(LEAST_GAIN * now.left_out, PER_UNKNOWN * by_chance)
 
 
-def _larger(
-    groups: Sequence[LineGroup], now: Refined[Structure], band_hz: tuple[float, float], limits: _Limits
-) -> Iterator[tuple[str, Refined[Structure]]]:
-    """One thing more, the cheaper ones first."""
+def _larger_structures(
+    groups: Sequence[LineGroup], now: RefinedFit[Structure], band_hz: tuple[float, float], limits: _Limits
+) -> Iterator[tuple[str, RefinedFit[Structure]]]:
+    """Fits of structures with one extension more, the cheaper ones first."""
     structure = now.structure
     starts = mode_starts(groups, now, band_hz) if structure.modes < limits.most_modes else ()
     for start in starts:
         what = f"with a mode begun at {start.frequency_hz:.3g} Hz ({start.structure.modes} in all)"
-        yield what, refined(groups, start.structure, start.unknowns, band_hz)
+        yield what, refine_unknowns(groups, start.structure, start.unknowns, band_hz)
     if structure.inputs > 1 and not limits.whole_band:  # what is between axes shows once all modes are there
         return
     small: list[tuple[str, Structure]] = []
@@ -182,13 +186,13 @@ def _larger(
     if structure.inputs > 1 and not structure.turned:
         small.append(("with a turned sensor", replace(structure, turned=True)))
     for what, other in small:
-        yield what, refined(groups, other, structure.carried_over(now.unknowns, other), band_hz)
+        yield what, refine_unknowns(groups, other, structure.transfer_unknowns(now.unknowns, other), band_hz)
     for start in () if structure.shared else starts[:1]:
         other = replace(start.structure, shared=True)
-        unknowns = start.structure.carried_over(start.unknowns, other)
+        unknowns = start.structure.transfer_unknowns(start.unknowns, other)
         what = f"with a mode begun at {start.frequency_hz:.3g} Hz that the sensors see ({other.modes} in all)"
-        yield what, refined(groups, other, unknowns, band_hz)
+        yield what, refine_unknowns(groups, other, unknowns, band_hz)
 
 
-def _tried(what: str, fit: Refined[Structure], structure: Structure, accepted: bool) -> OrderTried:
+def _record_trial(what: str, fit: RefinedFit[Structure], structure: Structure, accepted: bool) -> OrderTried:
     return OrderTried(what, structure.coordinates, structure.parameters, fit.error, accepted)

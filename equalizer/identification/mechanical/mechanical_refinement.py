@@ -1,4 +1,4 @@
-"""The unknowns of a structure, refined on measured lines: weighted least squares of the output's error."""
+"""Refinement of a structure's unknowns by weighted nonlinear least squares of the output error on measured lines."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from equalizer.identification.mechanical.mechanical_misfit import LineGroup, jacobian, misfits, stacked
+from equalizer.identification.mechanical.mechanical_misfit import LineGroup, misfits, numerical_jacobian, stack_real
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
@@ -16,7 +16,7 @@ S = TypeVar("S", Structure, ModalStructure)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Refined(Generic[S]):
+class RefinedFit(Generic[S]):
     structure: S
     unknowns: FloatArray
     squares: float
@@ -29,18 +29,18 @@ class Refined(Generic[S]):
 
     @property
     def error(self) -> float:
-        """On lines left out, where there are any."""
+        """Root mean square on the lines that were left out."""
         return float(np.sqrt(self.left_out / max(self.left_out_count, 1)))
 
 
-def refined(
+def refine_unknowns(
     groups: Sequence[LineGroup],
     structure: S,
     start: FloatArray,
     band_hz: tuple[float, float],
     most_steps: int = 40,
-) -> Refined[S]:
-    """Raises ValueError where the start itself is no model."""
+) -> RefinedFit[S]:
+    """Refine unknowns from a start (parameters,). Raises ValueError where the start itself is not a valid model."""
     # Here, for a diagnosis that fits no model need not wait for the import.
     from scipy.optimize import least_squares
 
@@ -48,11 +48,11 @@ def refined(
     low, high = structure.bounds(band_hz)
 
     start = np.clip(start, low + 1e-9, high - 1e-9)
-    worst = stacked(misfits(fitted, structure.model(start)))
+    worst = stack_real(misfits(fitted, structure.model(start)))
 
     def residuals(unknowns: FloatArray) -> FloatArray:
         try:
-            found = stacked(misfits(fitted, structure.model(unknowns)))
+            found = stack_real(misfits(fitted, structure.model(unknowns)))
         except (np.linalg.LinAlgError, MechanicalModelError):
             return np.full_like(worst, 1e6)
         return found if np.isfinite(found).all() else np.full_like(worst, 1e6)
@@ -60,7 +60,7 @@ def refined(
     answer = least_squares(
         residuals,
         start,
-        jac=lambda unknowns: jacobian(residuals, unknowns, residuals(unknowns), high),
+        jac=lambda unknowns: numerical_jacobian(residuals, unknowns, residuals(unknowns), high),
         bounds=(low, high),
         method="trf",
         x_scale="jac",
@@ -68,11 +68,11 @@ def refined(
         ftol=1e-6,
         xtol=1e-7,
     )
-    left_out, count = _left_out(groups, structure.model(answer.x))
-    return Refined(structure, answer.x, 2 * float(answer.cost), left_out, count, answer.jac)
+    left_out, count = _left_out_squares(groups, structure.model(answer.x))
+    return RefinedFit(structure, answer.x, 2 * float(answer.cost), left_out, count, answer.jac)
 
 
-def _left_out(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
+def _left_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
     """Sum of squares, and how many."""
     pairs = list(zip(groups, misfits(groups, model), strict=True))
     squares = sum(np.sum(np.abs(misfit[group.left_out]) ** 2) for group, misfit in pairs)

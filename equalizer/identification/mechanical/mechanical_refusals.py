@@ -1,11 +1,11 @@
-"""When no mechanical model is made of the recordings, and what would do."""
+"""Conditions under which a mechanical fit is refused, with the remedy in the message."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
-from equalizer.identification.mechanical.mechanical_refinement import Refined
+from equalizer.identification.mechanical.mechanical_refinement import RefinedFit
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -14,23 +14,25 @@ from equalizer.signals.signal import FloatArray, Signal
 
 LEAST_SAMPLES = 64
 ALL_NOISE = 0.97
-"""Simulation's error over the response: a model explains less than a twentieth of its power."""
+"""Relative simulation error above which a model explains less than a twentieth of the response's power."""
 
 
-def refuse_unfit(recordings: Sequence[Recording]) -> None:
-    """What can be seen before anything is computed. Raises MechanicalFitRefused."""
+def refuse_unsuitable(recordings: Sequence[Recording]) -> None:
+    """Check the recordings before a fit. Raises MechanicalFitRefused."""
     if not recordings:
         raise MechanicalFitRefused("there is no recording to fit a model to")
     first = recordings[0]
     for number, other in enumerate(recordings[1:], start=2):
-        for what, each, two in (
+        for what, each, found in (
             ("sample rate", first.sample_rate_hz, other.sample_rate_hz),
             ("hold", first.hold.value, other.hold.value),
-            ("command", _words(first.command), _words(other.command)),
-            ("response", _words(first.response), _words(other.response)),
+            ("command", _channels_text(first.command), _channels_text(other.command)),
+            ("response", _channels_text(first.response), _channels_text(other.response)),
         ):
-            if each != two:
-                raise MechanicalFitRefused(f"recording {number} has the {what} {two}, the first {each}; fit them apart")
+            if each != found:
+                raise MechanicalFitRefused(
+                    f"recording {number} has the {what} {found}, the first {each}; fit them apart"
+                )
     quantities = set(first.response.quantities)
     if len(quantities) > 1 or not quantities <= set(DERIVATIVE_OF_QUANTITY):
         raise MechanicalFitRefused(
@@ -68,8 +70,8 @@ def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
         )
 
 
-def refuse_unstable(final: Refined[Structure] | Refined[ModalStructure]) -> None:
-    """Raises MechanicalFitRefused for a fit that moves by itself."""
+def refuse_unstable(final: RefinedFit[Structure] | RefinedFit[ModalStructure]) -> None:
+    """Raises MechanicalFitRefused for a fit with unstable poles."""
     from equalizer.identification.mechanical.mechanical_response import pole_form
 
     form = pole_form(final.structure.model(final.unknowns))
@@ -81,5 +83,5 @@ def refuse_unstable(final: Refined[Structure] | Refined[ModalStructure]) -> None
         )
 
 
-def _words(signal: Signal) -> str:
+def _channels_text(signal: Signal) -> str:
     return ", ".join(f"{name} ({unit})" for name, unit in zip(signal.channels, signal.units, strict=True))

@@ -1,7 +1,7 @@
-"""What a mechanical model answers at given frequencies, sampled exactly as recordings are.
+"""Frequency response of a mechanical model, sampled exactly as recordings are.
 
-Through the poles of M a + D v + K q = B u: each answers a held command in closed form, so that a line costs a product
-of small matrices. `response[k]` is taken just before `command[k]` is written; see `equalizer.signals.recording`.
+By the poles of M a + D v + K q = B u: the response of each to a held command has a closed form, so that a line costs a
+product of small matrices. `response[k]` is taken just before `command[k]` is written, as in `signals.recording`.
 """
 
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 _SMALL = 1e-9
-"""Of a pole times the step: below it the pole integrates."""
+"""Magnitude of a pole times the step below which it is taken as an integrator."""
 _FASTEST_GROWTH = 200.0
 """Of a pole's real part times the step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoleForm:
-    """Of the plant in continuous time, without delay and sensor."""
+    """Pole-residue form of the plant in continuous time, without delay and sensor."""
 
     poles: ComplexArray
     """(states,), 1/s"""
@@ -36,7 +36,7 @@ class PoleForm:
 
 
 def pole_form(model: MechanicalModel) -> PoleForm:
-    """Raises numpy.linalg.LinAlgError where the poles cannot be told apart at all."""
+    """Pole-residue form of a model. Raises numpy.linalg.LinAlgError where its state matrix cannot be diagonalised."""
     n, m = model.coordinates, model.inputs
     weights = np.linalg.solve(model.mass, np.concatenate([model.stiffness, model.damping, model.input], axis=1))
     A = np.zeros((2 * n, 2 * n))
@@ -47,7 +47,7 @@ def pole_form(model: MechanicalModel) -> PoleForm:
     C = model.output @ (A[n:] if order == 2 else np.eye(2 * n)[order * n : (order + 1) * n])
     direct = model.output @ B[n:] if order == 2 else np.zeros((model.outputs, m))
     if model.actuator.bandwidth_hz:
-        A, B, C, direct = _behind_a_pole(A, B, C, direct, 2 * np.pi * model.actuator.bandwidth_hz)
+        A, B, C, direct = _append_input_lag(A, B, C, direct, 2 * np.pi * model.actuator.bandwidth_hz)
     poles, vectors = np.linalg.eig(A)
     inverse = np.linalg.inv(vectors)
     return PoleForm(poles.astype(complex), C @ vectors, inverse @ B, direct, inverse.astype(complex))
@@ -56,19 +56,20 @@ def pole_form(model: MechanicalModel) -> PoleForm:
 def sampled_response(
     model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, hold: Hold, form: PoleForm | None = None
 ) -> ComplexArray:
-    """(lines, p, m), sensor and delay included; frequencies above zero. form: the model's, where it is known."""
+    """Frequency response (lines, p, m), sensor and delay included; frequencies above zero. form: the model's, if
+    known."""
     form = form or pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
-    answers, direct = pole_answers(form.poles, z, rate_hz, hold, model.actuator.delay_s)
-    response = _through(answers, form.outputs, form.inputs) + direct[:, None, None] * form.direct
+    answers, direct = pole_responses(form.poles, z, rate_hz, hold, model.actuator.delay_s)
+    response = _sum_poles(answers, form.outputs, form.inputs) + direct[:, None, None] * form.direct
     return np.asarray(response * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
 
 
 def free_response(
     model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, form: PoleForm | None = None
 ) -> ComplexArray:
-    """(lines, p, 2n): spectra of what each initial state alone would give, per state's wrap from end to beginning.
-    form: the model's, where it is known.
+    """(lines, p, 2n): spectra of the free response to each state, per difference between its last and first value.
+    form: the model's, if known.
 
     A segment's spectrum is the response to its commands plus a real combination of these.
     """
@@ -77,11 +78,11 @@ def free_response(
     # A fit may try a model that is unstable: beyond this growth per sample, it has run away all the same.
     growth = np.minimum(form.poles.real / rate_hz, _FASTEST_GROWTH) + 1j * form.poles.imag / rate_hz
     decays = z[:, None] / (z[:, None] - np.exp(growth))
-    spectra = _through(decays, form.outputs, form.states)
+    spectra = _sum_poles(decays, form.outputs, form.states)
     return np.asarray(spectra * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
 
 
-def _through(answers: ComplexArray, outputs: ComplexArray, inputs: ComplexArray) -> ComplexArray:
+def _sum_poles(answers: ComplexArray, outputs: ComplexArray, inputs: ComplexArray) -> ComplexArray:
     """(lines, p, m), in one product of matrices. answers: (lines, poles)."""
     residues = outputs.T[:, :, None] * inputs[:, None, :]
     flat = answers @ residues.reshape(len(residues), -1)
@@ -96,7 +97,7 @@ def sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> Com
     return np.asarray((1 - left) / (1 - left / z))
 
 
-def _behind_a_pole(
+def _append_input_lag(
     A: FloatArray, B: FloatArray, C: FloatArray, direct: FloatArray, rate: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     n, m = B.shape
@@ -105,7 +106,7 @@ def _behind_a_pole(
     return lagged, driven, np.concatenate([C, direct], axis=1), np.zeros_like(direct)
 
 
-def pole_answers(
+def pole_responses(
     poles: ComplexArray, z: ComplexArray, rate_hz: float, hold: Hold, delay_s: float
 ) -> tuple[ComplexArray, ComplexArray]:
     """(lines, poles), (lines,): what a pole, and what goes straight through, makes of a command."""
@@ -116,26 +117,26 @@ def pole_answers(
         whole = np.floor(delay_s * rate_hz + 1e-9)
         late = max(delay_s - whole * step, 0.0)
         early = step - late
-        first = _integral(poles, early)
-        second = np.exp(poles * early) * _integral(poles, late)
+        first = _integrate_exponential(poles, early)
+        second = np.exp(poles * early) * _integrate_exponential(poles, late)
         away = column ** (-whole)
         return away * (first + second / column) / (column - np.exp(poles * step)), z ** (-whole - 1)
     delayed = np.exp(-np.log(z) * delay_s * rate_hz)
     if hold is Hold.LINEAR:
-        ramp = _ramp(poles, step)
+        ramp = _integrate_ramp(poles, step)
         away = column - np.exp(poles * step)
-        return delayed[:, None] * (_integral(poles, step) + ramp * (column - 1)) / away, delayed
+        return delayed[:, None] * (_integrate_exponential(poles, step) + ramp * (column - 1)) / away, delayed
     return delayed[:, None] / (np.log(column) * rate_hz - poles), delayed
 
 
-def _integral(poles: ComplexArray, seconds: float) -> ComplexArray:
+def _integrate_exponential(poles: ComplexArray, seconds: float) -> ComplexArray:
     """Of e^(p t) from 0 on; (poles,)."""
     small = np.abs(poles) * seconds < _SMALL
     safe = np.where(small, 1.0, poles)
     return np.asarray(np.where(small, seconds, np.expm1(safe * seconds) / safe))
 
 
-def _ramp(poles: ComplexArray, step: float) -> ComplexArray:
+def _integrate_ramp(poles: ComplexArray, step: float) -> ComplexArray:
     """What a command that rises by one over the step adds by its end; (poles,)."""
     small = np.abs(poles) * step < 1e-4
     safe = np.where(small, 1.0, poles)

@@ -1,4 +1,4 @@
-"""Where the fit of a mechanical model starts: least squares on the dynamic stiffness."""
+"""Starting values of a mechanical fit: linear least squares on the dynamic stiffness."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines
 from equalizer.identification.mechanical.mechanical_response import sensor_response
-from equalizer.identification.mechanical.mechanical_structure import Structure, packed_mass, packed_square
+from equalizer.identification.mechanical.mechanical_structure import Structure, pack_mass, pack_square_root
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
@@ -19,16 +19,16 @@ _MOST_DELAY_CYCLES = 8.0
 
 
 def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: float) -> tuple[Structure, FloatArray]:
-    """Unknowns of a structure without modes; in it the signs and scales that the data ask for."""
+    """Structure without modes, with the signs and scales that the data require, and its unknowns."""
     m = structure.inputs
     if structure.delayed:
         delays_s = np.linspace(0.0, _MOST_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _DELAYS)
-        solved = [_solved(segments, structure, floor, float(delay_s)) for delay_s in delays_s]
+        solved = [_solve_matrices(segments, structure, floor, float(delay_s)) for delay_s in delays_s]
         delay_s = float(delays_s[int(np.argmin([left for _, left in solved]))])
     else:
         delay_s = structure.actuator.delay_s
-    parts = _solved(segments, structure, floor, delay_s)[0].reshape(3, -1)
-    mass, damping, stiffness = (symmetric(part, m) for part in parts)
+    parts = _solve_matrices(segments, structure, floor, delay_s)[0].reshape(3, -1)
+    mass, damping, stiffness = (symmetric_matrix(part, m) for part in parts)
     if m == 1 and mass[0, 0] < 0 and structure.signs == (1.0,):
         return rigid_start(segments, replace(structure, signs=(-1.0,)), floor)
     values, vectors = np.linalg.eigh(mass)
@@ -38,21 +38,21 @@ def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: f
     units = structure.units
     unknowns = np.zeros(structure.parameters)
     unknowns[structure.slices["delay"]] = delay_s / structure.step_s
-    unknowns[structure.slices["mass"]] = packed_mass(mass / units[0])
-    unknowns[structure.slices["damping"]] = packed_square(_not_negative(damping) / units[1])
+    unknowns[structure.slices["mass"]] = pack_mass(mass / units[0])
+    unknowns[structure.slices["damping"]] = pack_square_root(_make_positive(damping) / units[1])
     if structure.grounded:
-        unknowns[structure.slices["stiffness"]] = packed_square(_not_negative(stiffness) / units[2])
+        unknowns[structure.slices["stiffness"]] = pack_square_root(_make_positive(stiffness) / units[2])
     if structure.outputs > m:
         unknowns[structure.slices["rows"]] = _other_rows(segments, m).ravel()
     return structure, unknowns
 
 
-def _solved(
+def _solve_matrices(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, float]:
-    """Entries of the three matrices, and the squares that are left."""
+    """Entries of the three matrices, and the residual sum of squares."""
     rows, right = _stiffness_rows(segments, structure, floor, delay_s)
-    found = scaled_least_squares(rows, right)
+    found = solve_scaled(rows, right)
     m = structure.inputs
     return found[: 3 * m * (m + 1) // 2], float(np.sum((right - rows @ found) ** 2))
 
@@ -60,7 +60,8 @@ def _solved(
 def _stiffness_rows(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """u = M a + D v + K x, and what a segment's ends add; real rows, weighted by the force's expected error."""
+    """Real regressors and target of u = M a + D v + K x plus each segment's transient, weighted by the force's expected
+    error."""
     m, order = structure.inputs, DERIVATIVE_OF_QUANTITY[structure.quantity]
     late_steps = 1.0 if order == 2 else 0.5
     blocks, right = [], []
@@ -76,7 +77,9 @@ def _stiffness_rows(
         noise = np.sqrt(np.nan_to_num(each.noise[:, :m]).sum(axis=1)) / np.maximum(size, 1e-300)
         weight = each.excited / (np.linalg.norm(each.command, axis=1) * np.hypot(5 * floor, noise) + 1e-300)
         columns = [
-            _acting(moved * (s ** (power - order))[:, None], one_of) for power in (2, 1, 0) for one_of in pairs(m)
+            _entry_force(moved * (s ** (power - order))[:, None], pair)
+            for power in (2, 1, 0)
+            for pair in triangle_pairs(m)
         ]
         ends = np.zeros((len(s), m, 3 * m * len(transients)), dtype=np.complex128)
         if each.transient:
@@ -93,12 +96,12 @@ def _stiffness_rows(
     )
 
 
-def pairs(m: int) -> list[tuple[int, int]]:
+def triangle_pairs(m: int) -> list[tuple[int, int]]:
     return list(zip(*(part.tolist() for part in np.tril_indices(m)), strict=True))
 
 
-def _acting(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:
-    """(lines, m): force of a unit entry of a symmetric matrix. motion: (lines, m)."""
+def _entry_force(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:
+    """(lines, m): force of a unit entry of a symmetric matrix along a motion (lines, m)."""
     force = np.zeros_like(motion)
     row, column = pair
     force[:, row] += motion[:, column]
@@ -107,24 +110,24 @@ def _acting(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:
     return force
 
 
-def scaled_least_squares(rows: FloatArray, right: FloatArray) -> FloatArray:
+def solve_scaled(rows: FloatArray, right: FloatArray) -> FloatArray:
     scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
     return np.asarray(np.linalg.lstsq(rows / scale, right, rcond=1e-12)[0] / scale)
 
 
-def symmetric(entries: FloatArray, m: int) -> FloatArray:
+def symmetric_matrix(entries: FloatArray, m: int) -> FloatArray:
     lower = np.zeros((m, m))
     lower[np.tril_indices(m)] = entries
     return np.asarray(lower + np.tril(lower, -1).T)
 
 
-def _not_negative(matrix: FloatArray) -> FloatArray:
+def _make_positive(matrix: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(matrix)
     return np.asarray((vectors * np.maximum(values, 1e-3 * max(np.abs(values).max(), 1e-300))) @ vectors.T)
 
 
 def _other_rows(segments: Sequence[SegmentLines], m: int) -> FloatArray:
-    """(p - m, m): what the other responses see of the driven axes."""
+    """(p - m, m): output rows of the other responses on the driven axes, by least squares."""
     own = np.concatenate([segment.response[:, :m] for segment in segments])
     others = np.concatenate([segment.response[:, m:] for segment in segments])
     return np.asarray(

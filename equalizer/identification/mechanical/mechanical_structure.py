@@ -1,9 +1,9 @@
-"""The unknowns of a mechanical model: masses, dampers and springs at the driven axes, and oscillators on them.
+"""Parametrisation of a mechanical model: masses, dampers and springs at the driven axes, and oscillators on them.
 
 M a + D v + K x = u at the m driven axes. An oscillator with frequency w, damping ratio d and participation vector L
 (root of its mass times its direction) has the relative coordinate e: e'' + 2 d w e' + w² e = -Lᵀ a. Responses see the
 driven axes through `output` rows, the oscillators through rows of their own. An elastic joint may lie between the
-driven axes and what sensors and oscillators sit on; see `mechanical_joint`.
+driven axes and what sensors and oscillators sit on; see `insert_joint`.
 """
 
 from dataclasses import dataclass, field, replace
@@ -19,7 +19,7 @@ DRIVEN_SHARE = 0.5
 """Of the mass that is no oscillator's."""
 
 
-def across_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: float) -> MechanicalModel:
+def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: float) -> MechanicalModel:
     """The driven axes, the axes beyond the joint, oscillators relative to these. model: of the driven axes and
     oscillators relative to them. stiffness: (m, m), positive definite. loss_s: the joint's damping over its stiffness.
 
@@ -59,7 +59,7 @@ _JOINT_LOSS = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """What is unknown; its numbers are a vector, in units that make them about one."""
+    """Which parts a model has; its unknowns are a vector, scaled to about one."""
 
     inputs: int
     outputs: int
@@ -116,8 +116,8 @@ class Structure:
             self.mass_scale * self.speed_scale**2,
         )
 
-    def carried_over(self, unknowns: FloatArray, other: "Structure") -> FloatArray:
-        """The same in a structure with more unknowns, which begin at zero, or with fewer."""
+    def transfer_unknowns(self, unknowns: FloatArray, other: "Structure") -> FloatArray:
+        """The unknowns in a structure with more of them, which begin at zero, or with fewer."""
         grown = np.zeros(other.parameters)
         for name, part in self.slices.items():
             there = other.slices[name]
@@ -134,18 +134,18 @@ class Structure:
         return grown
 
     def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
-        """In relative coordinates. Raises MechanicalModelError for what is no mass."""
+        """The model in relative coordinates. Raises MechanicalModelError where the mass is not positive definite."""
         m, part = self.inputs, self.slices
         mass, damping, stiffness = self.grounded_parts(unknowns)
         frequency, ratio, participation, seen = self.oscillators(unknowns)
-        own = np.diag(self.signs) @ _turn(unknowns[part["turn"]], m)
+        own = np.diag(self.signs) @ _cayley_rotation(unknowns[part["turn"]], m)
         rows = np.concatenate([own, unknowns[part["rows"]].reshape(-1, m)])
         whole = MechanicalModel(
             name=name,
             quantity=self.quantity,
-            mass=_joined(mass + participation.T @ participation, participation, np.ones(self.modes)),
-            damping=_joined(damping, None, 2 * ratio * frequency),
-            stiffness=_joined(stiffness, None, frequency**2),
+            mass=_assemble_matrix(mass + participation.T @ participation, participation, np.ones(self.modes)),
+            damping=_assemble_matrix(damping, None, 2 * ratio * frequency),
+            stiffness=_assemble_matrix(stiffness, None, frequency**2),
             input=np.concatenate([np.eye(m), np.zeros((self.modes, m))]),
             output=np.concatenate([rows, seen.T], axis=1),
             sensor=self.sensor,
@@ -155,18 +155,18 @@ class Structure:
         if not self.joint:
             return whole
         joint = unknowns[part["joint"]]
-        lower = _lower(joint[:-1], m)
-        return across_joint(whole, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
+        lower = _unpack_triangle(joint[:-1], m)
+        return insert_joint(whole, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
 
     def grounded_parts(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Mass without that of oscillators, damping and stiffness at the driven axes, (m, m) each."""
         m, part, units = self.inputs, self.slices, self.units
-        lower = _lower(unknowns[part["mass"]], m)
-        stiffness = units[2] * _square(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
-        return units[0] * lower @ lower.T, units[1] * _square(unknowns[part["damping"]], m), stiffness
+        lower = _unpack_triangle(unknowns[part["mass"]], m)
+        stiffness = units[2] * _unpack_square(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
+        return units[0] * lower @ lower.T, units[1] * _unpack_square(unknowns[part["damping"]], m), stiffness
 
     def bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-        """Within which unknowns are sought: no negative damper or spring, modes about the band."""
+        """Lower and upper bounds of the unknowns: no negative damper or spring, modes near the band."""
         low, high = np.full(self.parameters, -np.inf), np.full(self.parameters, np.inf)
         part, diagonal = self.slices, diagonal_places(self.inputs)
         for name in ("damping", "stiffness"):
@@ -204,20 +204,20 @@ class Structure:
         return self.speed_scale * np.exp(each[:, 0]), np.exp(each[:, 1]), root * each[:, 2 : 2 + m], seen
 
 
-def packed_mass(mass: FloatArray) -> FloatArray:
-    """Unknowns of a mass in the structure's unit. mass: (m, m), positive definite."""
+def pack_mass(mass: FloatArray) -> FloatArray:
+    """Unknowns of a mass (m, m), positive definite, in the structure's unit: its Cholesky factor, diagonal as logs."""
     lower = np.linalg.cholesky(mass)
     np.fill_diagonal(lower, np.log(np.diag(lower)))
-    return np.asarray(lower[_triangle(len(mass))])
+    return np.asarray(lower[_triangle_indices(len(mass))])
 
 
-def packed_square(matrix: FloatArray) -> FloatArray:
-    """Likewise of a damping or stiffness: as its root, so that none can feed a motion. matrix: positive definite."""
-    return np.asarray(np.linalg.cholesky(matrix)[_triangle(len(matrix))])
+def pack_square_root(matrix: FloatArray) -> FloatArray:
+    """Unknowns of a damping or stiffness (m, m), positive definite: its Cholesky factor, so that it stays passive."""
+    return np.asarray(np.linalg.cholesky(matrix)[_triangle_indices(len(matrix))])
 
 
-def begun_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float) -> FloatArray:
-    """The unknowns with a joint alike along all axes, whose resonance lies there."""
+def start_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float) -> FloatArray:
+    """The unknowns with an isotropic joint whose resonance is at frequency_hz."""
     mass = structure.grounded_parts(unknowns)[0]
     m, part = structure.inputs, structure.slices["joint"]
     shared = float(np.trace(mass)) / m * DRIVEN_SHARE * (1 - DRIVEN_SHARE)
@@ -229,7 +229,7 @@ def begun_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float)
     return begun
 
 
-def without_mode(structure: Structure, unknowns: FloatArray, number: int) -> tuple[Structure, FloatArray]:
+def remove_mode(structure: Structure, unknowns: FloatArray, number: int) -> tuple[Structure, FloatArray]:
     part = structure.slices["modes"]
     rows = np.delete(unknowns[part].reshape(structure.modes, -1), number, axis=0)
     return replace(structure, modes=structure.modes - 1), np.concatenate([unknowns[: part.start], rows.ravel()])
@@ -237,30 +237,30 @@ def without_mode(structure: Structure, unknowns: FloatArray, number: int) -> tup
 
 def diagonal_places(m: int) -> npt.NDArray[np.intp]:
     """Which of the unknowns of a symmetric matrix stand on its diagonal."""
-    rows, columns = _triangle(m)
+    rows, columns = _triangle_indices(m)
     return np.flatnonzero(rows == columns)
 
 
 @cache
-def _triangle(m: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def _triangle_indices(m: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     return np.tril_indices(m)  # kept, for a fit asks some ten thousand times
 
 
-def _lower(unknowns: FloatArray, m: int) -> FloatArray:
+def _unpack_triangle(unknowns: FloatArray, m: int) -> FloatArray:
     lower = np.zeros((m, m))
-    lower[_triangle(m)] = unknowns
+    lower[_triangle_indices(m)] = unknowns
     np.fill_diagonal(lower, np.exp(np.diag(lower)))
     return lower
 
 
-def _square(unknowns: FloatArray, m: int) -> FloatArray:
+def _unpack_square(unknowns: FloatArray, m: int) -> FloatArray:
     lower = np.zeros((m, m))
-    lower[_triangle(m)] = unknowns
+    lower[_triangle_indices(m)] = unknowns
     return np.asarray(lower @ lower.T)
 
 
-def _turn(angles: FloatArray, m: int) -> FloatArray:
-    """Rows that see the axes turned: the rotation that the skew matrix's Cayley transform gives."""
+def _cayley_rotation(angles: FloatArray, m: int) -> FloatArray:
+    """Rotation (m, m) as the Cayley transform of a skew-symmetric matrix of small angles."""
     if not len(angles):
         return np.eye(m)
     skew = np.zeros((m, m))
@@ -269,8 +269,8 @@ def _turn(angles: FloatArray, m: int) -> FloatArray:
     return np.asarray(np.linalg.solve(np.eye(m) - skew, np.eye(m) + skew))
 
 
-def _joined(driven: FloatArray, between: FloatArray | None, own: FloatArray) -> FloatArray:
-    """Driven axes first, then the oscillators. own: (modes,), between: (modes, m)."""
+def _assemble_matrix(driven: FloatArray, between: FloatArray | None, own: FloatArray) -> FloatArray:
+    """Matrix of the driven axes (m, m), then the oscillators. own: (modes,), between: (modes, m)."""
     m, n = len(driven), len(driven) + len(own)
     whole = np.zeros((n, n))
     whole[:m, :m] = driven

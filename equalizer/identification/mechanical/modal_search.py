@@ -1,5 +1,5 @@
-"""Modes of a measured response, found one after the other: frequencies and dampings are searched, shapes follow from
-them by linear least squares (variable projection after Golub and Pereyra, its slope after Kaufman)."""
+"""Sequential search for the modes of a measured response by variable projection: frequencies and dampings are searched,
+shapes follow by linear least squares (Golub and Pereyra; Jacobian after Kaufman)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.identification.mechanical.mechanical_misfit import LineGroup
-from equalizer.identification.mechanical.mechanical_response import pole_answers, sensor_response
+from equalizer.identification.mechanical.mechanical_response import pole_responses, sensor_response
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.lockin import ComplexArray
@@ -31,7 +31,7 @@ class FoundModes:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Solved:
+class _Solution:
     misfit: list[ComplexArray]
     """Per group (lines, p, rows)"""
     bases: list[FloatArray]
@@ -40,7 +40,7 @@ class _Solved:
 
 
 class ModalSearch:
-    """Over some groups of lines, none of which holds the transient of a segment that does not repeat."""
+    """Search on groups of lines, none of which holds the transient of a segment that does not repeat."""
 
     def __init__(
         self, groups: Sequence[LineGroup], structure: Structure, band_hz: tuple[float, float], fit_delay: bool
@@ -53,20 +53,20 @@ class ModalSearch:
         self._known_delay = structure.actuator.delay_s / structure.step_s
         self._kept = [~group.left_out for group in groups]
 
-    def with_one_more(self, now: FoundModes | None) -> FoundModes:
-        """Begun where one more explains most, then all together."""
+    def add_mode(self, now: FoundModes | None) -> FoundModes:
+        """Add a mode where it explains most, then refine all together."""
         logs = np.empty(0) if now is None else now.logs
         delay = self._known_delay if now is None else now.delay_s / self._structure.step_s
         solved = self._solve(np.append(logs, delay))
         low, high = np.log(2 * np.pi * np.array([self._band[0] / 2, self._band[1] * 2]))
         best = max(
-            ((self._explained(solved, np.array([speed, np.log(ratio), delay])), speed, np.log(ratio))
+            ((self._explained_by_mode(solved, np.array([speed, np.log(ratio), delay])), speed, np.log(ratio))
             for speed in np.linspace(low, high, _GRID) for ratio in _RATIOS),
         )  # fmt: skip
         half = len(logs) // 2
-        return self._refined(np.concatenate([logs[:half], [best[1]], logs[half:], [best[2]], [delay]]))
+        return self._refine(np.concatenate([logs[:half], [best[1]], logs[half:], [best[2]], [delay]]))
 
-    def _refined(self, start: FloatArray) -> FoundModes:
+    def _refine(self, start: FloatArray) -> FoundModes:
         # Here, for a diagnosis that fits no model need not wait for the import.
         from scipy.optimize import least_squares
 
@@ -76,9 +76,9 @@ class ModalSearch:
         high = np.concatenate([np.full(half, np.log(2 * np.pi * self._band[1] * 2)), np.full(half, np.log(30.0))])
         low, high = np.append(low, least), np.append(high, most)
         answer = least_squares(
-            lambda unknowns: self._stacked(self._solve(unknowns).misfit),
+            lambda unknowns: self._stack_real(self._solve(unknowns).misfit),
             np.clip(start, low + 1e-10, high - 1e-10),
-            jac=self._slope,
+            jac=self._jacobian,
             bounds=(low, high),
             max_nfev=40,
             ftol=1e-5,
@@ -93,9 +93,9 @@ class ModalSearch:
             int(sum(group.count[group.left_out].sum() for group in self._groups)),
         )
 
-    def _solve(self, unknowns: FloatArray) -> _Solved:
+    def _solve(self, unknowns: FloatArray) -> _Solution:
         m, p, modes = self._structure.inputs, self._structure.outputs, len(unknowns) // 2
-        basis = [self._answers(group, unknowns) for group in self._groups]
+        basis = [self._mode_responses(group, unknowns) for group in self._groups]
         shapes = np.zeros((modes, p, m))
         bases = []
         for out in range(p):
@@ -106,7 +106,7 @@ class ModalSearch:
                 for group, answers, kept in zip(self._groups, basis, self._kept, strict=True)
             ]
             right = [group.target[kept, out].ravel() for group, kept in zip(self._groups, self._kept, strict=True)]
-            design, wanted = _real(np.concatenate(rows)), _real(np.concatenate(right))
+            design, wanted = _real_and_imaginary(np.concatenate(rows)), _real_and_imaginary(np.concatenate(right))
             scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
             q, r = np.linalg.qr(design / scale) if modes else (design, design)
             bases.append(q)
@@ -117,9 +117,9 @@ class ModalSearch:
             group.target - (group.root @ np.einsum("lk,kpm->lpm", answers, shapes)[..., None])[..., 0]
             for group, answers in zip(self._groups, basis, strict=True)
         ]
-        return _Solved(misfit, bases, shapes)
+        return _Solution(misfit, bases, shapes)
 
-    def _slope(self, unknowns: FloatArray) -> FloatArray:
+    def _jacobian(self, unknowns: FloatArray) -> FloatArray:
         solved = self._solve(unknowns)
         half = len(unknowns) // 2
         columns = []
@@ -133,26 +133,27 @@ class ModalSearch:
                 -np.einsum(
                     "lpem,lk,kpm->lpe",
                     group.root,
-                    (self._answers(group, moved[chosen]) - self._answers(group, unknowns[chosen])) / _STEP,
+                    (self._mode_responses(group, moved[chosen]) - self._mode_responses(group, unknowns[chosen]))
+                    / _STEP,
                     solved.shapes[modes],
                     optimize=True,
                 )
                 for group in self._groups
             ]
-            columns.append(self._projected(change, solved.bases))
+            columns.append(self._project_out(change, solved.bases))
         return np.stack(columns, axis=1)
 
-    def _explained(self, solved: _Solved, unknowns: FloatArray) -> float:
-        """Of the misfit's squares by one more mode, all shapes free."""
-        answers = [self._answers(group, unknowns)[:, 0] for group in self._groups]
+    def _explained_by_mode(self, solved: _Solution, unknowns: FloatArray) -> float:
+        """Part of the residual sum of squares that one more mode explains, all shapes free."""
+        answers = [self._mode_responses(group, unknowns)[:, 0] for group in self._groups]
         total = 0.0
         for out, basis in enumerate(solved.bases):
             rows = [
                 (group.root[kept, out] * answer[kept, None, None]).reshape(-1, self._structure.inputs)
                 for group, answer, kept in zip(self._groups, answers, self._kept, strict=True)
             ]
-            design = _real(np.concatenate(rows))
-            wanted = _real(
+            design = _real_and_imaginary(np.concatenate(rows))
+            wanted = _real_and_imaginary(
                 np.concatenate([part[kept, out].ravel() for part, kept in zip(solved.misfit, self._kept, strict=True)])
             )
             design = design - basis @ (basis.T @ design)
@@ -160,25 +161,27 @@ class ModalSearch:
             total += float(np.sum((q.T @ wanted) ** 2))
         return total
 
-    def _projected(self, change: Sequence[ComplexArray], bases: Sequence[FloatArray]) -> FloatArray:
+    def _project_out(self, change: Sequence[ComplexArray], bases: Sequence[FloatArray]) -> FloatArray:
         parts = []
         for out, basis in enumerate(bases):
-            column = _real(
+            column = _real_and_imaginary(
                 np.concatenate([part[kept, out].ravel() for part, kept in zip(change, self._kept, strict=True)])
             )
             parts.append(column - basis @ (basis.T @ column))
         return np.concatenate(parts)
 
-    def _stacked(self, misfit: Sequence[ComplexArray]) -> FloatArray:
+    def _stack_real(self, misfit: Sequence[ComplexArray]) -> FloatArray:
         return np.concatenate(
             [
-                _real(np.concatenate([part[kept, out].ravel() for part, kept in zip(misfit, self._kept, strict=True)]))
+                _real_and_imaginary(
+                    np.concatenate([part[kept, out].ravel() for part, kept in zip(misfit, self._kept, strict=True)])
+                )
                 for out in range(self._structure.outputs)
             ]
         )
 
-    def _answers(self, group: LineGroup, unknowns: FloatArray) -> ComplexArray:
-        """(lines, modes): of modes of unit mass, sampled exactly."""
+    def _mode_responses(self, group: LineGroup, unknowns: FloatArray) -> ComplexArray:
+        """(lines, modes): responses of modes of unit mass, sampled exactly."""
         half = len(unknowns) // 2
         speed, ratio = np.exp(unknowns[:half]), np.exp(unknowns[half : 2 * half])
         delay_s = max(float(unknowns[-1]), 0.0) / group.rate_hz
@@ -187,12 +190,12 @@ class ModalSearch:
         poles = np.concatenate([speed * (-ratio + root), speed * (-ratio - root)])
         other = np.concatenate([poles[half:], poles[:half]])
         z = np.exp(2j * np.pi * group.frequency_hz / group.rate_hz)
-        answers, direct = pole_answers(poles, z, group.rate_hz, group.hold, delay_s)
+        answers, direct = pole_responses(poles, z, group.rate_hz, group.hold, delay_s)
         weighted = answers * (poles**self._order / (poles - other))
         through = direct[:, None] if self._order == 2 else 0.0
         shown = sensor_response(self._structure.sensor.bandwidth_hz, z, group.rate_hz)
         return np.asarray((weighted[:, :half] + weighted[:, half:] + through) * shown[:, None])
 
 
-def _real(values: ComplexArray) -> FloatArray:
+def _real_and_imaginary(values: ComplexArray) -> FloatArray:
     return np.concatenate([values.real, values.imag])

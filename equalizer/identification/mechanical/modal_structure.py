@@ -1,5 +1,5 @@
-"""The unknowns of a mechanical model as a sum of modes, each with its own shape at the commands and at the sensors:
-for devices whose sensors move otherwise than what the commands push."""
+"""Modal parametrisation of a mechanical model: each mode has its own shape at the commands and at the sensors, for
+devices whose sensors are not collocated with the commands."""
 
 from dataclasses import dataclass, replace
 
@@ -9,7 +9,7 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.signal import FloatArray
 
 _WIDEST = 10.0
-"""Times the band: how far from it a mode may lie."""
+"""Ratio by which a mode may lie outside the band."""
 _LARGEST_RATIO = 100.0
 _WEAKEST = 1e-9
 _SHARE = 0.5
@@ -66,10 +66,10 @@ class ModalStructure:
         return low.ravel(), high.ravel()
 
 
-def balanced(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:
-    """(parameters,): factors that leave every response as it is, and let no mode be pushed harder than half of what the
-    slowest one is. What the commands push is not measured by sensors that sit elsewhere; this is the least that moves
-    there, and the mass that it has stays that of a device."""
+def balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:
+    """(parameters,): factors that leave every response unchanged, and limit the input shape of each mode to half of the
+    slowest mode's. Sensors elsewhere do not measure the motion at the commands, which leaves this scale free; the limit
+    keeps the mass there realistic."""
     each = unknowns.reshape(structure.modes, -1)
     pushed = slice(2, 2 + structure.inputs)
     size = np.maximum(np.linalg.norm(each[:, pushed], axis=1), 1e-300)
@@ -82,8 +82,8 @@ def balanced(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:
     return np.asarray(factors.ravel())
 
 
-def at_driven_axes(model: MechanicalModel) -> MechanicalModel:
-    """The same model in other coordinates: first what the commands push, then what hangs on it, each by itself.
+def to_driven_axes(model: MechanicalModel) -> MechanicalModel:
+    """The model in other coordinates: first the driven axes, then the remaining modes with those axes held.
 
     Raises numpy.linalg.LinAlgError where the modes do not move every command's axis by itself."""
     B = model.input

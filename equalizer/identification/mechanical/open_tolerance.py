@@ -1,4 +1,4 @@
-"""How far a model may be re-tuned that was fitted to the very recordings in which physics is sought."""
+"""Tolerance of a model that was fitted to the same recordings in which missing physics is searched for."""
 
 from dataclasses import replace
 
@@ -8,13 +8,13 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 
 MASS, DAMPING, STIFFNESS, MODES = 0.1, 0.5, 0.2, 0.03
-"""Of the largest at any driven axis; of a mode's frequency and mass. Friction reads as damping above all, a hardening
-spring as stiffness, a lag as mass."""
+"""Relative to the largest at any driven axis; of a mode's frequency and mass. A linear fit absorbs friction mainly as
+damping, a hardening spring as stiffness, a lag as mass."""
 
 
-def opened(model: MechanicalModel) -> MechanicalModel:
-    """With a tolerance that is wider than the fit's own: that one is of its misfit, and does not know that a linear
-    model takes on itself what missing physics does."""
+def widen_tolerance(model: MechanicalModel) -> MechanicalModel:
+    """The model with a wider tolerance than the fit's own, which reflects its residuals alone and not that a linear
+    model absorbs missing physics."""
     along = driven_axes(model)
     mass, damping, stiffness = (
         float(np.einsum("ni,nk,ki->i", along, part, along).max())

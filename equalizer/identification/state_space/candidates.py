@@ -1,22 +1,22 @@
-"""Starts for the search, each refined to its nearest best fit, and the choice among them."""
+"""Candidates of the search: starting models, each refined to a local optimum, and the choice among them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.identification.state_space.canonical_variate import canonical_variate, decimation, driven_records
+from equalizer.identification.state_space.canonical_variate import canonical_variate, decimation_factor, driven_records
 from equalizer.identification.state_space.canonical_variate import poles_and_shapes as from_records
 from equalizer.identification.state_space.modal_form import ModalForm
-from equalizer.identification.state_space.refinement import FittedForm, fitted, refine
+from equalizer.identification.state_space.refinement import FittedForm, complete_form, refine
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.stable_poles import Radius, largest_radius
-from equalizer.identification.state_space.warped_subspace import default_horizon, poles_and_shapes, warped_subspace
+from equalizer.identification.state_space.warped_subspace import default_horizon, estimate_subspace, poles_and_shapes
 from equalizer.identification.state_space.weighted_lines import (
     WeightedLines,
+    average_bins,
     bin_centres_hz,
-    binned,
-    bins_of,
+    group_lines,
 )
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
@@ -31,7 +31,7 @@ MOST_STEPS, LAST_STEPS = (60, 20, 20), 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """Where a search begins."""
+    """Starting model of a search."""
 
     name: str
     form: ModalForm
@@ -39,7 +39,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """Where it ended."""
+    """Refined model at the end of a search."""
 
     name: str
     fitted: FittedForm
@@ -62,15 +62,15 @@ def subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> t
 def subspace_start(lines: WeightedLines, settings: IdentificationSettings, longer: int) -> Start:
     radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
     horizon = default_horizon(settings.order, lines.response.shape[1]) + longer
-    subspace = warped_subspace(lines, horizon, settings.centre_hz)
+    subspace = estimate_subspace(lines, horizon, settings.centre_hz)
     return Start(f"warped subspace, horizon {horizon}", poles_and_shapes(subspace, settings.order, radius))
 
 
 def record_starts(
     recordings: Sequence[Recording], lines: WeightedLines, settings: IdentificationSettings
 ) -> tuple[Start, ...]:
-    """From the time domain; none where the band leaves nothing to decimate."""
-    factor = decimation(lines.sample_rate_hz, settings.band_hz[1])
+    """Starts by canonical variate analysis of time records; none where the band leaves no room for decimation."""
+    factor = decimation_factor(lines.sample_rate_hz, settings.band_hz[1])
     if factor < 2:
         return ()
     records = driven_records(recordings, factor)
@@ -85,15 +85,15 @@ def record_starts(
     return tuple(starts)
 
 
-def candidate(start: Start, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
+def refine_start(start: Start, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
     radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
-    return refined(start.name, fitted(start.form, lines), lines, settings, radius)
+    return refine_candidate(start.name, complete_form(start.form, lines), lines, settings, radius)
 
 
-def refined(
+def refine_candidate(
     name: str, found: FittedForm, lines: WeightedLines, settings: IdentificationSettings, radius: Radius
 ) -> Candidate:
-    """On bins, which are formed anew about each pass's result, and at last on all lines of a narrow band."""
+    """Refine a model on bins, which are formed anew about each pass's result, then on all lines of a narrow band."""
     for steps in MOST_STEPS:
         found = refine(found.form, bins_about(found, lines, settings), radius, steps)
     if not settings.wide:
@@ -104,22 +104,22 @@ def refined(
 
 def bins_about(found: FittedForm, lines: WeightedLines, settings: IdentificationSettings) -> WeightedLines:
     """The lines in bins, their means taken about a model that is nearly right."""
-    bins = bins_of(lines, 1, OCTAVE_SHARE) if settings.wide else bins_of(lines, LINES_PER_BIN, 0.0)
+    bins = group_lines(lines, 1, OCTAVE_SHARE) if settings.wide else group_lines(lines, LINES_PER_BIN, 0.0)
     centres = np.exp(2j * np.pi * bin_centres_hz(lines, bins) / lines.sample_rate_hz)
-    return binned(lines, bins, found.response(lines.z), found.response(centres))
+    return average_bins(lines, bins, found.response(lines.z), found.response(centres))
 
 
 def outside_gain(found: FittedForm, lines: WeightedLines) -> float:
     """The largest response anywhere over the largest on the lines."""
     every = np.exp(1j * np.linspace(0, np.pi, 2000))
-    return float(_largest(found.response(every)) / _largest(found.response(lines.z)))
+    return float(_largest_gain(found.response(every)) / _largest_gain(found.response(lines.z)))
 
 
-def best(found: Sequence[Candidate]) -> Candidate:
-    """The cheapest of the sane ones; of none sane, the least extreme."""
+def choose_best(found: Sequence[Candidate]) -> Candidate:
+    """The candidate of lowest cost among the sane; where none is sane, that of the smallest gain outside the band."""
     sane = [each for each in found if each.sane]
     return min(sane, key=lambda each: each.cost) if sane else min(found, key=lambda each: each.outside_gain)
 
 
-def _largest(response: ComplexArray) -> float:
+def _largest_gain(response: ComplexArray) -> float:
     return float(np.linalg.norm(response, ord=2, axis=(1, 2)).max())

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import resample_poly
 
 from equalizer.identification.state_space.modal_form import ModalForm, from_poles
-from equalizer.identification.state_space.stable_poles import reflected
+from equalizer.identification.state_space.stable_poles import stabilise_poles
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -22,13 +22,13 @@ LEAST_SAMPLES = 4
 _SILENT_KINDS = ("rest", "free")
 
 
-def decimation(sample_rate_hz: float, high_hz: float) -> int:
+def decimation_factor(sample_rate_hz: float, high_hz: float) -> int:
     return max(1, int(sample_rate_hz / (RATE_OVER_BAND * high_hz)))
 
 
 def driven_records(recordings: Sequence[Recording], factor: int) -> list[FloatArray]:
-    """Commands and responses side by side, (n, m + p) each: every driven segment that no test was kept for, its mean
-    taken off, both sides decimated alike. Segments with missing samples are left out."""
+    """Commands and responses side by side, (n, m + p) each: every driven segment that is not kept for a test, without
+    its mean, decimated. Segments with missing samples are left out."""
     records = []
     for recording in recordings:
         both = np.hstack([recording.command.samples, recording.response.samples])
@@ -50,8 +50,8 @@ def canonical_variate(records: Sequence[FloatArray], inputs: int, horizon: int) 
     long = [record for record in records if len(record) > LEAST_SAMPLES * rows / max(len(records), 1) + 2 * horizon]
     if not long:
         return None
-    triangle = np.vstack([_triangle(_past_and_future(record, inputs, horizon)) for record in long])
-    triangle = _triangle(triangle)
+    triangle = np.vstack([_qr_triangle(_past_and_future(record, inputs, horizon)) for record in long])
+    triangle = _qr_triangle(triangle)
     p = records[0].shape[1] - inputs
     known, future = horizon * inputs, triangle.shape[1] - horizon * p
     by_past, by_chance = triangle[known:future, future:], triangle[future:, future:]
@@ -62,7 +62,7 @@ def canonical_variate(records: Sequence[FloatArray], inputs: int, horizon: int) 
     return np.asarray(root @ (vectors * np.sqrt(correlations)), dtype=np.float64)
 
 
-def _triangle(rows: FloatArray) -> FloatArray:
+def _qr_triangle(rows: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
 
 
@@ -81,10 +81,11 @@ def _past_and_future(record: FloatArray, inputs: int, horizon: int) -> FloatArra
 
 
 def poles_and_shapes(observed: FloatArray, outputs: int, order: int, factor: int, radius: float) -> ModalForm:
-    """At the full rate: a pole of the decimated records becomes its root. radius: largest pole at the full rate."""
+    """Modal form at the full rate: a pole of the decimated records becomes its factor-th root. radius: largest pole at
+    the full rate."""
     seen = observed[:, :order]
     values, vectors = np.linalg.eig(np.linalg.lstsq(seen[:-outputs], seen[outputs:], rcond=None)[0])
-    slow: ComplexArray = reflected(values, radius**factor)
+    slow: ComplexArray = stabilise_poles(values, radius**factor)
     # A negative real pole has no real root: taken for the equally fast positive one.
     turned = np.where((slow.imag == 0) & (slow.real < 0), -slow, slow)
-    return from_poles(reflected(turned ** (1 / factor), radius), seen[:outputs] @ vectors)
+    return from_poles(stabilise_poles(turned ** (1 / factor), radius), seen[:outputs] @ vectors)

@@ -1,4 +1,4 @@
-"""How well a model predicts what it has not seen: free simulation over the segments that were kept for a test."""
+"""Validation of a model: free simulation over the segments that were kept for a test."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,12 +28,12 @@ class HeldOut:
     """Compared."""
 
 
-def held_out(model: IdentifiedModel, recordings: Sequence[Recording]) -> HeldOut | None:
-    """Over all segments with the role "test"; None where there are none. The command is what entered the plant.
+def validate_on_test(model: IdentifiedModel, recordings: Sequence[Recording]) -> HeldOut | None:
+    """Simulation error over all segments with the role "test"; None where there are none. The command is the total one.
 
     Raises ValueError where channels or rate are not the model's.
     """
-    parts = [_compared(model, recording, segment) for recording, segment in _kept_for_a_test(recordings)]
+    parts = [_compare_segment(model, recording, segment) for recording, segment in _test_segments(recordings)]
     if not parts:
         return None
     power = sum(part.power for part in parts)
@@ -54,17 +54,17 @@ class _Part:
     seconds: float
 
 
-def _kept_for_a_test(recordings: Sequence[Recording]) -> Iterator[tuple[Recording, Segment]]:
+def _test_segments(recordings: Sequence[Recording]) -> Iterator[tuple[Recording, Segment]]:
     for recording in recordings:
         for segment in recording.segments:
             if segment.role == "test":
                 yield recording, segment
 
 
-def _compared(model: IdentifiedModel, recording: Recording, segment: Segment) -> _Part:
-    _check(model, recording)
+def _compare_segment(model: IdentifiedModel, recording: Recording, segment: Segment) -> _Part:
+    _check_compatible(model, recording)
     rate_hz = recording.sample_rate_hz
-    start = max(0, segment.start - _lead(model))
+    start = max(0, segment.start - _lead_samples(model))
     gaps = np.flatnonzero(~np.isfinite(recording.command.samples[start : segment.start]).all(axis=1))
     start += int(gaps[-1]) + 1 if len(gaps) else 0
     commands = recording.command.samples[start : segment.stop]
@@ -72,32 +72,32 @@ def _compared(model: IdentifiedModel, recording: Recording, segment: Segment) ->
     if not (np.isfinite(commands).all() and np.isfinite(response[segment.start - start :]).all()):
         raise ValueError(f"samples {start} to {segment.stop} hold missing values; a test segment needs all of them")
     predicted = simulate(model, commands)
-    last = _last_whole_part(segment) - start
+    last = _compared_from(segment) - start
     length = segment.stop - start - last
-    measured = _in_band(response[last:], rate_hz, model.band_hz)
-    error = measured - _in_band(predicted[last:], rate_hz, model.band_hz)
+    measured = _band_spectrum(response[last:], rate_hz, model.band_hz)
+    error = measured - _band_spectrum(predicted[last:], rate_hz, model.band_hz)
     noise = None
     if segment.period and last - 2 * length >= segment.start - start:  # the first one holds the transient
-        # Of what the model leaves, so that ringing which dies out from period to period is no noise.
-        before = _in_band((response - predicted)[last - length : last], rate_hz, model.band_hz)
+        # Of the residuals, so that free decay from period to period does not count as noise.
+        before = _band_spectrum((response - predicted)[last - length : last], rate_hz, model.band_hz)
         noise = _power(error - before) / 2
     return _Part(_power(error), noise, _power(measured), length / rate_hz)
 
 
-def _lead(model: IdentifiedModel) -> int:
+def _lead_samples(model: IdentifiedModel) -> int:
     """Samples."""
     radius = model.spectral_radius
     slowest = -1 / np.log(radius) if 0 < radius < 1 else 0.0
     return round(max(LEAD_S * model.sample_rate_hz, DECAYS * slowest))
 
 
-def _last_whole_part(segment: Segment) -> int:
+def _compared_from(segment: Segment) -> int:
     """First sample of what is compared: the last period, the transient being over by then, or the whole segment."""
     periods = (segment.stop - segment.start) // segment.period if segment.period else 0
     return segment.stop - segment.period if periods >= 1 else segment.start
 
 
-def _in_band(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> ComplexArray:
+def _band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> ComplexArray:
     lines = np.fft.rfftfreq(len(samples), 1 / rate_hz)
     inside = (lines >= band_hz[0]) & (lines <= band_hz[1])
     if not inside.any():
@@ -109,7 +109,7 @@ def _power(spectrum: ComplexArray) -> float:
     return float((np.abs(spectrum) ** 2).sum())
 
 
-def _check(model: IdentifiedModel, recording: Recording) -> None:
+def _check_compatible(model: IdentifiedModel, recording: Recording) -> None:
     if recording.sample_rate_hz != model.sample_rate_hz:
         raise ValueError(
             f"a recording at {recording.sample_rate_hz:g} Hz cannot test a model at {model.sample_rate_hz:g}"

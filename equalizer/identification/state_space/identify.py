@@ -1,4 +1,4 @@
-"""From measured frequency responses to a model: starts, refinement, choice, uncertainty."""
+"""Identification of a state-space model from measured frequency responses: starts, refinement, choice, uncertainty."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -9,18 +9,24 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.state_space.candidates import (
     Candidate,
     Start,
-    best,
     bins_about,
-    candidate,
+    choose_best,
     record_starts,
+    refine_start,
     subspace_start,
     subspace_starts,
 )
-from equalizer.identification.state_space.misfit import Misfit, misfit_of, unknowns_of
+from equalizer.identification.state_space.misfit import Misfit, count_unknowns, misfit_of
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
 from equalizer.identification.state_space.refinement import FittedForm, refine
-from equalizer.identification.state_space.refusals import IdentificationRefused, lines_or_refusal
-from equalizer.identification.state_space.relaxed_poles import Relaxed, SlowPole, relaxed, relaxed_again, slow_poles
+from equalizer.identification.state_space.refusals import IdentificationRefused, require_lines
+from equalizer.identification.state_space.relaxed_poles import (
+    RelaxedFit,
+    SlowPole,
+    relax_poles,
+    slow_poles,
+    update_relaxed,
+)
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.stable_poles import Radius
 from equalizer.identification.state_space.weighted_lines import WeightedLines
@@ -36,7 +42,7 @@ STEPS = 3
 def parameter_draws(
     fitted: FittedForm, lines: WeightedLines, radius: Radius, noise_factor: float, draws: int, seed: int
 ) -> FloatArray:
-    """(draws, k), in the order of `IdentifiedModel.parameters`: each a fit that equally likely noise would give.
+    """Parametric bootstrap (draws, k), in the order of `IdentifiedModel.parameters`: each a fit to another noise draw.
 
     A covariance from the Jacobian would not do: an order above what the band shows leaves directions in which the
     response hardly changes at first and then at once, so draws from it are unstable models. Refitting keeps every draw
@@ -69,7 +75,7 @@ def response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> Floa
 
 
 FIRST_SEARCH = 0.8
-"""Share of the progress that is told of it; poles are relaxed in the rest."""
+"""Share of the progress that is reported for the first search; poles are relaxed in the rest."""
 BAND_POINTS = 200
 WIDTHS = np.sinh(np.linspace(-4, 4, 41))
 """Places about a slow pole, in half-widths of its peak: dense at the peak, up to 27 away."""
@@ -140,37 +146,39 @@ def identify(
     settings = settings or IdentificationSettings()
     tell = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
-    lines = lines_or_refusal(responses, settings)
+    lines = require_lines(responses, settings)
     _refuse_foreign(records, responses[0])
 
     if near is not None:
-        again = Relaxed(relaxed_again(near, lines, settings), bound_costs=False)
-        return _identified((again.candidate,), again, lines, responses[0], settings)
-    found = _searched(lines, settings, records, lambda share: tell(FIRST_SEARCH * share))
-    after = relaxed(best(found), lambda freer: _searched(lines, freer, records, lambda _: None), lines, settings)
+        again = RelaxedFit(update_relaxed(near, lines, settings), bound_costs=False)
+        return _assess_model((again.candidate,), again, lines, responses[0], settings)
+    found = _search_candidates(lines, settings, records, lambda share: tell(FIRST_SEARCH * share))
+    after = relax_poles(
+        choose_best(found), lambda freer: _search_candidates(lines, freer, records, lambda _: None), lines, settings
+    )
     every = found if after.candidate in found else [*found, after.candidate]
-    identified = _identified(tuple(every), after, lines, responses[0], settings)
+    identified = _assess_model(tuple(every), after, lines, responses[0], settings)
     tell(1.0)
     return identified
 
 
-def _searched(
+def _search_candidates(
     lines: WeightedLines,
     settings: IdentificationSettings,
     records: tuple[Recording, ...],
     tell: Callable[[float], None],
 ) -> list[Candidate]:
-    starts = _starts(lines, settings, records)
+    starts = _make_starts(lines, settings, records)
     found = []
     for number, start in enumerate(starts):
         tell(number / len(starts))
-        found.append(candidate(start, lines, settings))
-    found += _spare_candidates(best(found), lines, settings)
+        found.append(refine_start(start, lines, settings))
+    found += _spare_candidates(choose_best(found), lines, settings)
     tell(1.0)
     return found
 
 
-def _starts(
+def _make_starts(
     lines: WeightedLines, settings: IdentificationSettings, records: tuple[Recording, ...]
 ) -> tuple[Start, ...]:
     try:
@@ -184,18 +192,18 @@ def _starts(
 
 
 def _spare_candidates(so_far: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> list[Candidate]:
-    """Of a wide band, until one leaves no more than noise."""
+    """Further candidates of a wide band, until one leaves no more than noise."""
     found: list[Candidate] = []
     for longer in settings.spare_horizons if settings.wide else ():
-        if best([so_far, *found]).cost <= UNEXPLAINED:
+        if choose_best([so_far, *found]).cost <= UNEXPLAINED:
             break
-        found.append(candidate(subspace_start(lines, settings, longer), lines, settings))
+        found.append(refine_start(subspace_start(lines, settings, longer), lines, settings))
     return found
 
 
-def _identified(
+def _assess_model(
     found: tuple[Candidate, ...],
-    after: Relaxed,
+    after: RelaxedFit,
     lines: WeightedLines,
     like: FrequencyResponse,
     settings: IdentificationSettings,
@@ -203,14 +211,14 @@ def _identified(
     chosen = after.candidate
     low, high = settings.band_hz
     p, m = lines.response.shape[1:]
-    unknowns = unknowns_of(settings.order, p, m)
+    unknowns = count_unknowns(settings.order, p, m)
     cost = chosen.cost * lines.response.size / max(lines.response.size - unknowns / 2, 1.0)
     inside = (lines.frequency_hz >= low) & (lines.frequency_hz <= high)
     modelled = chosen.fitted.response(lines.z)
     error = lines.relative_error(modelled)[inside]
     slow = () if settings.longest_decay_s else slow_poles(chosen, settings.decay_s, lines.sample_rate_hz)
     misfit = misfit_of(lines, modelled, inside, unknowns)
-    model = _model(chosen, lines, cost, like, settings, slow)
+    model = _make_model(chosen, lines, cost, like, settings, slow)
     return Identified(
         model=model,
         cost=cost,
@@ -229,7 +237,7 @@ def _identified(
 
 
 def _scatter(model: IdentifiedModel, frequency_hz: FloatArray, slow: tuple[SlowPole, ...]) -> float | None:
-    """As an integral over the band, and so also between lines, where a narrow resonance has its peak."""
+    """Relative scatter as an integral over the band: also between lines, where a narrow resonance has its peak."""
     if model.samples is None or len(frequency_hz) < 2:
         return None
     low, high = frequency_hz[0], frequency_hz[-1]
@@ -261,7 +269,7 @@ def outside_remark(chosen: Candidate) -> list[str]:
     ]
 
 
-def _model(
+def _make_model(
     chosen: Candidate,
     lines: WeightedLines,
     cost: float,

@@ -1,24 +1,24 @@
-"""From recordings to a model: estimate, fit, and again where something rings so long that starts are heard in the
-estimate, or where the lines scatter more than their noise."""
+"""Identification from recordings: estimate and fit, repeated where long decays disturb the estimate, or where the lines
+scatter more than their noise."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from equalizer.identification.frequency_response.experiments import periodic_looks
+from equalizer.identification.frequency_response.experiments import periodic_experiments
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.identification.frequency_response.local_polynomial import smoothed
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.local_polynomial import smooth_response
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.identify import Identified, identify, outside_remark
 from equalizer.identification.state_space.misfit import misfit_of_estimate
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
 from equalizer.identification.state_space.settings import IdentificationSettings
-from equalizer.identification.state_space.settled_recordings import settled, slow_part
+from equalizer.identification.state_space.settled_recordings import slow_part, subtract_free_decay
 from equalizer.identification.state_space.stable_poles import largest_radius
 from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
 
 HEARD_S = 1.0
-"""Time constant from which the start of a period is heard in the estimate, which leaves out its first 5 s."""
+"""Time constant from which the transient of a start disturbs the estimate, which leaves out its first 5 s."""
 MOST_ROUNDS = 8
 SETTLED = 1e-4
 """Relative change of the slowest decay from round to round that is not worth another one."""
@@ -50,17 +50,17 @@ def identify_recordings(
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or IdentificationSettings()
-    estimate = transfer_estimate(recordings)
-    looked_twice = _looked_twice(recordings)
+    estimate = estimate_transfer(recordings)
+    looked_twice = _has_repeats(recordings)
     if not looked_twice:
         settings = replace(settings, longest_decay_s=settings.decay_s)
-    found = _fitted(estimate, recordings, settings, smooth, on_progress or (lambda _: None))
+    found = _fit_estimate(estimate, recordings, settings, smooth, on_progress or (lambda _: None))
     if looked_twice and found.fitted is found.estimate:
         return found
-    return _with_causes(found, settings, looked_twice)
+    return _add_causes(found, settings, looked_twice)
 
 
-def _fitted(
+def _fit_estimate(
     estimate: FrequencyResponse,
     recordings: tuple[Recording, ...],
     settings: IdentificationSettings,
@@ -68,19 +68,20 @@ def _fitted(
     tell: Callable[[float], None],
 ) -> IdentifiedRecordings:
     if smooth and settings.longest_decay_s is not None:
-        return _smooth(estimate, recordings, settings, None, tell)
+        return _fit_smoothed(estimate, recordings, settings, None, tell)
     identified = identify(estimate, settings, recordings, lambda share: tell(share / 2))
-    estimate, identified = _settled(estimate, identified, recordings, settings)
+    estimate, identified = _remove_transients(estimate, identified, recordings, settings)
     if smooth is False or (smooth is None and identified.cost <= UNEXPLAINED):
         tell(1.0)
         return IdentifiedRecordings(estimate, estimate, identified)
-    return _smooth(estimate, recordings, settings, identified, lambda share: tell(0.5 + share / 2))
+    return _fit_smoothed(estimate, recordings, settings, identified, lambda share: tell(0.5 + share / 2))
 
 
-def _with_causes(
+def _add_causes(
     found: IdentifiedRecordings, settings: IdentificationSettings, looked_twice: bool
 ) -> IdentifiedRecordings:
-    """What a fit to averages leaves always runs smoothly, for neighbours share their lines: only the lines tell."""
+    """Add the causes of the misfit, judged on the lines themselves: residuals of local averages are always smooth,
+    because neighbours share their lines."""
     identified, averaged = found.identified, found.fitted is not found.estimate
     misfit = misfit_of_estimate(identified.model, found.estimate) if averaged else identified.misfit
     misfit = misfit if looked_twice else replace(misfit, smooth=None)
@@ -90,35 +91,35 @@ def _with_causes(
     return replace(found, identified=replace(identified, misfit=misfit, remarks=remarks))
 
 
-def _looked_twice(recordings: Sequence[Recording]) -> bool:
+def _has_repeats(recordings: Sequence[Recording]) -> bool:
     """Whether every experiment has two counted periods.
 
     In a single period, or in windows, transient and leakage look like lightly damped resonances, so that poles are not
-    relaxed on their evidence. Noise that is judged by the scatter of the lines does not tell what a misfit is, either.
+    relaxed on their evidence. Noise estimated from the scatter of the lines does not tell the cause of a misfit either.
     """
-    looks = periodic_looks(recordings)
+    looks = periodic_experiments(recordings)
     return bool(looks.experiments) and all(experiment.looks > 1 for experiment in looks.experiments)
 
 
-def _settled(
+def _remove_transients(
     estimate: FrequencyResponse,
     identified: Identified,
     recordings: Sequence[Recording],
     settings: IdentificationSettings,
 ) -> tuple[FrequencyResponse, Identified]:
-    """Freed of what rings from period to period, by a model that is nearly right, and then by a better one."""
+    """Subtract the free decay of slow poles from the recordings, and identify again, until the decay settles."""
     heard, quick = largest_radius(HEARD_S, estimate.sample_rate_hz), replace(settings, draws=0)
     rounds = 0
     while (slow := slow_part(identified, heard)) is not None and rounds < MOST_ROUNDS:
         before, rounds = identified.slowest_decay_s, rounds + 1
-        estimate = transfer_estimate(settled(recordings, slow))
+        estimate = estimate_transfer(subtract_free_decay(recordings, slow))
         identified = identify(estimate, quick, near=identified.chosen)
         if abs(identified.slowest_decay_s / before - 1) < SETTLED:
             break
     return estimate, identify(estimate, settings, near=identified.chosen) if rounds else identified
 
 
-def _smooth(
+def _fit_smoothed(
     estimate: FrequencyResponse,
     recordings: tuple[Recording, ...],
     settings: IdentificationSettings,
@@ -127,10 +128,10 @@ def _smooth(
 ) -> IdentifiedRecordings:
     relaxed = known is not None and bool(known.relaxed)
     if known is not None and relaxed:
-        fitted = smoothed(estimate, about=model_response(known.model, estimate.frequency_hz))
+        fitted = smooth_response(estimate, about=model_response(known.model, estimate.frequency_hz))
         identified = identify(fitted, settings, near=known.chosen)
     else:
-        fitted = smoothed(estimate)
+        fitted = smooth_response(estimate)
         # Averaged lines are not independent, so they cannot tell whether a pole needs more than the bound.
         held = replace(settings, longest_decay_s=settings.decay_s)
         identified = identify(fitted, held, recordings, tell)

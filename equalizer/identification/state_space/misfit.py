@@ -1,18 +1,18 @@
-"""What a model leaves of the lines beyond their noise: how much, and whether it runs smoothly from line to line."""
+"""Misfit of a model: its residuals on the lines beyond their noise, and their correlation from line to line."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
-from equalizer.identification.state_space.weighted_lines import WeightedLines, weighted_lines
+from equalizer.identification.state_space.weighted_lines import WeightedLines, weight_lines
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 NOISE_TRUSTED = 1.1
-"""The noise power of an estimate is itself estimated, from few looks: below this factor nothing is said to be left."""
+"""Residual power over noise power below which no misfit is claimed: the noise itself is estimated from few periods."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +34,13 @@ ONE_SIDED_95 = 1.645
 
 
 def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, unknowns: int) -> Misfit:
-    """modelled: (lines, p, m). inside: (lines,), those that count. unknowns: that the fit had, in real numbers."""
+    """Misfit of modelled responses (lines, p, m). inside: (lines,), which lines count. unknowns: real numbers that were
+    fitted."""
     left = (modelled - lines.response)[inside]
     weight = lines.weight[inside]
     size = float((np.abs(lines.response[inside]) ** 2).sum())
     beyond = float((np.abs(left) ** 2).sum() - NOISE_TRUSTED * (1 / weight**2).sum())
-    hidden = float((np.abs(left) ** 2).sum() - _least_noise(1 / weight**2, unknowns))
+    hidden = float((np.abs(left) ** 2).sum() - _lower_noise_bound(1 / weight**2, unknowns))
     weighted = weight * left
     power = float((np.abs(weighted) ** 2).sum())
     smooth = None
@@ -50,20 +51,20 @@ def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, u
     return Misfit(error, most, power / max(weighted.size, 1), smooth)
 
 
-def _least_noise(variance: FloatArray, unknowns: int) -> float:
-    """Power of the noise that is left beside a fit, at the low end of its chances."""
+def _lower_noise_bound(variance: FloatArray, unknowns: int) -> float:
+    """One-sided lower 95 % bound of the noise power that a fit leaves."""
     total = float(variance.sum())
     entries = total**2 / max(float((variance**2).sum()), 1e-300)  # those that carry it
     return total * (1 - unknowns / (2 * max(variance.size, 1)) - ONE_SIDED_95 * float(np.sqrt(2 / max(entries, 1.0))))
 
 
 def misfit_of_estimate(model: IdentifiedModel, estimate: FrequencyResponse) -> Misfit:
-    """Of the reliable lines in the model's band."""
-    lines = weighted_lines((estimate,), model.band_hz)
+    """Misfit of a model on an estimate's reliable lines within its band."""
+    lines = weight_lines((estimate,), model.band_hz)
     modelled, every = model_response(model, lines.frequency_hz), np.ones(len(lines), bool)
-    return misfit_of(lines, modelled, every, unknowns_of(model.order, *model.D.shape))
+    return misfit_of(lines, modelled, every, count_unknowns(model.order, *model.D.shape))
 
 
-def unknowns_of(order: int, p: int, m: int) -> int:
-    """Of a model of p outputs and m inputs: real numbers that no change of its state's coordinates alters."""
+def count_unknowns(order: int, p: int, m: int) -> int:
+    """Number of identifiable real parameters of a model with p outputs and m inputs."""
     return order * (p + m) + p * m

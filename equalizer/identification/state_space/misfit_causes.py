@@ -1,4 +1,4 @@
-"""What a model's misfit comes from, as far as the evidence tells; where it does not, that is what is said."""
+"""Likely causes of a model's misfit, as sentences; where the evidence does not tell, they say so."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from equalizer.signals.recording import Recording
 UNEXPLAINED = 1.5
 """Cost above which a model is said to leave more than noise."""
 SMOOTH = 0.5
-"""Correlation of neighbouring lines from which what is left is taken for a linear answer."""
+"""Correlation of neighbouring lines from which residuals count as a linear response that the model lacks."""
 HELD_OUT_BEYOND = 2.0
 """Times its noise and the misfit of the fit: a held-out error above needs a cause of its own."""
 LEVEL_RATIO = 1.25
@@ -25,7 +25,7 @@ LIMIT_SAMPLES = 10
 def fit_remarks(
     cost: float, misfit: Misfit, relaxed: Sequence[SlowPole], bound_costs: bool, settings: IdentificationSettings
 ) -> list[str]:
-    """Of the fit alone, in sentences without their full stop; the bound first, since it imitates all others."""
+    """Remarks on the fit alone, sentences without their full stop; the bound first, because it imitates all others."""
     bound_s, order = settings.decay_s, settings.order
     found = [
         f"the resonance at {pole.frequency_hz:.2f} Hz (damping ratio {100 * pole.damping_ratio:.2g} %) rings longer "
@@ -62,14 +62,17 @@ def fit_remarks(
 def held_out_remarks(
     tested: HeldOut | None, cost: float, misfit: Misfit, recordings: Sequence[Recording]
 ) -> tuple[str, ...]:
-    """Whole sentences about an error on the test that the fit does not explain."""
-    found = [f"The sensor is at its limit: {channel} stays at one extreme value." for channel in _at_limit(recordings)]
+    """Remarks, as whole sentences, on an error on the test that the fit does not explain."""
+    found = [
+        f"The sensor is at its limit: {channel} stays at one extreme value."
+        for channel in _clipped_channels(recordings)
+    ]
     if tested is None:
         return tuple(found)
     expected = float(np.hypot(tested.noise or 0.0, misfit.error))
     if tested.noise is None or tested.error <= HELD_OUT_BEYOND * expected or cost > UNEXPLAINED:
         return tuple(found)
-    fit, test = (_amplitude(recordings, test=test) for test in (False, True))
+    fit, test = (_largest_amplitude(recordings, test=test) for test in (False, True))
     if min(fit, test) > 0 and max(fit, test) > LEVEL_RATIO * min(fit, test):
         found.append(
             f"The test errs more than the fit, and was played at another level (up to {test:.3g} N, the fit {fit:.3g} "
@@ -83,7 +86,7 @@ def held_out_remarks(
     return tuple(found)
 
 
-def _amplitude(recordings: Sequence[Recording], *, test: bool) -> float:
+def _largest_amplitude(recordings: Sequence[Recording], *, test: bool) -> float:
     found = [
         segment.amplitude
         for recording in recordings
@@ -93,7 +96,7 @@ def _amplitude(recordings: Sequence[Recording], *, test: bool) -> float:
     return max(found, default=0.0)
 
 
-def _at_limit(recordings: Sequence[Recording]) -> tuple[str, ...]:
+def _clipped_channels(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Channels that stay at one and the same largest or smallest value, again and again."""
     found: dict[str, None] = {}
     for recording in recordings:

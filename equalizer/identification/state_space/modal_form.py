@@ -1,4 +1,4 @@
-"""A state-space model as blocks of two poles, [[a, 1], [b, a]] with poles a ± sqrt(b).
+"""Modal form of a state-space model: blocks of two poles, [[a, 1], [b, a]] with poles a ± sqrt(b).
 
 In this form two poles pass smoothly from a complex pair to two real ones, which a fit needs. An odd order is made even
 by the caller's choice of it: a block always holds two poles.
@@ -77,9 +77,9 @@ def from_poles(poles: ComplexArray, shapes: ComplexArray) -> ModalForm:
     k = len(upper)
     a[:k], b[:k] = poles[upper].real, -(poles[upper].imag ** 2)
     C[:, 0 : 2 * k : 2], C[:, 1 : 2 * k : 2] = poles[upper].imag * shapes[:, upper].real, shapes[:, upper].imag
-    one, other = real[::2], real[1::2]
-    half = (poles[one].real - poles[other].real) / 2
-    a[k:], b[k:] = (poles[one].real + poles[other].real) / 2, half**2
-    C[:, 2 * k :: 2] = half * (shapes[:, one] - shapes[:, other]).real
-    C[:, 2 * k + 1 :: 2] = (shapes[:, one] + shapes[:, other]).real
+    first, second = real[::2], real[1::2]
+    half = (poles[first].real - poles[second].real) / 2
+    a[k:], b[k:] = (poles[first].real + poles[second].real) / 2, half**2
+    C[:, 2 * k :: 2] = half * (shapes[:, first] - shapes[:, second]).real
+    C[:, 2 * k + 1 :: 2] = (shapes[:, first] + shapes[:, second]).real
     return ModalForm(a, b, C)

@@ -1,4 +1,4 @@
-"""What an order buys and costs: singular values, error on lines that were held out, multiplications per tick."""
+"""Comparison of model orders: singular values, error on held-out lines, multiplications per tick."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.identification.state_space.candidates import best, candidate, subspace_starts
-from equalizer.identification.state_space.refusals import lines_or_refusal
+from equalizer.identification.state_space.candidates import choose_best, refine_start, subspace_starts
+from equalizer.identification.state_space.refusals import require_lines
 from equalizer.identification.state_space.settings import IdentificationSettings
-from equalizer.identification.state_space.warped_subspace import default_horizon, warped_subspace
+from equalizer.identification.state_space.warped_subspace import default_horizon, estimate_subspace
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import FloatArray
 
@@ -44,26 +44,27 @@ class OrderReport:
     """The lowest whose error on held-out lines is not worse than the best one's by more than its standard error."""
 
 
-def order_report(
+def compare_orders(
     response: FrequencyResponse | Sequence[FrequencyResponse],
     settings: IdentificationSettings | None = None,
     orders: Sequence[int] = (10, 14, 16, 20, 26),
     on_progress: Callable[[float], None] | None = None,
 ) -> OrderReport:
-    """Every second line fits, the others test. Raises IdentificationRefused where the highest order has too few."""
+    """Fit every order to every second line and test it on the others. Raises IdentificationRefused where there are too
+    few lines for the highest order."""
     settings = settings or IdentificationSettings()
     tell = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     highest = replace(settings, order=max(orders))
     fit, test = (
-        lines_or_refusal([each.of_lines(_every_second(each, k)) for each in responses], highest) for k in (0, 1)
+        require_lines([each.of_lines(_alternate_lines(each, k)) for each in responses], highest) for k in (0, 1)
     )
     per_line = []
     rows = []
     for number, order in enumerate(sorted(orders)):
         tell(number / len(orders))
         at_order = replace(settings, order=order)
-        found = best([candidate(start, fit, at_order) for start in subspace_starts(fit, at_order)])
+        found = choose_best([refine_start(start, fit, at_order) for start in subspace_starts(fit, at_order)])
         modelled = found.fitted.response(test.z)
         squared = (np.abs(test.weight * (modelled - test.response)) ** 2).mean(axis=(1, 2))
         per_line.append(squared)
@@ -73,11 +74,11 @@ def order_report(
             OrderRow(order, float(squared.mean()), error, multiply_adds(order, p, m), dense_multiply_adds(order, p, m))
         )
     tell(1.0)
-    whole = lines_or_refusal(responses, highest)
-    subspace = warped_subspace(whole, default_horizon(max(orders), whole.response.shape[1]), settings.centre_hz)
+    whole = require_lines(responses, highest)
+    subspace = estimate_subspace(whole, default_horizon(max(orders), whole.response.shape[1]), settings.centre_hz)
     values = subspace.singular_values
     return OrderReport(
-        values, int((values > VISIBLE).sum()), tuple(rows), _noise_of(test), rows[_suggested(per_line)].order
+        values, int((values > VISIBLE).sum()), tuple(rows), _relative_noise(test), rows[_suggest_order(per_line)].order
     )
 
 
@@ -90,17 +91,18 @@ def dense_multiply_adds(order: int, outputs: int, inputs: int) -> int:
     return order**2 + order * (outputs + inputs) + outputs * inputs
 
 
-def _every_second(response: FrequencyResponse, first: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _alternate_lines(response: FrequencyResponse, first: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     return np.asarray(np.arange(len(response)) % 2 == first)
 
 
-def _noise_of(lines: WeightedLines) -> float:
-    """Relative like `WeightedLines.relative_error`."""
+def _relative_noise(lines: WeightedLines) -> float:
+    """Noise of the lines, relative as `WeightedLines.relative_error`."""
     return float(np.sqrt((1 / lines.weight**2).sum() / (np.abs(lines.response) ** 2).sum()))
 
 
-def _suggested(per_line: Sequence[FloatArray]) -> int:
-    """Compared line by line, so that the noise both models meet drops out of the comparison."""
+def _suggest_order(per_line: Sequence[FloatArray]) -> int:
+    """Number of the lowest order that is not worse by its standard error; compared line by line, so that common noise
+    cancels."""
     lowest = int(np.argmin([cost.mean() for cost in per_line]))
     for number, cost in enumerate(per_line):
         worse = cost - per_line[lowest]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.identification.state_space.modal_form import ModalForm
-from equalizer.identification.state_space.stable_poles import Radius, bounded_blocks
+from equalizer.identification.state_space.stable_poles import Radius, stabilise_blocks
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
@@ -18,18 +18,17 @@ RANK = 1e-11
 """Directions weaker than this share of the strongest are left at zero rather than filled with noise."""
 
 
-def input_matrices(form: ModalForm, lines: WeightedLines) -> tuple[FloatArray, FloatArray]:
-    """B (n, m) and D (p, m). Each input is a problem of its own."""
+def solve_input_matrices(form: ModalForm, lines: WeightedLines) -> tuple[FloatArray, FloatArray]:
+    """B (n, m) and D (p, m) by weighted linear least squares, for each input separately."""
     n, p = form.C.shape[1], form.C.shape[0]
     regressors = weighted_regressors(form, lines)
-    measured = by_input(lines.weight * lines.response)
+    measured = stack_by_input(lines.weight * lines.response)
     solved = np.stack([_least_squares(phi, y) for phi, y in zip(regressors, measured, strict=True)], axis=1)
     return solved[:n], solved[n : n + p]
 
 
 def weighted_regressors(form: ModalForm, lines: WeightedLines) -> FloatArray:
-    """(m, 2 lines p, n + p): what one unit of each entry of B and D adds to the weighted response, real parts then
-    imaginary ones."""
+    """(m, 2 lines p, n + p): regressors of B and D for the weighted response, real parts, then imaginary ones."""
     states = form.from_states(lines.z)
     p = form.C.shape[0]
     unit = np.broadcast_to(np.eye(p), (len(lines), p, p))
@@ -39,7 +38,7 @@ def weighted_regressors(form: ModalForm, lines: WeightedLines) -> FloatArray:
     return np.concatenate([flat.real, flat.imag], axis=1)
 
 
-def by_input(values: ComplexArray) -> FloatArray:
+def stack_by_input(values: ComplexArray) -> FloatArray:
     """(lines, p, m) complex as (m, 2 lines p) real, in the rows' order of `weighted_regressors`."""
     flat = values.transpose(2, 0, 1).reshape(values.shape[2], -1)
     return np.concatenate([flat.real, flat.imag], axis=1)
@@ -76,7 +75,7 @@ class FittedForm:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Point:
-    """The cost at one choice of poles and outputs, and what a step from there needs."""
+    """Cost, residuals and projection at given poles and outputs."""
 
     form: ModalForm
     basis: FloatArray
@@ -89,16 +88,16 @@ class _Point:
 
 
 def refine(form: ModalForm, lines: WeightedLines, radius: Radius, most_steps: int = 60) -> FittedForm:
-    """The nearest fit of lowest cost whose poles stay within the radius, of all blocks or one for each."""
-    point = _point(form, lines)
+    """Local optimum near a form by Levenberg-Marquardt, with all poles within the radius (for all blocks, or each)."""
+    point = _evaluate_form(form, lines)
     damping, growth = 1e-3, 2.0
     for _ in range(most_steps):
         jacobian = _jacobian(point, lines)
         normal = np.einsum("jra,jrb->ab", jacobian, jacobian, optimize=True)
         gradient = np.einsum("jra,jr->a", jacobian, point.residual, optimize=True)
         while True:
-            step = _damped_step(normal, gradient, damping)
-            trial = _point(_moved(point.form, step, radius), lines)
+            step = _levenberg_marquardt_step(normal, gradient, damping)
+            trial = _evaluate_form(_apply_step(point.form, step, radius), lines)
             if trial.cost < point.cost or damping > 1e12:
                 break
             damping, growth = damping * growth, growth * 2
@@ -116,12 +115,12 @@ def refine(form: ModalForm, lines: WeightedLines, radius: Radius, most_steps: in
     return FittedForm(point.form, point.solved[:, :n].T, point.solved[:, n:].T)
 
 
-def fitted(form: ModalForm, lines: WeightedLines) -> FittedForm:
-    """Without a search: B and D for the form as it is."""
-    return FittedForm(form, *input_matrices(form, lines))
+def complete_form(form: ModalForm, lines: WeightedLines) -> FittedForm:
+    """The form with its least-squares B and D; poles and outputs are not searched."""
+    return FittedForm(form, *solve_input_matrices(form, lines))
 
 
-def _damped_step(normal: FloatArray, gradient: FloatArray, damping: float) -> FloatArray:
+def _levenberg_marquardt_step(normal: FloatArray, gradient: FloatArray, damping: float) -> FloatArray:
     scale = np.diag(normal) + 1e-300
     root = np.sqrt(scale)
     scaled = normal / root[:, None] / root
@@ -129,18 +128,18 @@ def _damped_step(normal: FloatArray, gradient: FloatArray, damping: float) -> Fl
     return np.asarray(-np.linalg.solve(scaled, gradient / root) / root, dtype=np.float64)
 
 
-def _moved(form: ModalForm, step: FloatArray, radius: Radius) -> ModalForm:
+def _apply_step(form: ModalForm, step: FloatArray, radius: Radius) -> ModalForm:
     blocks = len(form.a)
-    a, b = bounded_blocks(form.a + step[:blocks], form.b + step[blocks : 2 * blocks], radius)
+    a, b = stabilise_blocks(form.a + step[:blocks], form.b + step[blocks : 2 * blocks], radius)
     return ModalForm(a, b, form.C + step[2 * blocks :].reshape(form.C.shape))
 
 
-def _point(form: ModalForm, lines: WeightedLines) -> _Point:
+def _evaluate_form(form: ModalForm, lines: WeightedLines) -> _Point:
     phi = weighted_regressors(form, lines)
     size = np.linalg.norm(phi, axis=1, keepdims=True)
     size[size == 0] = 1.0
     basis, triangle = np.linalg.qr(phi / size)
-    measured = by_input(lines.weight * lines.response)
+    measured = stack_by_input(lines.weight * lines.response)
     along = np.einsum("jrs,jr->js", basis, measured)
     residual = np.einsum("jrs,js->jr", basis, along) - measured
     # A state that nothing shows (its column is zero, or another's) would stop the fit here.
@@ -151,7 +150,7 @@ def _point(form: ModalForm, lines: WeightedLines) -> _Point:
 
 
 def _jacobian(point: _Point, lines: WeightedLines) -> FloatArray:
-    """(m, rows, parameters): poles a, then b, then C row by row; what B and D can take up is taken off."""
+    """(m, rows, parameters): for poles a, then b, then C row by row, with the span of B and D projected out."""
     form, z = point.form, lines.z
     p, n = form.C.shape
     blocks = n // 2

@@ -1,4 +1,4 @@
-"""When no model is made of the data, and what would do."""
+"""Conditions under which an identification is refused, with the remedy in the message."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ import numpy as np
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.warped_subspace import default_horizon
-from equalizer.identification.state_space.weighted_lines import WeightedLines, weighted_lines
+from equalizer.identification.state_space.weighted_lines import WeightedLines, weight_lines
 
 LEAST_SIGNAL_TO_NOISE = 2.0
 """Of amplitudes, the typical line's strongest entry."""
@@ -21,9 +21,9 @@ class IdentificationRefused(ValueError):  # noqa: N818 - an answer that a user r
     """The data do not carry a model; the text says what would do."""
 
 
-def lines_or_refusal(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> WeightedLines:
+def require_lines(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> WeightedLines:
     """The band's lines, if a model can be fitted to them. Raises IdentificationRefused."""
-    _refuse_what_does_not_belong_together(responses)
+    _refuse_mixed_responses(responses)
     high, rate = settings.band_hz[1], responses[0].sample_rate_hz
     if high >= rate / 2:
         raise IdentificationRefused(
@@ -32,14 +32,14 @@ def lines_or_refusal(responses: Sequence[FrequencyResponse], settings: Identific
         )
     _refuse_unexcited_inputs(responses, settings)
     _refuse_dead_outputs(responses, settings)
-    lines = weighted_lines(responses, settings.fitted_hz)
+    lines = weight_lines(responses, settings.fitted_hz)
     _refuse_an_empty_band(responses, lines, settings)
     _refuse_noise(lines, settings)
     _refuse_too_high_an_order(lines, settings)
     return lines
 
 
-def _refuse_what_does_not_belong_together(responses: Sequence[FrequencyResponse]) -> None:
+def _refuse_mixed_responses(responses: Sequence[FrequencyResponse]) -> None:
     if not responses:
         raise IdentificationRefused("no frequency response was given; estimate one from a recorded sweep first")
     first = responses[0]

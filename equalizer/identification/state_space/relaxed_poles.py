@@ -1,8 +1,8 @@
-"""Poles that need more than the ordinary decay bound: found, relaxed one by one, and only where the data ask for it.
+"""Relaxation of the decay bound for poles whose data demand it, by a likelihood-ratio test.
 
-A pole at the bound is either to spare, because the order exceeds what the band shows, and then costs nothing there, or
-it stands for a resonance that rings longer. Which of the two is told by the likelihood ratio: the fall of the cost when
-the bound is lifted, against what noise alone gives at the best of all lines (chi-squared, Bonferroni over the lines).
+A pole at the bound is either superfluous, because the order exceeds what the band shows, and then costs nothing there,
+or it represents a resonance with a longer decay. The likelihood ratio decides: the fall of the cost when the bound is
+lifted, against what noise alone gives at the best of all lines (chi-squared, Bonferroni over the lines).
 """
 
 from collections.abc import Callable, Sequence
@@ -11,10 +11,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from equalizer.identification.state_space.candidates import MOST_STEPS, Candidate, best, bins_about, refined
-from equalizer.identification.state_space.refinement import FittedForm, fitted, refine
+from equalizer.identification.state_space.candidates import (
+    MOST_STEPS,
+    Candidate,
+    bins_about,
+    choose_best,
+    refine_candidate,
+)
+from equalizer.identification.state_space.refinement import FittedForm, complete_form, refine
 from equalizer.identification.state_space.settings import IdentificationSettings
-from equalizer.identification.state_space.stable_poles import Radius, bounded_blocks, largest_radius
+from equalizer.identification.state_space.stable_poles import Radius, largest_radius, stabilise_blocks
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import FloatArray
 
@@ -40,37 +46,39 @@ class SlowPole:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Relaxed:
+class RelaxedFit:
     candidate: Candidate
     """The one given where no pole needs more than the bound."""
     bound_costs: bool
     """A pole sits at the bound all the same, and the fit would improve beyond noise without it."""
 
 
-def relaxed(chosen: Candidate, search: Search, lines: WeightedLines, settings: IdentificationSettings) -> Relaxed:
-    """A bound that was asked for is kept."""
-    limit_s = longest_told_s(lines)
+def relax_poles(
+    chosen: Candidate, search: Search, lines: WeightedLines, settings: IdentificationSettings
+) -> RelaxedFit:
+    """Relax the poles of a candidate that need it; a bound that the settings state is kept."""
+    limit_s = longest_resolved_decay_s(lines)
     if limit_s <= settings.decay_s:
-        return Relaxed(chosen, bound_costs=False)
+        return RelaxedFit(chosen, bound_costs=False)
     limit = largest_radius(limit_s, lines.sample_rate_hz)
-    costs = _costs(chosen, limit, lines, settings)
-    if settings.longest_decay_s is not None or not (costs or _left_at_a_line(chosen, lines)):
-        return Relaxed(chosen, costs)
+    costs = _bound_costs(chosen, limit, lines, settings)
+    if settings.longest_decay_s is not None or not (costs or _has_outlying_line(chosen, lines)):
+        return RelaxedFit(chosen, costs)
     freer = replace(settings, longest_decay_s=limit_s)
-    found = best([*search(freer), refined(chosen.name, chosen.fitted, lines, settings, limit)])
-    again = _bounded_again(found, lines, settings, limit)
-    taken = again.sane >= chosen.sane and _beats(again, chosen, lines)
-    return Relaxed(again, bound_costs=False) if taken else Relaxed(chosen, costs)
+    found = choose_best([*search(freer), refine_candidate(chosen.name, chosen.fitted, lines, settings, limit)])
+    again = _tighten_poles(found, lines, settings, limit)
+    taken = again.sane >= chosen.sane and _is_better(again, chosen, lines)
+    return RelaxedFit(again, bound_costs=False) if taken else RelaxedFit(chosen, costs)
 
 
-def relaxed_again(near: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
-    """From a candidate of other estimates of the same device: of its relaxed poles those that are still needed."""
-    again = refined(near.name, near.fitted, lines, settings, near.radius)
-    return _bounded_again(again, lines, settings, float(np.max(near.radius)))
+def update_relaxed(near: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
+    """Refine a candidate of another estimate of the same device, and keep of its relaxed poles those still needed."""
+    again = refine_candidate(near.name, near.fitted, lines, settings, near.radius)
+    return _tighten_poles(again, lines, settings, float(np.max(near.radius)))
 
 
 def slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) -> tuple[SlowPole, ...]:
-    """Slowest first."""
+    """Poles of a candidate beyond the bound, slowest first."""
     form = chosen.fitted.form
     first, second = form.poles.reshape(2, -1)
     slower = np.where(np.abs(first) >= np.abs(second), first, second)
@@ -84,74 +92,74 @@ def slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) -> tupl
     return tuple(sorted(found, key=lambda pole: -pole.decay_s))
 
 
-def longest_told_s(lines: WeightedLines) -> float:
-    """Time constant beyond which these lines do not tell a decay from none."""
+def longest_resolved_decay_s(lines: WeightedLines) -> float:
+    """Time constant in seconds beyond which these lines do not distinguish a decay from an undamped mode."""
     steps = np.diff(np.unique(lines.frequency_hz))
     return PERIODS_TOLD / float(np.median(steps)) if len(steps) else 0.0
 
 
-def at_the_bound(found: FittedForm, radius: Radius) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(blocks,)"""
-    return np.asarray(_sizes(found) >= radius * (1 - 1e-7))
+def is_at_bound(found: FittedForm, radius: Radius) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(blocks,): whether a block's larger pole lies on the radius."""
+    return np.asarray(_pole_radii(found) >= radius * (1 - 1e-7))
 
 
-def _sizes(found: FittedForm) -> FloatArray:
-    """(blocks,): of the larger pole."""
+def _pole_radii(found: FittedForm) -> FloatArray:
+    """(blocks,): magnitude of the larger pole."""
     poles = np.abs(found.form.poles).reshape(2, -1)
     return np.asarray(poles.max(axis=0))
 
 
-def _costs(chosen: Candidate, limit: float, lines: WeightedLines, settings: IdentificationSettings) -> bool:
-    """The bound, to the poles that sit on it: tried with a few steps from where they are."""
-    on = at_the_bound(chosen.fitted, chosen.radius)
+def _bound_costs(chosen: Candidate, limit: float, lines: WeightedLines, settings: IdentificationSettings) -> bool:
+    """Whether the bound costs more than noise, for the poles on it: tested by a few steps without it."""
+    on = is_at_bound(chosen.fitted, chosen.radius)
     if not on.any():
         return False
     bins = bins_about(chosen.fitted, lines, settings)
     loose = np.where(on, limit, chosen.radius)
     after = bins.cost(refine(chosen.fitted.form, bins, loose, MOST_STEPS[-1]).response(bins.z))
-    if not _beyond_noise(bins.cost(chosen.fitted.response(bins.z)) - after, after, bins, len(lines)):
+    if not _exceeds_noise(bins.cost(chosen.fitted.response(bins.z)) - after, after, bins, len(lines)):
         return False
     # What more steps alone give is no reason.
     held = bins.cost(refine(chosen.fitted.form, bins, chosen.radius, MOST_STEPS[-1]).response(bins.z))
-    return _beyond_noise(held - after, after, bins, len(lines))
+    return _exceeds_noise(held - after, after, bins, len(lines))
 
 
-def _left_at_a_line(chosen: Candidate, lines: WeightedLines) -> bool:
-    """Some line stands out of what is left: a resonance so narrow that no pole was drawn to it."""
+def _has_outlying_line(chosen: Candidate, lines: WeightedLines) -> bool:
+    """Whether the residual of some line stands out: a resonance so narrow that no pole moved there."""
     left = (np.abs(lines.weight * (chosen.fitted.response(lines.z) - lines.response)) ** 2).sum(axis=(1, 2))
     entries = lines.response[0].size
     return bool(2 * left.max() / max(chosen.cost, 1.0) > chi2.isf(FALSE_ALARM / len(lines), 2 * entries))
 
 
-def _bounded_again(free: Candidate, lines: WeightedLines, settings: IdentificationSettings, limit: float) -> Candidate:
-    """Poles that lose nothing by it are put back to the ordinary bound, slowest first."""
+def _tighten_poles(free: Candidate, lines: WeightedLines, settings: IdentificationSettings, limit: float) -> Candidate:
+    """Return poles to the ordinary bound, slowest first, where that costs no more than noise."""
     ordinary = largest_radius(settings.decay_s, lines.sample_rate_hz)
-    sizes, entries = _sizes(free.fitted), lines.response.size
+    sizes, entries = _pole_radii(free.fitted), lines.response.size
     name = f"{free.name.removesuffix(RELAXED)}{RELAXED}"
     found = replace(free, name=name, radius=np.where(sizes > ordinary, limit, ordinary))
     for block in [int(k) for k in np.argsort(-sizes) if sizes[k] > ordinary]:
         radii = np.array(found.radius)
         radii[block] = ordinary
         form = found.fitted.form
-        a, b = bounded_blocks(form.a, form.b, radii)
-        tried = refined(name, fitted(replace(form, a=a, b=b), lines), lines, settings, radii)
+        a, b = stabilise_blocks(form.a, form.b, radii)
+        tried = refine_candidate(name, complete_form(replace(form, a=a, b=b), lines), lines, settings, radii)
         lost = entries * (tried.cost - free.cost)
-        if tried.sane and not _beyond_noise(lost, entries * free.cost, lines, len(lines)):
+        if tried.sane and not _exceeds_noise(lost, entries * free.cost, lines, len(lines)):
             found = tried
     return found
 
 
-def _beats(again: Candidate, chosen: Candidate, lines: WeightedLines) -> bool:
+def _is_better(again: Candidate, chosen: Candidate, lines: WeightedLines) -> bool:
     entries = lines.response.size
     gained = entries * (chosen.cost - again.cost)
-    return bool(np.any(again.radius > np.min(again.radius))) and _beyond_noise(
+    return bool(np.any(again.radius > np.min(again.radius))) and _exceeds_noise(
         gained, entries * again.cost, lines, len(lines)
     )
 
 
-def _beyond_noise(gained: float, left: float, lines: WeightedLines, tried: int) -> bool:
-    """A fall of the cost to `left`: more than a resonance fitted to noise at the best of `tried` lines would give.
-    Where more than noise is left, that is taken for the noise."""
+def _exceeds_noise(gained: float, left: float, lines: WeightedLines, tried: int) -> bool:
+    """Whether a fall of the cost to `left` exceeds what a resonance fitted to noise at the best of `tried` lines gives.
+    Where more than noise is left, that counts as the noise."""
     p, m = lines.response.shape[1:]
     scale = max(left / lines.response.size, 1.0)
     return bool(2 * gained / scale > chi2.isf(FALSE_ALARM / tried, 2 * (p + m + 1)))

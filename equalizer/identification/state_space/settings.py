@@ -1,4 +1,4 @@
-"""What identification is asked for."""
+"""Settings of an identification: band, order, decay bound and search."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ and cost nothing there; without it they settle anywhere up to the unit circle, a
 
 @dataclass(frozen=True, slots=True)
 class IdentificationSettings:
-    """Band and order of a model, and how it is looked for."""
+    """Band and order of a model, and how it is searched for."""
 
     band_hz: tuple[float, float] = (5.0, 35.0)
     order: int = 26
@@ -22,8 +22,8 @@ class IdentificationSettings:
     longer_horizons: tuple[int, ...] = (0, 2)
     """Block rows beyond the shortest useful horizon; each is a start of its own."""
     spare_horizons: tuple[int, ...] = (1, 3, 4, 6)
-    """Likewise, of a wide band: one after the other, as long as the best fit leaves more than noise. There a fit may
-    end where it gets no better though it should."""
+    """Likewise for a wide band: one after the other, while the best fit leaves more than noise, because a fit may end
+    in a local optimum there."""
     record_horizons: tuple[int, ...] = (16,)
     """Past and future samples of the starts from time records, where there are any."""
     margin: float = 0.1

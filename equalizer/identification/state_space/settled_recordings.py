@@ -1,4 +1,4 @@
-"""Recordings as if they had been made in the steady state: what slow poles still ring of a start is taken off.
+"""Subtraction of the free decay of slow poles from recordings, so that they are in the steady state.
 
 A period that begins in another state than it ends in holds, beside the periodic answer, the free decay from the
 difference: C A^t (I - A^N)^-1 (x_0 - x_N). A period that is shorter than some ten time constants is full of it.
@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equalizer.identification.state_space.identify import Identified
-from equalizer.identification.state_space.relaxed_poles import at_the_bound
+from equalizer.identification.state_space.relaxed_poles import is_at_bound
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlowPart:
-    """The blocks of a model that ring longest."""
+    """The slowly decaying blocks of a model."""
 
     A: FloatArray
     B: FloatArray
@@ -25,24 +25,24 @@ class SlowPart:
 
 
 def slow_part(identified: Identified, radius: float) -> SlowPart | None:
-    """Of the relaxed poles beyond the radius; None where there are none. A pole at the limit of what the lines tell is
-    left out, for its decay is not known."""
+    """The relaxed poles beyond the radius; None where there are none. A pole at the limit of what the lines resolve is
+    left out, because its decay is not known."""
     fitted = identified.chosen.fitted
     sizes = np.abs(fitted.form.poles).reshape(2, -1).max(axis=0)
-    beyond = (sizes > radius) & ~at_the_bound(fitted, identified.chosen.radius)
+    beyond = (sizes > radius) & ~is_at_bound(fitted, identified.chosen.radius)
     states = np.flatnonzero(np.repeat(beyond, 2))
     if not len(states) or not identified.relaxed:
         return None
     return SlowPart(fitted.form.state_matrix[np.ix_(states, states)], fitted.B[states], fitted.form.C[:, states])
 
 
-def settled(recordings: Sequence[Recording], slow: SlowPart) -> tuple[Recording, ...]:
-    """Every period of every periodic segment without the free decay of the slow part. Segments with missing samples,
-    and what comes after them, stay as they are."""
-    return tuple(_settled(recording, slow) for recording in recordings)
+def subtract_free_decay(recordings: Sequence[Recording], slow: SlowPart) -> tuple[Recording, ...]:
+    """The recordings without the slow part's free decay in every period of their periodic segments. Segments with
+    missing samples, and all after them, stay as they are."""
+    return tuple(_settle_recording(recording, slow) for recording in recordings)
 
 
-def _settled(recording: Recording, slow: SlowPart) -> Recording:
+def _settle_recording(recording: Recording, slow: SlowPart) -> Recording:
     commands, samples = recording.command.samples, np.array(recording.response.samples)
     states: dict[int, FloatArray] = {}
     periods = [
@@ -69,7 +69,7 @@ def _settled(recording: Recording, slow: SlowPart) -> Recording:
 
 
 def _free_decay(slow: SlowPart, first: FloatArray, last: FloatArray, samples: int) -> FloatArray:
-    """(samples, p)"""
+    """Response (samples, p) of the free decay from the state's difference between period start and end."""
     once = np.linalg.matrix_power(slow.A, samples)
     x = np.linalg.solve(np.eye(len(slow.A)) - once, first - last)
     rows = np.empty((samples, len(slow.C)))

@@ -1,4 +1,4 @@
-"""Poles put where a device's poles can lie: inside the unit circle, and dying out within a given time.
+"""Stabilisation of poles: inside the unit circle, and with a decay within a given time.
 
 A pole at 0.99999 leaves a fit over 5 to 35 Hz untouched and ruins the simulation in which the model is used.
 """
@@ -13,19 +13,19 @@ Radius = float | FloatArray
 
 
 def largest_radius(longest_decay_s: float, sample_rate_hz: float) -> float:
-    """Of a pole that falls to 1/e in that time."""
+    """Radius of a pole that decays to 1/e in that time."""
     return float(np.exp(-1 / (longest_decay_s * sample_rate_hz)))
 
 
-def reflected(poles: ComplexArray | FloatArray, radius: Radius) -> ComplexArray:
+def stabilise_poles(poles: ComplexArray | FloatArray, radius: Radius) -> ComplexArray:
     """Unstable poles mirrored at the unit circle, then all within the radius; frequencies stay. poles: any shape."""
     size = np.abs(poles)
     wanted = np.minimum(np.where(size > 1, 1 / np.maximum(size, 1e-300), size), radius)
     return np.asarray(poles * wanted / np.maximum(size, 1e-300), dtype=np.complex128)
 
 
-def bounded_blocks(a: FloatArray, b: FloatArray, radius: Radius) -> tuple[FloatArray, FloatArray]:
-    """The same for pole pairs a ± sqrt(b), both of shape (pairs,)."""
+def stabilise_blocks(a: FloatArray, b: FloatArray, radius: Radius) -> tuple[FloatArray, FloatArray]:
+    """`stabilise_poles` for pole pairs a ± sqrt(b), both of shape (pairs,)."""
     root = np.sqrt(b.astype(np.complex128))
-    first, second = reflected(a + root, radius), reflected(a - root, radius)
+    first, second = stabilise_poles(a + root, radius), stabilise_poles(a - root, radius)
     return ((first + second) / 2).real, (((first - second) / 2) ** 2).real

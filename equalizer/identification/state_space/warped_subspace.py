@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.identification.state_space.modal_form import ModalForm, from_poles
-from equalizer.identification.state_space.stable_poles import reflected
+from equalizer.identification.state_space.stable_poles import stabilise_poles
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
@@ -18,7 +18,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Subspace:
-    """What the lines can see, strongest first, before an order is chosen."""
+    """Extended observability matrix with its singular values, before an order is chosen."""
 
     directions: FloatArray
     """(horizon p, horizon p): columns span the extended observability matrix, noise coloured back."""
@@ -39,7 +39,8 @@ def warp_coefficient(centre_hz: float, sample_rate_hz: float) -> float:
     return float((1 - np.tan(half)) / (1 + np.tan(half)))
 
 
-def warped_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> Subspace:
+def estimate_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> Subspace:
+    """Subspace of a measured response, warped about centre_hz. horizon: block rows."""
     c = warp_coefficient(centre_hz, lines.sample_rate_hz)
     zeta = (lines.z - c) / (1 - c * lines.z)
     powers = zeta[:, None] ** np.arange(horizon)
@@ -51,15 +52,15 @@ def warped_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> Sub
     scaled = lines.response / of_output[:, None] / of_column[:, None, :]
     entered = np.einsum("lq,lj,jk->qklj", powers, 1 / of_column, np.eye(m)).reshape(horizon * m, -1)
     came_out = np.einsum("lq,lij->qilj", powers, scaled).reshape(horizon * p, -1)
-    unexplained = _without_inputs(entered, came_out)
+    unexplained = _project_out_inputs(entered, came_out)
     noise = np.kron(np.linalg.cholesky((powers.T @ powers.conj()).real / len(zeta)), np.eye(p))
     vectors, values, _ = np.linalg.svd(np.linalg.solve(noise, unexplained))
     coloured = np.tile(of_output, horizon)[:, None] * (noise @ vectors)
     return Subspace(coloured, values / np.sqrt(len(zeta) * m), p, c)
 
 
-def _without_inputs(entered: ComplexArray, came_out: ComplexArray) -> FloatArray:
-    """(horizon p, horizon p): the outputs' rows with all that the inputs' rows explain taken off."""
+def _project_out_inputs(entered: ComplexArray, came_out: ComplexArray) -> FloatArray:
+    """(horizon p, horizon p): the outputs' rows with the span of the inputs' rows projected out."""
     stacked = np.concatenate([entered, came_out])
     real = np.concatenate([stacked.real, stacked.imag], axis=1)
     upper = np.asarray(np.linalg.qr(real.T, mode="r"))
@@ -75,4 +76,4 @@ def poles_and_shapes(subspace: Subspace, order: int, radius: float) -> ModalForm
     shifted = np.linalg.lstsq(evened[:-p], evened[p:], rcond=None)[0]
     values, vectors = np.linalg.eig(shifted)
     # B is fitted afterwards, so what the map does to C may be left to it.
-    return from_poles(reflected((values + c) / (1 + c * values), radius), observed[:p] @ vectors)
+    return from_poles(stabilise_poles((values + c) / (1 + c * values), radius), observed[:p] @ vectors)

@@ -1,4 +1,4 @@
-"""The lines that a model is fitted to: where they lie, what was measured there, and how much each number counts."""
+"""Lines that a model is fitted to: measured responses with the inverse of their standard errors as weights."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 LEAST_NOISE = 1e-9
-"""Of the strongest entry: what a measurement is trusted to at most, so that noise-free data leave weights finite."""
+"""Smallest noise relative to the strongest entry, so that noise-free data have finite weights."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,9 +44,9 @@ class WeightedLines:
         return np.asarray(np.linalg.norm(modelled - self.response, axis=(1, 2)) / size, dtype=np.float64)
 
 
-def weighted_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, float]) -> WeightedLines:
-    """All reliable lines of the band, of all estimates together. A line's noise, where it is not told, is read from
-    how far it lies off its neighbours."""
+def weight_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, float]) -> WeightedLines:
+    """All reliable lines of the band, of all estimates together. Where a line's noise is not known, it is estimated
+    from differences to its neighbours."""
     inside = [estimate.within(*band_hz) for estimate in responses]
     chosen = [
         estimate.of_lines(estimate.reliable & np.isfinite(estimate.response).all(axis=(1, 2))) for estimate in inside
@@ -60,19 +60,19 @@ def weighted_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float,
     frequency = np.concatenate([estimate.frequency_hz for estimate in chosen])
     rising = np.argsort(frequency, kind="stable")
     response = np.concatenate([estimate.response for estimate in chosen])[rising]
-    variance = np.concatenate([_told_or_seen(estimate) for estimate in chosen])[rising]
+    variance = np.concatenate([_noise_variance(estimate) for estimate in chosen])[rising]
     least = LEAST_NOISE * float(np.abs(response).max())
     weight = 1 / np.sqrt(np.maximum(variance, least**2))
     return WeightedLines(frequency[rising], response, weight, chosen[0].sample_rate_hz)
 
 
-def _told_or_seen(estimate: FrequencyResponse) -> FloatArray:
+def _noise_variance(estimate: FrequencyResponse) -> FloatArray:
     told = estimate.noise_variance
-    return np.where(np.isfinite(told), told, scatter(estimate.response))
+    return np.where(np.isfinite(told), told, scatter_variance(estimate.response))
 
 
-def scatter(response: ComplexArray) -> FloatArray:
-    """Noise variance (lines, p, m) as second differences show it, averaged over all lines of an entry."""
+def scatter_variance(response: ComplexArray) -> FloatArray:
+    """Noise variance (lines, p, m) by the median of second differences over all lines of an entry."""
     if len(response) < 3:
         return np.abs(response) ** 2
     second = np.diff(response, n=2, axis=0)
@@ -81,9 +81,11 @@ def scatter(response: ComplexArray) -> FloatArray:
     return np.asarray(np.broadcast_to(typical, response.shape), dtype=np.float64)
 
 
-def binned(lines: WeightedLines, bins: Sequence[slice], about: ComplexArray, centres: ComplexArray) -> WeightedLines:
-    """Each bin one line at its middle. Averaged is the difference to a model that is nearly right (`about`: its
-    responses on `lines`, `centres`: at the bins' middles), so that a resonance within a bin is not blunted."""
+def average_bins(
+    lines: WeightedLines, bins: Sequence[slice], about: ComplexArray, centres: ComplexArray
+) -> WeightedLines:
+    """Average the lines of each bin to one at its middle. The difference to a nearly right model is averaged (`about`:
+    its responses on `lines`, `centres`: at the bins' middles), so that resonances within a bin are not blunted."""
     power = lines.weight**2
     difference = power * (lines.response - about)
     weight = np.array([power[part].sum(axis=0) for part in bins])
@@ -95,8 +97,8 @@ def bin_centres_hz(lines: WeightedLines, bins: Sequence[slice]) -> FloatArray:
     return np.array([lines.frequency_hz[part].mean() for part in bins])
 
 
-def bins_of(lines: WeightedLines, smallest: int, octave_share: float) -> tuple[slice, ...]:
-    """Neighbouring lines in groups of `smallest`, or as many as lie in that share of an octave."""
+def group_lines(lines: WeightedLines, smallest: int, octave_share: float) -> tuple[slice, ...]:
+    """Slices of neighbouring lines: `smallest` at least, and as many as lie in that share of an octave."""
     edges, frequency = [0], lines.frequency_hz
     while edges[-1] < len(lines):
         start = edges[-1]

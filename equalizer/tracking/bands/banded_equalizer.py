@@ -1,4 +1,4 @@
-"""An arbitrary wanted acceleration, band by band: a rigid model below, the identified one, one degree of freedom above.
+"""Equalizer for arbitrary accelerations in three bands: rigid model, identified model, one degree of freedom above.
 
 Where one model covers all that is wanted, both edges can be left out: the same equalizer is then wide-band.
 """
@@ -15,25 +15,26 @@ from equalizer.tracking.bands.high_band import (
     HighBandForces,
     HighBandSettings,
     ResponseSource,
-    delivered,
     high_band_forces,
-    one_dof,
-    one_dof_at_once,
+    predict_acceleration,
+    project_to_one_dof,
+    reduce_to_one_dof,
 )
 from equalizer.tracking.bands.low_band import CORNER_HZ, SlowMotion, low_band_forces, plan_motion, plan_motion_causally
 from equalizer.tracking.bands.rigid_model import RigidModel
 from equalizer.tracking.bands.stylus import StylusActuator, StylusShare, share_with_stylus
 from equalizer.tracking.feedforward.band_split import CausalSplit, LinearPhaseSplit
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
-from equalizer.tracking.lqr.constrained import constrained_track
-from equalizer.tracking.lqr.limits import require_within
+from equalizer.tracking.lqr.constrained import track_under_cap
+from equalizer.tracking.lqr.limits import require_under_cap
 from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.tracking_problem import TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 PADDING_S = 0.3
-"""Quiet before and after: the inverse of a force that gives no lasting acceleration begins early and ends late."""
+"""Rest added before and after: a constant force gives no acceleration, so that the inverse begins early and ends
+late."""
 LOW_BAND_DECAYS = 6.0
-"""Time constants of the low band's slow return to its place that are played too: cut off sooner, it ends in a jolt."""
+"""Time constants of the low band's slow return to rest that are played too: cut off sooner, it ends in a jolt."""
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
 """Below, forces drift where no model was identified; above, the level falls short."""
 
@@ -103,26 +104,26 @@ class BandedEqualizer:
 
     def play(self, wanted: FloatArray, cap: CapPolicy | None = None) -> BandedForces:
         """wanted: (n, p), m/s². Raises ForceLimitError or TrackingError where the cap cannot be held."""
-        bands = self.split.split(self._padded(wanted))
+        bands = self.split.split(self._pad(wanted))
         low, motion = self._low_forces(bands.low)
-        problem = augmented(self.middle, self.weights)
+        problem = make_tracking_problem(self.middle, self.weights)
         tracked = track(stored_gains(problem, len(low)), bands.middle)
         middle, answer, loss = tracked.forces, tracked.predicted, None
         high, share = self._high_forces(bands.high, low + middle)
         others = low if high is None else low + high.forces
         if cap is not None and cap.constrain:
-            capped = constrained_track(problem, bands.middle, cap.cap_n, others)
+            capped = track_under_cap(problem, bands.middle, cap.cap_n, others)
             middle, answer, loss = capped.forces, capped.predicted, capped.loss
         entering = middle + others
         by_band = (low, middle, others - low)
         return BandedForces(
-            commands=entering - self._rendered(motion, answer),
+            commands=entering - self._spring_force(motion, answer),
             entering=entering,
             by_band=by_band,
-            predicted=self._predicted(by_band, motion, answer),
+            predicted=self._predict_bands(by_band, motion, answer),
             bands=bands,
             latency_samples=self.latency_samples,
-            peaks=None if cap is None else require_within(entering, cap.cap_n, self._rate_hz),
+            peaks=None if cap is None else require_under_cap(entering, cap.cap_n, self._rate_hz),
             loss=loss,
             motion=motion,
             high=high,
@@ -138,27 +139,27 @@ class BandedEqualizer:
         decay_s = 0.0 if self.low is None else LOW_BAND_DECAYS / (2 * np.pi * self.low.corner_hz)
         return int(np.ceil(max(PADDING_S, decay_s) * self._rate_hz))
 
-    def _padded(self, wanted: FloatArray) -> FloatArray:
-        """With more at the end than asked for, where that makes a length whose spectrum is soon had."""
+    def _pad(self, wanted: FloatArray) -> FloatArray:
+        """Pad with zeros, to a length with a fast FFT."""
         before = 0 if self.causal else self._padding
         around = 2 * self.split.latency_samples
         after = next_fast_len(len(wanted) + before + self._padding + around) - len(wanted) - before - around
         return np.pad(np.asarray(wanted, dtype=np.float64), ((before, after), (0, 0)))
 
-    def _planned(self, acceleration: FloatArray, corner_hz: float) -> SlowMotion:
+    def _plan_motion(self, acceleration: FloatArray, corner_hz: float) -> SlowMotion:
         plan = plan_motion_causally if self.causal else plan_motion
         return plan(acceleration, self._rate_hz, corner_hz)
 
     def _low_forces(self, wanted: FloatArray) -> tuple[FloatArray, SlowMotion | None]:
         if self.low is None:
             return np.zeros((len(wanted), self.middle.B.shape[1])), None
-        motion = self._planned(wanted, self.low.corner_hz)
+        motion = self._plan_motion(wanted, self.low.corner_hz)
         return low_band_forces(motion, self.low.rigid, self._rate_hz).total, motion
 
     def _high_forces(self, wanted: FloatArray, others: FloatArray) -> tuple[HighBandForces | None, StylusShare | None]:
         if self.high is None:
             return None, None
-        signal = one_dof_at_once(wanted) if self.causal else one_dof(wanted)
+        signal = project_to_one_dof(wanted) if self.causal else reduce_to_one_dof(wanted)
         share = None
         if self.high.stylus is not None:
             share = share_with_stylus(signal, self._rate_hz, self.high.stylus)
@@ -166,20 +167,20 @@ class BandedEqualizer:
         settings = replace(self.high.settings, causal=self.causal)
         return high_band_forces(signal, self._rate_hz, self.high.source, others, settings), share
 
-    def _rendered(self, motion: SlowMotion | None, middle: FloatArray) -> FloatArray:
-        """What the spring does by itself along the motion of the two lower bands; the high band's is too small."""
+    def _spring_force(self, motion: SlowMotion | None, middle: FloatArray) -> FloatArray:
+        """The rendered spring's force along the motion of the two lower bands; the high band's motion is too small."""
         k, b = self.spring.stiffness_n_per_m, self.spring.damping_n_s_per_m
         if k == b == 0:
             return np.zeros_like(middle)
-        motions = [self._planned(middle, CORNER_HZ)] + ([] if motion is None else [motion])
+        motions = [self._plan_motion(middle, CORNER_HZ)] + ([] if motion is None else [motion])
         force: FloatArray = -sum((k * part.position_m + b * part.velocity_m_s for part in motions), np.zeros(()))
         return force
 
-    def _predicted(
+    def _predict_bands(
         self, by_band: tuple[FloatArray, FloatArray, FloatArray], motion: SlowMotion | None, answer: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         if self.high is not None:
-            low, middle, high = (delivered(forces, self._rate_hz, self.high.source) for forces in by_band)
+            low, middle, high = (predict_acceleration(forces, self._rate_hz, self.high.source) for forces in by_band)
             return low, middle, high
         nothing = np.zeros_like(answer)
         return nothing if motion is None else motion.acceleration, answer, nothing

@@ -1,4 +1,4 @@
-"""What playing an arbitrary acceleration band by band gives: forces, what they should deliver, and at what price."""
+"""Result of the banded equalizer: forces, the accelerations they are predicted to give, and their cost."""
 
 from dataclasses import dataclass
 

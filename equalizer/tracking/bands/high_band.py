@@ -38,7 +38,7 @@ class ModelledResponse:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredResponse:
-    """Between its lines length and phase are drawn straight; outside, the first and last line hold."""
+    """Magnitude and phase are interpolated linearly between its lines, and held constant outside."""
 
     frequency_hz: FloatArray
     """(lines,), rising"""
@@ -82,9 +82,9 @@ class HighBandForces:
     """(m,): what it would have been along each axis alone"""
 
 
-def one_dof(wanted: FloatArray) -> FloatArray:
-    """(N,) from (N, p): line by line the length of all axes together, with the phase of their sum. Energy is kept
-    (Landin et al., Dimensional reduction of high-frequency accelerations for haptic rendering, 2010)."""
+def reduce_to_one_dof(wanted: FloatArray) -> FloatArray:
+    """(N,) from (N, p): at each line the norm over all axes, with the phase of their sum. Energy is preserved (Landin
+    et al., Dimensional reduction of high-frequency accelerations for haptic rendering, 2010)."""
     spectrum = np.fft.rfft(wanted, axis=0)
     length = np.linalg.norm(spectrum, axis=1)
     # A sum over axes can vanish where two of them oppose; the stronger axis then says the phase.
@@ -94,9 +94,9 @@ def one_dof(wanted: FloatArray) -> FloatArray:
     return np.asarray(np.fft.irfft(length * np.exp(1j * phase), len(wanted)))
 
 
-def one_dof_at_once(wanted: FloatArray) -> FloatArray:
-    """(N,) from (N, p): the part along the direction in which most happens, with the energy of all. Nothing comes
-    before its time, unlike `one_dof`."""
+def project_to_one_dof(wanted: FloatArray) -> FloatArray:
+    """(N,) from (N, p): projection on the first principal direction, scaled to the energy of all axes. Causal, unlike
+    `reduce_to_one_dof`."""
     direction = np.linalg.svd(wanted, full_matrices=False)[2][0]
     along = wanted @ direction
     size = float(np.linalg.norm(along))
@@ -110,16 +110,16 @@ def high_band_forces(
     others: FloatArray | None = None,
     settings: HighBandSettings | None = None,
 ) -> HighBandForces:
-    """wanted: (N,), one degree of freedom; quiet at both ends, unless causal: the inverse is two-sided and wraps
-    around. others: (N, m), forces that are commanded besides; the direction spares what they need. source: m/s²
-    per N."""
+    """Forces along the direction of the smallest peak. wanted: (N,), one degree of freedom; at rest at both ends,
+    unless causal: the inverse is two-sided and wraps around. others: (N, m), further forces, which count in the peak.
+    source: m/s² per N."""
     settings = settings or HighBandSettings()
     n = 2 * len(wanted) if settings.causal else len(wanted)
     response = source.at(lines_hz(n, sample_rate_hz))
     there = np.zeros((len(wanted), response.shape[2])) if others is None else np.asarray(others, dtype=np.float64)
     spectrum = np.fft.rfft(wanted, n)
-    candidates = _candidates(response.shape[2], settings.shared)
-    played = [_played(spectrum, n, response @ direction, settings) for direction in candidates]
+    candidates = _candidate_directions(response.shape[2], settings.shared)
+    played = [_invert_along(spectrum, n, response @ direction, settings) for direction in candidates]
     # Which way round is not felt, but it matters beside the other forces.
     ways = [sign * scalar[:, None] * d for scalar, d in zip(played, candidates, strict=True) for sign in (1.0, -1.0)]
     peaks = np.array([np.linalg.norm(forces + there, axis=1).max(initial=0.0) for forces in ways])
@@ -128,8 +128,8 @@ def high_band_forces(
     return HighBandForces(ways[best], candidates[best // 2], float(peaks[best]), by_axis)
 
 
-def delivered(forces: FloatArray, sample_rate_hz: float, source: ResponseSource) -> FloatArray:
-    """(N, p), m/s²: what the source says of forces (N, m), from rest."""
+def predict_acceleration(forces: FloatArray, sample_rate_hz: float, source: ResponseSource) -> FloatArray:
+    """(N, p), m/s²: response of the source to forces (N, m), from rest."""
     n = 2 * len(forces)
     spectrum = np.fft.rfft(forces, n, axis=0)[:, :, None]
     answer = (source.at(lines_hz(n, sample_rate_hz)) @ spectrum)[:, :, 0]
@@ -140,7 +140,7 @@ def lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
     return np.asarray(np.fft.rfftfreq(samples, 1 / sample_rate_hz), dtype=np.float64)
 
 
-def _played(spectrum: ComplexArray, n: int, answer: ComplexArray, settings: HighBandSettings) -> FloatArray:
+def _invert_along(spectrum: ComplexArray, n: int, answer: ComplexArray, settings: HighBandSettings) -> FloatArray:
     """Force along a direction, (N,). answer: (lines, p), the device's to that direction."""
     length = np.linalg.norm(answer, axis=1)
     inverse = (length / (length**2 + settings.weight)).astype(np.complex128)
@@ -153,9 +153,10 @@ def _played(spectrum: ComplexArray, n: int, answer: ComplexArray, settings: High
 
 
 def minimum_phase(gain: FloatArray) -> ComplexArray:
-    """(lines,): the causal filter of that gain, (lines,) of a real FFT of even length, that is soonest done.
+    """(lines,): minimum-phase response with that gain, (lines,) of a real FFT of even length.
 
-    By folding the real cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing)."""
+    By folding the real cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing).
+    """
     n = 2 * (len(gain) - 1)
     cepstrum = np.fft.irfft(np.log(gain), n)
     cepstrum[1 : n // 2] *= 2
@@ -163,8 +164,8 @@ def minimum_phase(gain: FloatArray) -> ComplexArray:
     return np.asarray(np.exp(np.fft.rfft(cepstrum)))
 
 
-def _candidates(inputs: int, shared: bool) -> list[FloatArray]:
-    """The axes; then a spiral over the half sphere."""
+def _candidate_directions(inputs: int, shared: bool) -> list[FloatArray]:
+    """Directions of force that are tried: the axes, then a spiral over the half sphere."""
     axes = list(np.eye(inputs))
     if not shared or inputs != 3:
         return axes

@@ -1,4 +1,4 @@
-"""The low band: a slow motion is planned, and a rigid model says which force moves the device along it.
+"""The low band: a slow motion is planned, and its forces follow from the inverse dynamics of a rigid model.
 
 The handle is rendered in a closed loop there: springs, walls and their forces answer to where it is. Playback is
 superposed on that, so what is added is the model's force along the planned motion less what the rendered spring will
@@ -15,7 +15,7 @@ from equalizer.tracking.bands.rigid_model import RigidModel
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
 CORNER_HZ = 0.5
-"""Below it less and less is played: an acceleration that lasts would take the handle out of its workspace."""
+"""High-pass corner: a lasting acceleration would move the handle out of its workspace."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +48,7 @@ def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CO
     Two-sided, so that there is no phase error: x = a / (s² - w²), an exponential kernel that decays both ways. Of the
     wanted acceleration f² / (f² + corner²) is played.
     """
-    a, corner = np.asarray(wanted, dtype=np.float64), _checked_corner(corner_hz, sample_rate_hz)
+    a, corner = np.asarray(wanted, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
     run = int(np.ceil(8 * sample_rate_hz / corner))
     padded = np.pad(a, ((run, run), (0, 0)))
     s = 2j * np.pi * np.fft.rfftfreq(len(padded), 1 / sample_rate_hz)[:, None]
@@ -60,7 +60,7 @@ def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CO
 def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
     """wanted: (N, m), m/s², from rest at the first row, as after a contact. x = a / (s + w)²: it leads by
     2 atan(corner / f)."""
-    a, corner = np.asarray(wanted, dtype=np.float64), _checked_corner(corner_hz, sample_rate_hz)
+    a, corner = np.asarray(wanted, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
     c = 2 * sample_rate_hz
     integral = np.array([1.0, 1.0]) / (c + corner), np.array([1.0, (corner - c) / (c + corner)])
     velocity_like = lfilter(*integral, a, axis=0)
@@ -73,8 +73,8 @@ def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: f
 def low_band_forces(
     motion: SlowMotion, rigid: RigidModel, sample_rate_hz: float, spring: VirtualSpring = NO_SPRING
 ) -> LowBandForces:
-    """Inverse dynamics along the motion, early by the rigid model's delay: to first order, which is enough where the
-    band is slow."""
+    """Inverse dynamics along the motion, advanced by the rigid model's delay to first order, which is enough for a slow
+    band."""
     early = rigid.delay_s + 0.5 / sample_rate_hz
     x, v, a = motion.position_m, motion.velocity_m_s, motion.acceleration
     later_x, later_v = x + early * v, v + early * a
@@ -84,8 +84,8 @@ def low_band_forces(
     return LowBandForces(total, total - rendered, motion)
 
 
-def _checked_corner(corner_hz: float, sample_rate_hz: float) -> float:
-    """In rad/s."""
+def _corner_rad_per_s(corner_hz: float, sample_rate_hz: float) -> float:
+    """The corner in rad/s. Raises ValueError where it is not between zero and half the sample rate."""
     if not 0 < corner_hz < sample_rate_hz / 2:
         raise ValueError(f"corner_hz is {corner_hz}; it must be above zero and below half the sample rate")
     return 2 * np.pi * corner_hz

@@ -1,4 +1,4 @@
-"""The device where it moves as one piece: force = mass a + damping v + stiffness x."""
+"""Rigid-body model of the device: force = mass a + damping v + stiffness x."""
 
 from dataclasses import dataclass
 
@@ -35,7 +35,7 @@ class RigidModel:
 def fit_rigid_model(
     frequency_hz: FloatArray, response: ComplexArray, sample_rate_hz: float, delay_s: float = 0.0
 ) -> RigidModel:
-    """Least squares on the relative error of the force, line by line.
+    """Fit a rigid model by least squares on the relative error of the force, line by line.
 
     frequency_hz: (lines,), above zero, below the first resonance; response: (lines, m, m), m/s² per N, sampled as
     recordings are. delay_s is not fitted: so low it cannot be told from damping and mass. Raises ValueError with fewer

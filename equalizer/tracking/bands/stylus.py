@@ -1,4 +1,4 @@
-"""A separate actuator at the stylus: the highest part of what is wanted, off the motors."""
+"""A separate actuator at the stylus, which takes the highest frequencies off the motors."""
 
 from dataclasses import dataclass
 
@@ -46,8 +46,8 @@ class StylusShare:
 
 
 def share_with_stylus(wanted: FloatArray, sample_rate_hz: float, stylus: StylusActuator) -> StylusShare:
-    """wanted: (N,), one degree of freedom, quiet at both ends. A command above the actuator's limit is scaled down as
-    a whole, and what it then leaves goes back to the motors."""
+    """Split wanted (N,), one degree of freedom, at rest at both ends, between stylus and motors. A command above the
+    actuator's limit is scaled down as a whole, and the rest goes back to the motors."""
     n = len(wanted)
     lines = np.fft.rfftfreq(n, 1 / sample_rate_hz)
     rising = np.clip((lines - stylus.from_hz) / stylus.transition_hz + 0.5, 0, 1)

@@ -1,4 +1,4 @@
-"""Two models of one place, one narrow and exact, one wide: three bands for what is wanted, as a table row by row.
+"""Banded feedforward from two models of one place, a narrow exact one and a wide one, row by row.
 
 Below the narrow model's band a rigid one that is fitted to its lowest lines, in its band the narrow model, above it
 the wide one's response along one direction. The run-in and run-out of the outer bands are no rows of a table and are
@@ -14,7 +14,7 @@ from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.bands.banded_equalizer import BandedEqualizer, HighBand, LowBand
 from equalizer.tracking.bands.banded_forces import BandedForces
-from equalizer.tracking.bands.high_band import ModelledResponse, delivered
+from equalizer.tracking.bands.high_band import ModelledResponse, predict_acceleration
 from equalizer.tracking.bands.rigid_model import RigidModel, fit_rigid_model
 from equalizer.tracking.feedforward.band_split import BandEdges, LinearPhaseSplit
 from equalizer.tracking.feedforward.feedforward import (
@@ -22,19 +22,19 @@ from equalizer.tracking.feedforward.feedforward import (
     LEAKED,
     Feedforward,
     FeedforwardSettings,
-    solved_causally,
-    within_band,
+    extract_band,
+    solve_causally,
 )
 from equalizer.tracking.feedforward.periodic_inverse import check_wanted
-from equalizer.tracking.lqr.limits import require_within
-from equalizer.tracking.lqr.padding import answer, band_error
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, augmented
+from equalizer.tracking.lqr.limits import require_under_cap
+from equalizer.tracking.lqr.padding import band_error, simulate_from_rest
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 RIGID_OCTAVES = 0.6
 """Above the lower end of the narrow band, where the rigid model is fitted: below the first resonance."""
 RIGID_LINES = 30
 LEAST_REACH = 2.0
-"""Of the wider band beyond the narrower: a high band of less than an octave, one direction for all of it, is none."""
+"""Least ratio of the two bands' upper ends: a high band with a single direction needs an octave."""
 BINS_PER_OCTAVE = 6
 
 
@@ -56,8 +56,8 @@ class TwoModels:
         told = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
         if told[0] != told[1] and None not in told[0] + told[1]:
             raise ValueError(
-                f"the narrower one was made {_made(self.narrow)}, the wider one {_made(self.wide)}: two bands must be "
-                "of one device, held and driven alike"
+                f"the narrower one was made {_describe_conditions(self.narrow)}, the wider one "
+                f"{_describe_conditions(self.wide)}: two bands must be of one device, held and driven alike"
             )
 
 
@@ -89,18 +89,18 @@ def banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardS
     check_wanted(models.narrow, wanted)
     check_wanted(models.wide, wanted)
     equalizer, rate_hz = banded_equalizer(models, settings.weight), wanted.sample_rate_hz
-    below = _below(wanted.samples, models.wide)
+    below = _remove_above_band(wanted.samples, models.wide)
     played = equalizer.play(below)
     rows = played.rows_of_wanted(len(wanted))
     if not np.linalg.norm(played.bands.middle[rows]) > LEAKED * np.linalg.norm(wanted.samples):
         low, high = models.narrow.band_hz
         raise TrackingError(f"nothing is wanted between {low:g} and {high:g} Hz, the narrower model's band")
-    problem = augmented(models.narrow, TrackingWeights(settings.weight))
+    problem = make_tracking_problem(models.narrow, TrackingWeights(settings.weight))
     others = (played.by_band[0] + played.by_band[2])[rows]
-    left = within_band(models.narrow, below - answer(problem, others))
-    middle, loss = solved_causally(problem, left, settings, others)
+    left = extract_band(models.narrow, below - simulate_from_rest(problem, others))
+    middle, loss = solve_causally(problem, left, settings, others)
     forces = middle + others
-    predicted = answer(problem, forces)
+    predicted = simulate_from_rest(problem, forces)
     slow = np.zeros_like(below) if played.motion is None else played.motion.acceleration[rows]
     inside = slow + (played.bands.middle + played.bands.high)[rows]
     found = Feedforward(
@@ -109,10 +109,10 @@ def banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardS
         predicted=predicted,
         error=band_error(below, predicted, rate_hz, models.narrow.band_hz),
         left_out=float(np.linalg.norm(wanted.samples - inside) / np.linalg.norm(wanted.samples)),
-        peaks=require_within(forces, settings.cap_n, rate_hz),
+        peaks=require_under_cap(forces, settings.cap_n, rate_hz),
         loss=loss,
     )
-    return BandedFeedforward(found, _facts(models, equalizer, played, below, forces))
+    return BandedFeedforward(found, _collect_facts(models, equalizer, played, below, forces))
 
 
 def banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
@@ -134,8 +134,8 @@ def rigid_part(model: IdentifiedModel) -> RigidModel:
 
 
 def level_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> float | None:
-    """Of the power of all axes together, by sixths of an octave: above the limit of direction perception nothing else
-    is felt. None where nothing is wanted in the band."""
+    """Relative error of the level of all axes together, by sixths of an octave: above the limit of direction perception
+    nothing else is felt. None where nothing is wanted in the band."""
     length = 2 * len(wanted)
     lines_hz = np.fft.rfftfreq(length, 1 / rate_hz)
     count = max(1, round(BINS_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
@@ -150,8 +150,8 @@ def level_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz:
     return float(np.linalg.norm((levels[1] - levels[0])[1:-1]) / size)
 
 
-def _below(wanted: FloatArray, wide: IdentifiedModel) -> FloatArray:
-    """Without what lies above the wide band."""
+def _remove_above_band(wanted: FloatArray, wide: IdentifiedModel) -> FloatArray:
+    """The wanted acceleration without frequencies above the wide band."""
     edge_hz = wide.band_hz[1] + EDGE_ROOM_HZ
     if edge_hz + EDGE_ROOM_HZ >= wide.sample_rate_hz / 2:
         return wanted
@@ -159,14 +159,14 @@ def _below(wanted: FloatArray, wide: IdentifiedModel) -> FloatArray:
     return bands.middle[bands.latency_samples : bands.latency_samples + len(wanted)]
 
 
-def _facts(
+def _collect_facts(
     models: TwoModels, equalizer: BandedEqualizer, played: BandedForces, wanted: FloatArray, forces: FloatArray
 ) -> BandFacts:
     edges, rows, band_hz = equalizer.split.edges, played.rows_of_wanted(len(wanted)), models.narrow.band_hz
-    rate_hz, problem = models.narrow.sample_rate_hz, augmented(models.narrow, equalizer.weights)
-    whole, cut = answer(problem, played.entering)[rows], answer(problem, played.entering[rows])
+    rate_hz, problem = models.narrow.sample_rate_hz, make_tracking_problem(models.narrow, equalizer.weights)
+    whole, cut = simulate_from_rest(problem, played.entering)[rows], simulate_from_rest(problem, played.entering[rows])
     upper_hz = band_hz[1] + 2 * EDGE_ROOM_HZ, models.wide.band_hz[1]
-    above = delivered(forces, rate_hz, ModelledResponse(models.wide))
+    above = predict_acceleration(forces, rate_hz, ModelledResponse(models.wide))
     return BandFacts(
         edges_hz=(edges.low_hz or 0.0, edges.high_hz or 0.0),
         cut_error=band_error(wanted, cut, rate_hz, band_hz),
@@ -177,8 +177,8 @@ def _facts(
     )
 
 
-def _made(model: IdentifiedModel) -> str:
-    """In words, of what the provenance says."""
+def _describe_conditions(model: IdentifiedModel) -> str:
+    """Conditions of the identification in words, from the model's provenance."""
     held = "in a hand" if "held" in str(model.provenance.get("hand")) else "without a hand"
     spring = "with" if model.provenance.get("input") == "excitation" else "without"
     return f"{held} and {spring} the spring in it"

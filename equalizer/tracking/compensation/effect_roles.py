@@ -1,4 +1,4 @@
-"""What a feedforward can do about each effect: compensate it, count it in the timing, or leave it, and then why."""
+"""Role of each effect in a feedforward: compensated, counted in the timing, or left alone, and then why."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from equalizer.effects.discovered_law import axis_names
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.tracking.compensation.known_forces import LAWS
-from equalizer.tracking.compensation.law_forces import why_law_stays
+from equalizer.tracking.compensation.law_forces import reason_law_not_compensated
 
 IN_MODEL = "it is linear, so the identified model has it; compensating it again would count it twice"
 
@@ -35,11 +35,11 @@ TIMED = "in the identified model; used to send what is added ahead of time"
 SCALING, TIMING = ("force_gain",), ("amplifier_lag", "transport_delay", "sensor_lag")
 
 
-def why_not(effect: ModelEffect, inputs: tuple[str, ...] = ("fx", "fy", "fz")) -> str:
-    """Empty for an effect that is compensated. inputs: channels of the commands."""
+def reason_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx", "fy", "fz")) -> str:
+    """Why an effect is not compensated; empty for an effect that is. inputs: channels of the commands."""
     kind = effect.kind
     if effect.law is not None:
-        return why_law_stays(effect.law, axis_names(inputs))
+        return reason_law_not_compensated(effect.law, axis_names(inputs))
     if kind in LAWS or kind == "force_deadband":
         return ""
     if kind in SCALING:
@@ -52,8 +52,8 @@ def why_not(effect: ModelEffect, inputs: tuple[str, ...] = ("fx", "fy", "fz")) -
 
 
 def lead_s(physics: MechanicalModel, sample_rate_hz: float) -> float:
-    """From the row in which a force is commanded to the row in which its effect is read: half a held sample, actuator,
-    sensor. The identified model has all this in it; what is added to its forces must count it by itself."""
+    """Seconds from commanding a force to reading its effect: half a held sample, actuator, sensor. The identified model
+    includes this delay; forces that are added to its own must be advanced by it."""
     corners = [physics.actuator.bandwidth_hz, physics.sensor.bandwidth_hz]
     late = 0.5 / sample_rate_hz + physics.actuator.delay_s
     for effect in physics.effects:

@@ -1,10 +1,10 @@
-"""Known nonlinear physics in the feedforward: forces of effects that a diagnosis has named, along the planned motion.
+"""Compensation of known nonlinear effects: their forces along the planned motion are added to the feedforward.
 
 A linear model that was identified on a device with friction has an equivalent of that friction in it, and friction
 added on top would be counted twice: worse than none. Best is to identify on recordings freed of the effects
-(`without_effects`). Where only a model is at hand, the equivalent that a sinusoid of the identification's amplitude
-leaves in it is taken off. That is a part of the truth: an axis that hardly moved while another was swept stuck, and no
-equivalent of sticking is in this.
+(`subtract_effects`). Where only a model is at hand, the equivalent for a sinusoid of the identification's amplitude is
+subtracted. That is an approximation: an axis that hardly moved while another was swept was stuck, which this equivalent
+does not describe.
 """
 
 from collections.abc import Iterator
@@ -19,19 +19,24 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.compensation.effect_roles import lead_s, why_not
+from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
 from equalizer.tracking.compensation.known_forces import LAWS, Law, deadband_share, equivalent_impedance
-from equalizer.tracking.compensation.law_forces import along_own_axis, force_against, linear_share, undone
+from equalizer.tracking.compensation.law_forces import (
+    compensating_force,
+    invert_command_map,
+    linear_share,
+    single_axis_law,
+)
 from equalizer.tracking.feedforward.band_part import band_share, padded_length
 from equalizer.tracking.feedforward.planned_motion import PlannedMotion, planned_motion
-from equalizer.tracking.learning.iteration import fitting_share
+from equalizer.tracking.learning.iteration import largest_share
 
 SLIP_SHARE = 0.05
-"""Of an axis' rms velocity: where a friction force changes sign smoothly. Slower, it would chatter with the plan's
-own error about zero velocity; faster, it would miss the force that is there."""
+"""Velocity below which a friction force changes sign smoothly, over the axis' rms velocity. A smaller share would
+chatter with the plan's own error about zero velocity; a larger one would miss the force that is there."""
 
 LEAST_SPEED = 1e-9
-"""Stands for an axis that stood still in an identification, m/s."""
+"""Velocity of an axis that stood still in an identification, m/s, which keeps divisions finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +58,8 @@ def compensate(
     identified_with_n: float | None,
     cap_n: float | None = None,
 ) -> Compensation:
-    """forces (N, m), from the model alone, for what is wanted (N, p), from rest to rest; p = m, axis by axis.
+    """Add the forces of known effects to forces (N, m) of the model alone, for wanted accelerations (N, p), from rest
+    to rest; p = m, axis by axis.
 
     identified_with_n: amplitude of the sinusoidal forces (sweeps, one axis after the other) with which the model was
     identified on the device that has the effects; None = the model is of a device without them. Raises ValueError for
@@ -69,16 +75,16 @@ def compensate(
     used = tuple(effect for effect, reason in reasons if not reason)
     gain = axis_gains(physics, model.input_channels, model.output_channels)
     played, added = forces.copy(), np.zeros_like(forces)
-    for effect, axis in _by_axis(used, model):
+    for effect, axis in _effects_by_axis(used, model):
         if effect.kind in LAWS or _is_force(effect):
-            added[:, axis] += _beyond_model(effect, axis, motion, model, identified_with_n) / gain[axis]
-    for effect, axis in _by_axis(used, model):
+            added[:, axis] += _force_beyond_model(effect, axis, motion, model, identified_with_n) / gain[axis]
+    for effect, axis in _effects_by_axis(used, model):
         if effect.kind == "force_deadband":
-            _out_of_deadband(effect.parameters["width"], played, added, axis, identified_with_n)
+            _compensate_deadband(effect.parameters["width"], played, added, axis, identified_with_n)
         elif effect.law is not None and not _is_force(effect):
-            _undone(effect.law, played, added, axis, identified_with_n)
+            _compensate_command_map(effect.law, played, added, axis, identified_with_n)
     difference = played + added - forces
-    share = 1.0 if cap_n is None else fitting_share(forces, difference, cap_n)
+    share = 1.0 if cap_n is None else largest_share(forces, difference, cap_n)
     not_used = tuple((effect, reason) for effect, reason in reasons if reason)
     return Compensation(forces + share * difference, used, not_used, share)
 
@@ -121,16 +127,16 @@ def slip_speed(velocity: FloatArray) -> float:
     return SLIP_SHARE * float(np.sqrt(np.mean(velocity**2)))
 
 
-def _by_axis(effects: tuple[ModelEffect, ...], model: IdentifiedModel) -> Iterator[tuple[ModelEffect, int]]:
+def _effects_by_axis(effects: tuple[ModelEffect, ...], model: IdentifiedModel) -> Iterator[tuple[ModelEffect, int]]:
     for effect in effects:
         for axis in axes_of(effect, model.input_channels, model.output_channels):
             yield effect, axis
 
 
-def _beyond_model(
+def _force_beyond_model(
     effect: ModelEffect, axis: int, motion: PlannedMotion, model: IdentifiedModel, identified_with_n: float | None
 ) -> FloatArray:
-    """(N,): the effect's force along the motion, less what of it the linear model holds already."""
+    """(N,): the effect's force along the motion, without its linear equivalent in the identified model."""
     v = motion.velocity[:, axis]
     slip = slip_speed(v)
     law, force = force_law(effect, axis, motion, (model.input_channels, model.sample_rate_hz), slip)
@@ -153,8 +159,8 @@ def force_law(
     commands, and the rate, Hz."""
     if effect.law is not None:
         letters = axis_names(sampled[0])
-        against = force_against(effect.law, letters, motion, sampled[1], slip)
-        return along_own_axis(effect.law, letters, axis), against
+        against = compensating_force(effect.law, letters, motion, sampled[1], slip)
+        return single_axis_law(effect.law, letters, axis), against
     law, v = LAWS[effect.kind], motion.velocity[:, axis]
     if slip == 0:
         return law, np.zeros_like(v)
@@ -165,18 +171,20 @@ def _is_force(effect: ModelEffect) -> bool:
     return effect.law is not None and effect.law.acts_on == "force"
 
 
-def _undone(law: FoundLaw, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None) -> None:
-    """What must be commanded so that the force behind a command map is the one that is meant, in place."""
+def _compensate_command_map(
+    law: FoundLaw, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
+) -> None:
+    """Add in place what makes the force behind a command map the intended one."""
     if identified_with_n is not None:
         played[:, axis] *= linear_share(law, identified_with_n)
     meant = played[:, axis] + added[:, axis]
-    added[:, axis] += undone(law, meant) - meant
+    added[:, axis] += invert_command_map(law, meant) - meant
 
 
-def _out_of_deadband(
+def _compensate_deadband(
     width: float, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
 ) -> None:
-    """What must be commanded so that the force behind the dead band is the one that is meant, in place."""
+    """Add in place what makes the force behind the dead band the intended one."""
     if identified_with_n is not None:
         played[:, axis] *= deadband_share(width, identified_with_n)
     meant = played[:, axis] + added[:, axis]

@@ -1,5 +1,5 @@
-"""What a feedforward can do about a law without a name: a force is taken off along the planned motion, a command map
-that is one to one is inverted."""
+"""Compensation of discovered laws in a feedforward: a force is subtracted along the planned motion, a monotone command
+map is inverted."""
 
 from collections.abc import Mapping
 
@@ -15,9 +15,9 @@ from equalizer.tracking.feedforward.planned_motion import PlannedMotion
 
 MOTION = ("", "v", "a")
 TABLE, REACH = 2001, 2.0
-"""Places at which a command map is known, over so many times the largest force that is meant."""
+"""Samples of a command map's table, and its range over the largest intended force."""
 PLAYED = 1000.0
-"""Stands for the rate of a law that remembers nothing, Hz."""
+"""Sample rate at which a law without memory is evaluated; of no consequence, Hz."""
 COMMANDS = "it hangs on the command, which a compensation would change"
 REMEMBERS = "it remembers what was commanded, so no command by itself undoes it"
 SEVERAL = "it hangs on several commands or on the time"
@@ -25,8 +25,8 @@ FOLDED = "several commands give the same force, so it cannot be undone"
 SENSED = "it is the sensor's: a force against it would make the handle do what the sensor gets wrong"
 
 
-def why_law_stays(law: Law, letters: tuple[str, ...]) -> str:
-    """Empty for a law that is compensated. letters: of the axes, in their order."""
+def reason_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
+    """Why a law is not compensated; empty for a law that is. letters: of the axes, in their order."""
     known = {prefix + letter for letter in letters for prefix in MOTION}
     if law.acts_on == "response":
         return SENSED
@@ -41,41 +41,43 @@ def why_law_stays(law: Law, letters: tuple[str, ...]) -> str:
     return "" if np.isfinite(values).all() and (np.diff(values) > 0).any() else FOLDED
 
 
-def force_against(law: Law, letters: tuple[str, ...], motion: PlannedMotion, rate_hz: float, slip: float) -> FloatArray:
-    """(N,): what must be added to the command so that the law's force is taken off. slip: the speed below which a
-    change of sign is smoothed, m/s."""
+def compensating_force(
+    law: Law, letters: tuple[str, ...], motion: PlannedMotion, rate_hz: float, slip: float
+) -> FloatArray:
+    """(N,): force to be added to the command to cancel the law's force. slip: the speed below which a change of sign is
+    smoothed, m/s."""
     columns = {
         prefix + letter: column[:, axis]
         for axis, letter in enumerate(letters)
         for prefix, column in zip(MOTION, (motion.position, motion.velocity, motion.acceleration), strict=True)
     }
-    return -evaluate(_smooth(law, slip), columns, rate_hz)
+    return -evaluate(_smooth_signs(law, slip), columns, rate_hz)
 
 
-def along_own_axis(law: Law, letters: tuple[str, ...], axis: int) -> ForceAgainst:
-    """Along a sinusoid of this axis while the others rest, as `equivalent_impedance` asks."""
+def single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceAgainst:
+    """The law along a sinusoid of this axis while the others rest, as `equivalent_impedance` takes it."""
 
-    def against(of: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    def against(numbers: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
         wave = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
         still = np.zeros((len(x), len(letters)))
         motion = PlannedMotion(still, still.copy(), still.copy())
         motion.position[:, axis], motion.velocity[:, axis], motion.acceleration[:, axis] = x, v, -(wave**2) * x
         # Two cycles are given.
-        return force_against(law, letters, motion, len(x) / 2 * wave / (2 * np.pi), slip)
+        return compensating_force(law, letters, motion, len(x) / 2 * wave / (2 * np.pi), slip)
 
     return against
 
 
 def linear_share(law: Law, amplitude: float) -> float:
-    """What a command map lets through of a sinusoid's fundamental."""
+    """Describing function of a command map: share of a sinusoid's fundamental that passes."""
     wave = np.sin(2 * np.pi * (np.arange(TABLE) + 0.5) / TABLE)
     passed = evaluate(law, {law.variables[0]: amplitude * wave}, PLAYED)
     return float(2 * np.mean(passed * wave) / amplitude)
 
 
-def undone(law: Law, meant: FloatArray) -> FloatArray:
-    """(N,): commands that the map turns into the forces that are meant; the nearest where none does. Raises ValueError
-    where the map goes up and down there."""
+def invert_command_map(law: Law, meant: FloatArray) -> FloatArray:
+    """(N,): commands that the map turns into the intended forces (N,); the nearest where none does. Raises ValueError
+    where the map is not monotone there."""
     span = REACH * max(float(np.abs(meant).max()), np.finfo(np.float64).tiny)
     commands = np.linspace(-span, span, TABLE)
     forces = evaluate(law, {law.variables[0]: commands}, PLAYED)
@@ -84,16 +86,16 @@ def undone(law: Law, meant: FloatArray) -> FloatArray:
     return np.asarray(np.interp(meant, forces, commands))
 
 
-def _smooth(law: Law, slip: float) -> Law:
-    """Signs of a velocity change over `slip` on either side, as friction's does."""
-    tree = _smoothed(law.tree, slip)
+def _smooth_signs(law: Law, slip: float) -> Law:
+    """Replace signs of velocities by tanh over `slip`, as for friction."""
+    tree = _smooth_node(law.tree, slip)
     return Law(format_formula(tree, None, None), law.numbers, law.units, law.acts_on, law.axis)
 
 
-def _smoothed(node: Node, slip: float) -> Node:
+def _smooth_node(node: Node, slip: float) -> Node:
     match node:
         case Apply("sign", (Variable(name) as velocity,)) if name.startswith("v") and slip > 0:
             return Apply("tanh", (Apply("/", (velocity, Number(slip))),))
         case Apply(name, parts):
-            return Apply(name, tuple(_smoothed(part, slip) for part in parts))
+            return Apply(name, tuple(_smooth_node(part, slip) for part in parts))
     return node

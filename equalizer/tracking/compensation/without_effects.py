@@ -1,8 +1,8 @@
-"""A recording as it would be of a device without known effects: their forces, along the motion that was measured, are
-taken off the commands. A model identified from it is of the linear rest, and `compensate` then adds the effects whole.
+"""Subtraction of known effects from a recording: their forces along the measured motion are taken off the commands. A
+model identified from it describes the linear rest, and `compensate` then adds the effects as a whole.
 
-An axis that sticks shows no motion to take a force from: recordings in which all axes move all the time (multisines on
-all of them, well above friction) are freed well, one axis swept after the other is not.
+An axis that sticks shows no motion to compute a force from: this works on recordings in which all axes move all the
+time (multisines on all of them, well above friction), and not where one axis is swept after the other.
 """
 
 from dataclasses import replace
@@ -23,11 +23,11 @@ from equalizer.tracking.compensation.known_physics import (
 from equalizer.tracking.feedforward.planned_motion import planned_motion
 
 HIGHEST_SHARE = 3.0
-"""The motion is taken up to so many times the upper end of what was excited: friction has harmonics."""
+"""Upper end of the motion's band over that of the excitation, because friction has harmonics; and likewise below."""
 LOWEST_SHARE = 0.75
 
 
-def without_effects(recording: Recording, physics: MechanicalModel, excited_hz: tuple[float, float]) -> Recording:
+def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz: tuple[float, float]) -> Recording:
     """The response must be the acceleration, axis by axis with the commands. excited_hz: where the commands have their
     power. The excitation is left as it was. Raises ValueError for another response, missing samples, unknown axes."""
     inputs, outputs = recording.command.channels, recording.response.channels
@@ -45,14 +45,18 @@ def without_effects(recording: Recording, physics: MechanicalModel, excited_hz: 
     gain, freed = axis_gains(physics, inputs, outputs), recording.command.samples.copy()
     for effect in physics.effects:
         for axis in axes_of(effect, inputs, outputs):
-            if effect.law is not None and effect.law.acts_on == "command" and not why_not(effect, inputs):
+            if (
+                effect.law is not None
+                and effect.law.acts_on == "command"
+                and not reason_not_compensated(effect, inputs)
+            ):
                 freed[:, axis] = evaluate(effect.law, {effect.law.variables[0]: freed[:, axis]}, rate_hz)
             if effect.kind == "force_deadband":
                 beyond = np.maximum(np.abs(freed[:, axis]) - effect.parameters["width"], 0.0)
                 freed[:, axis] = np.copysign(beyond, freed[:, axis])
     for effect in physics.effects:
         acts_on = "force" if effect.law is None else effect.law.acts_on
-        if acts_on == "force" and effect.kind != "force_deadband" and not why_not(effect, inputs):
+        if acts_on == "force" and effect.kind != "force_deadband" and not reason_not_compensated(effect, inputs):
             for axis in axes_of(effect, inputs, outputs):
                 slip = max(slip_speed(motion.velocity[:, axis]), np.finfo(np.float64).tiny)
                 freed[:, axis] -= force_law(effect, axis, motion, (inputs, rate_hz), slip)[1] / gain[axis]

@@ -1,4 +1,4 @@
-"""Forces of one model for one wanted acceleration.
+"""Feedforward forces of a single model for a wanted acceleration.
 
 `trajectory` (a table) -> `band_split` -> `feedforward` (finite, by the tracker) or `periodic_inverse` (repeated for
 ever) -> `quality`. `model_equalizer` implements the port `equalizer` for stimuli of a session; `baselines` and

@@ -1,17 +1,17 @@
-"""The part of a finite record that lies in a band, without shift in time."""
+"""Zero-phase band-pass filtering of a finite record, in the frequency domain."""
 
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
 
 LOW_EDGE, HIGH_EDGE = 0.9, 1.06
-"""Raised cosines from these shares of the band's ends outwards to its ends: a sharp edge would ring for seconds."""
+"""Raised-cosine edges from these shares of the band's ends to its ends: a sharp edge would ring for seconds."""
 QUIET_S = 1.0
-"""Of zeros behind the record, so that its end does not reach round to its beginning."""
+"""Zeros appended to the record, so that its end does not wrap around to its beginning."""
 
 
 def band_part(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
-    """(N, channels), of a record that begins and ends at rest, or of noise."""
+    """Part of samples (N, channels) within the band. They begin and end at rest, or are noise."""
     length = padded_length(len(samples), sample_rate_hz)
     lines = np.fft.rfft(samples, length, axis=0)
     share = band_share(np.asarray(np.fft.rfftfreq(length, 1 / sample_rate_hz), dtype=np.float64), band_hz)
@@ -20,7 +20,7 @@ def band_part(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[float, 
 
 
 def band_share(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> FloatArray:
-    """(lines,): 1 in the band, 0 well outside."""
+    """Gain of the band pass (lines,): 1 in the band, 0 well outside."""
     low, high = band_hz
     rise = np.ones_like(frequency_hz) if low == 0 else (frequency_hz / low - LOW_EDGE) / (1 - LOW_EDGE)
     fall = (HIGH_EDGE - frequency_hz / high) / (HIGH_EDGE - 1)

@@ -1,8 +1,8 @@
-"""What is wanted, split into a low, a middle and a high band that add up to it again.
+"""Complementary filters: a signal split into a low, a middle and a high band that add up to it again.
 
 The split comes before anything is solved: a model says nothing outside its band, and where the device is loud there,
 a little content outside is much error. Two forms: symmetric filters, steep and without phase error but late, for what
-is known beforehand; causal ones, at once but shallow, for what begins at a contact.
+is known beforehand; causal ones, without latency but shallow, for what begins at a contact.
 """
 
 from dataclasses import dataclass

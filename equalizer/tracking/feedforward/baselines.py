@@ -1,4 +1,4 @@
-"""Other ways to turn wanted accelerations into forces, for comparison: each gives its inverse line by line.
+"""Baseline methods that turn wanted accelerations into forces, for comparison: each gives its inverse line by line.
 
 Costs are multiply-adds per sample of a form that runs sample by sample at the response's rate; loops that are computed
 beforehand cost nothing while they play.
@@ -27,16 +27,18 @@ class Inverse:
     """Per sample of all channels."""
 
 
-def nothing(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """The number that is wanted in m/s² is commanded in N."""
-    return Inverse("nothing", _everywhere(np.eye(*model.D.shape[::-1]), frequency_hz), 0)
+def no_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
+    """No equalization: the wanted number in m/s² is commanded in N."""
+    return Inverse("nothing", _constant_response(np.eye(*model.D.shape[::-1]), frequency_hz), 0)
 
 
 def static_gain(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """One gain for all axes: it sets their geometric mean over the lines right."""
+    """A common gain for all axes, which makes their geometric mean over the lines right."""
     along = np.abs(np.einsum("lii->li", model_response(model, frequency_hz)))
     gain = float(np.exp(-np.log(along).mean()))
-    return Inverse("static gain", _everywhere(gain * np.eye(*model.D.shape[::-1]), frequency_hz), model.D.shape[1])
+    return Inverse(
+        "static gain", _constant_response(gain * np.eye(*model.D.shape[::-1]), frequency_hz), model.D.shape[1]
+    )
 
 
 def acceleration_matching(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
@@ -83,12 +85,12 @@ def raw_estimate(measured: FrequencyResponse, frequency_hz: FloatArray, weight: 
     return Inverse("raw estimate", regularised_inverse(np.asarray(G, dtype=complex), weight), taps * p * m)
 
 
-def ours(model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
-    """The identified model's. Cost: its state, and the stored gains on it; less where resonances are kept apart."""
+def identified_inverse(model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
+    """The identified model's regularised inverse. Cost: its state, and the stored gains on it; less in modal form."""
     m, p = model.D.shape[1], model.D.shape[0]
     cost = model.order**2 + 2 * model.order * m + m * p
     return Inverse("identified model", inverse_response(model, frequency_hz, weight), cost)
 
 
-def _everywhere(matrix: FloatArray, frequency_hz: FloatArray) -> ComplexArray:
+def _constant_response(matrix: FloatArray, frequency_hz: FloatArray) -> ComplexArray:
     return np.broadcast_to(matrix.astype(complex), (len(frequency_hz), *matrix.shape)).copy()

@@ -1,4 +1,4 @@
-"""Every way to compute forces, at every place, in one table."""
+"""Comparison of all methods to compute forces at all places, as a table."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.baselines import (
     Inverse,
     acceleration_matching,
-    nothing,
-    ours,
+    identified_inverse,
+    no_inverse,
     raw_estimate,
     rigid_body,
     static_gain,
@@ -33,14 +33,14 @@ class ComparisonRow:
 def baseline_inverses(
     model: IdentifiedModel, measured: FrequencyResponse, frequency_hz: FloatArray
 ) -> tuple[Inverse, ...]:
-    """All of them from what one place showed, the identified model's last."""
+    """All baseline inverses from the data of one place, the identified model's last."""
     return (
-        nothing(model, frequency_hz),
+        no_inverse(model, frequency_hz),
         static_gain(model, frequency_hz),
         acceleration_matching(model, frequency_hz),
         rigid_body(model, frequency_hz),
         raw_estimate(measured, frequency_hz),
-        ours(model, frequency_hz),
+        identified_inverse(model, frequency_hz),
     )
 
 
@@ -49,8 +49,8 @@ def compare(
     responses: Mapping[str, ComplexArray],
     only_at: Mapping[str, Sequence[Inverse]] | None = None,
 ) -> tuple[ComparisonRow, ...]:
-    """responses: by place, the true ones, (lines, p, m) at the inverses' lines. `only_at`: inverses that were made for
-    one place, such as the interpolated model's at the edge."""
+    """Quality of each inverse at each place. responses: the true ones by place, (lines, p, m) at the inverses' lines.
+    `only_at`: inverses that were made for one place, such as the interpolated model's at the edge."""
     rows = []
     for where, response in responses.items():
         for inverse in (*inverses, *(only_at or {}).get(where, ())):

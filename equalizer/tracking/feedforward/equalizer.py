@@ -1,4 +1,4 @@
-"""The equalizer's port: what a stimulus passes through on its way to the device."""
+"""Interface of an equalizer, through which a stimulus passes on its way to the device."""
 
 from typing import Protocol
 
@@ -6,7 +6,7 @@ from equalizer.signals.signal import FloatArray, Signal
 
 
 class Equalizer(Protocol):
-    """Turns what is wanted at the handle into what is commanded."""
+    """Turns a signal wanted at the handle into commands."""
 
     @property
     def name(self) -> str: ...

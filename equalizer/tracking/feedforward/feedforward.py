@@ -1,4 +1,4 @@
-"""A wanted acceleration turned into forces by one model: its band cut out, tracked from the first row on, the cap kept.
+"""Feedforward forces for a wanted acceleration: band-limited, tracked by a model from the first row on, under a cap.
 
 What lies outside the band is not played: a model says nothing there, and where the device is loud a little of it would
 be much error. How much that is, is stated. Forces go one to one with the rows of what is wanted, from rest.
@@ -13,19 +13,24 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.summary import Summarised, Summary
 from equalizer.tracking.feedforward.band_split import BandEdges, LinearPhaseSplit
 from equalizer.tracking.feedforward.periodic_inverse import check_wanted
-from equalizer.tracking.lqr.constrained import CapSettings, TrackingLoss, constrained_track
-from equalizer.tracking.lqr.limits import Peaks, predicted_peaks, require_within
-from equalizer.tracking.lqr.padding import CAUSAL, answer, band_error, track_padded
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, TrackingWeights, augmented
+from equalizer.tracking.lqr.constrained import CapSettings, TrackingLoss, track_under_cap
+from equalizer.tracking.lqr.limits import Peaks, force_peaks, require_under_cap
+from equalizer.tracking.lqr.padding import CAUSAL, band_error, simulate_from_rest, track_padded
+from equalizer.tracking.lqr.tracking_problem import (
+    TrackingError,
+    TrackingProblem,
+    TrackingWeights,
+    make_tracking_problem,
+)
 
 EDGE_ROOM_HZ = 1.0
 """Beyond the model's band, so that all of it is played."""
 LEAKED = 3e-3
-"""Share of what is wanted that filters let through from outside the band: no more than that inside is nothing."""
+"""Share of a signal that filters leak from outside the band: less than that inside the band counts as nothing."""
 NO_CAP_N = 1e9
-"""For forces that are checked later, when all of them are together."""
+"""A cap that never acts, for forces that are checked later as a sum."""
 PROVED = 1e-3
-"""Forces under the cap are taken whose cost is proved to be so close to the best."""
+"""Relative duality gap to which forces under the cap are solved."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,14 +78,14 @@ def feedforward(model: IdentifiedModel, wanted: Signal, settings: FeedforwardSet
     """
     settings = settings or FeedforwardSettings()
     check_wanted(model, wanted)
-    problem = augmented(model, TrackingWeights(settings.weight))
-    inside = within_band(model, wanted.samples)
+    problem = make_tracking_problem(model, TrackingWeights(settings.weight))
+    inside = extract_band(model, wanted.samples)
     if not np.linalg.norm(inside) > LEAKED * np.linalg.norm(wanted.samples):
         low, high = model.band_hz
         raise TrackingError(f"nothing is wanted between {low:g} and {high:g} Hz, the model's band")
-    forces, loss = solved_causally(problem, inside, settings)
-    peaks = require_within(forces, settings.cap_n, model.sample_rate_hz)
-    predicted = answer(problem, forces)
+    forces, loss = solve_causally(problem, inside, settings)
+    peaks = require_under_cap(forces, settings.cap_n, model.sample_rate_hz)
+    predicted = simulate_from_rest(problem, forces)
     return Feedforward(
         forces=Signal(forces, model.sample_rate_hz, "force", "N", model.input_channels),
         wanted=inside,
@@ -92,15 +97,15 @@ def feedforward(model: IdentifiedModel, wanted: Signal, settings: FeedforwardSet
     )
 
 
-def within_band(model: IdentifiedModel, wanted: FloatArray) -> FloatArray:
+def extract_band(model: IdentifiedModel, wanted: FloatArray) -> FloatArray:
     """(N, p): the part of `wanted` within the model's band, without delay."""
-    split = LinearPhaseSplit(edges_around(model), model.sample_rate_hz)
+    split = LinearPhaseSplit(band_edges(model), model.sample_rate_hz)
     bands = split.split(wanted)
     return bands.middle[bands.latency_samples : bands.latency_samples + len(wanted)]
 
 
-def edges_around(model: IdentifiedModel) -> BandEdges:
-    """Beside the model's band, with room; None where the band reaches to the end."""
+def band_edges(model: IdentifiedModel) -> BandEdges:
+    """Edges of a model's band with room beside it; None where the band reaches to the end."""
     low, high = model.band_hz
     nyquist = model.sample_rate_hz / 2
     return BandEdges(
@@ -109,15 +114,16 @@ def edges_around(model: IdentifiedModel) -> BandEdges:
     )
 
 
-def solved_causally(
+def solve_causally(
     problem: TrackingProblem, wanted: FloatArray, settings: FeedforwardSettings, others: FloatArray | None = None
 ) -> tuple[FloatArray, TrackingLoss | None]:
-    """Forces (N, m) from the first row on, under the cap together with the others, (N, m), where it constrains."""
+    """Forces (N, m) from the first row on; where the settings constrain, their sum with others (N, m) is under the
+    cap."""
     free = track_padded(problem, wanted, CAUSAL).forces
     total = free if others is None else free + others
-    if not settings.constrain or predicted_peaks(total, settings.cap_n).fits:
+    if not settings.constrain or force_peaks(total, settings.cap_n).fits:
         return free, None
     room = (0, CAUSAL.samples(problem.sample_rate_hz)[1]), (0, 0)
     there = None if others is None else np.pad(others, room)
-    capped = constrained_track(problem, np.pad(wanted, room), settings.cap_n, there, CapSettings(gap=PROVED))
+    capped = track_under_cap(problem, np.pad(wanted, room), settings.cap_n, there, CapSettings(gap=PROVED))
     return capped.forces[: len(wanted)], capped.loss

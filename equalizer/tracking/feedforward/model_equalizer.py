@@ -1,4 +1,4 @@
-"""An identified model as an equalizer: stimuli that are wanted accelerations, and an onset that is one too."""
+"""Equalizer by an identified model: stimuli are wanted accelerations, and so is their onset."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,7 +10,7 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, periodic_command
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 from equalizer.tracking.lqr.lqr import StoredGains, periodic_state, ringing_weight, stored_gains, track
-from equalizer.tracking.lqr.tracking_problem import TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,8 +38,8 @@ class ModelEqualizer:
         return periodic_command(self.model, wanted, self.weight, self.spring)
 
     def onset(self, wanted: Signal, envelope: FloatArray) -> Signal:
-        """From rest into the loop, without a transient after it: the end is weighed by what a state that is not the
-        loop's would play on, its observability."""
+        """From rest into the loop without a transient after it: the final state's deviation from the loop's is weighted
+        by the observability Gramian."""
         T, n = len(envelope), len(wanted)
         gains = _onset_gains(self.model, self.weight, T)
         loop = periodic_command(self.model, wanted, self.weight)
@@ -47,21 +47,21 @@ class ModelEqualizer:
         start = periodic_state(gains.problem, turned)
         risen = envelope[:, None] * wanted.samples[np.arange(T) % n]
         forces = track(gains, risen, final_state=start).forces
-        return Signal(forces - self._spring_while_rising(wanted, loop, envelope), *_force_of(loop))
+        return Signal(forces - self._spring_during_onset(wanted, loop, envelope), *_force_properties(loop))
 
-    def _spring_while_rising(self, wanted: Signal, loop: Signal, envelope: FloatArray) -> FloatArray:
-        """What the spring does by itself: it comes in with the same envelope as the motion."""
+    def _spring_during_onset(self, wanted: Signal, loop: Signal, envelope: FloatArray) -> FloatArray:
+        """The spring's own force, which rises with the same envelope as the motion."""
         alone = loop.samples - self.periodic(wanted).samples
         ticks = np.arange(len(envelope)) % len(wanted)
         spring: FloatArray = envelope[:, None] * alone[ticks]
         return spring
 
 
-def _force_of(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[str, ...], tuple[str, ...]]:
+def _force_properties(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[str, ...], tuple[str, ...]]:
     return loop.sample_rate_hz, loop.quantity, loop.unit, loop.channels
 
 
 @lru_cache(maxsize=8)
 def _onset_gains(model: IdentifiedModel, weight: float, samples: int) -> StoredGains:
-    problem = augmented(model, TrackingWeights(weight))
+    problem = make_tracking_problem(model, TrackingWeights(weight))
     return stored_gains(problem, samples, ringing_weight(problem))

@@ -1,4 +1,4 @@
-"""Commands that are repeated for ever: the steady-state inverse of a model, line by line."""
+"""Periodic commands: the regularised steady-state inverse of a model, line by line."""
 
 import numpy as np
 
@@ -9,15 +9,15 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
 WEIGHT = 1e-4
-"""Of |force|² against |acceleration error|²: costs a thousandth of a decibel where the device answers 1 m/s² per N,
-and keeps the force finite where it hardly answers."""
+"""Weight of |force|² against |acceleration error|²: costs a thousandth of a decibel where the device answers 1 m/s² per
+N, and keeps the force finite where it hardly answers."""
 
 EMPTY = 1e-9
 """Lines below this share of the largest one are rounding."""
 
 
 class OutsideBandError(ValueError):
-    """Something is wanted at a frequency for which the model was not made."""
+    """Something is wanted at a frequency outside the model's band."""
 
 
 def inverse_response(
@@ -41,7 +41,7 @@ def regularised_inverse(G: ComplexArray, weight: float) -> ComplexArray:
 def periodic_command(
     model: IdentifiedModel, wanted: Signal, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
 ) -> Signal:
-    """One loop of forces (N, m) for one loop of what is wanted (N, p).
+    """One period of forces (N, m) for one period of wanted outputs (N, p).
 
     Raises OutsideBandError where something is wanted outside the model's band, ValueError for other rates or units.
     """
@@ -73,7 +73,7 @@ def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
 
 
 def check_wanted(model: IdentifiedModel, wanted: Signal) -> None:
-    """Raises ValueError for a signal that this model cannot be asked for."""
+    """Raises ValueError for a signal whose rate, channels or units are not the model's."""
     if wanted.sample_rate_hz != model.sample_rate_hz:
         raise ValueError(f"the model runs at {model.sample_rate_hz:g} Hz, not at {wanted.sample_rate_hz:g} Hz")
     p = model.C.shape[0]

@@ -1,4 +1,4 @@
-"""How the handle will move where an acceleration is delivered: integrated in the band, about its resting place."""
+"""Motion of the handle for a delivered acceleration: its integrals within a band, about the resting place."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ class PlannedMotion:
 def planned_motion(
     wanted: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float], lead_s: float = 0.0
 ) -> PlannedMotion:
-    """wanted: (N, p), begins and ends at rest. lead_s: how far ahead of the rows the motion is taken.
+    """Motion for wanted accelerations (N, p) that begin and end at rest. lead_s: how far ahead of the rows it is taken.
 
     Raises ValueError for a band from zero on: a constant acceleration has no motion about a resting place.
     """
@@ -34,8 +34,8 @@ def planned_motion(
     s[0] = 1.0  # of no consequence: nothing of it lies in the band
     spectrum = np.fft.rfft(wanted, length, axis=0) * share[:, np.newaxis]
 
-    def integrated(times: int) -> FloatArray:
+    def integrate(times: int) -> FloatArray:
         rows: FloatArray = np.fft.irfft(spectrum / s[:, np.newaxis] ** times, length, axis=0)[: len(wanted)]
         return rows
 
-    return PlannedMotion(integrated(2), integrated(1), integrated(0))
+    return PlannedMotion(integrate(2), integrate(1), integrate(0))

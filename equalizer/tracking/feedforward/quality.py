@@ -1,4 +1,4 @@
-"""How good an equalized response is: flatness, coupling, direction."""
+"""Quality of an equalized response: flatness, coupling, direction."""
 
 from dataclasses import dataclass
 

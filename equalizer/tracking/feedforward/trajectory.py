@@ -1,4 +1,4 @@
-"""What is wanted at the handle and the forces that give it, as tables of numbers over time."""
+"""Trajectories of wanted accelerations or commanded forces as CSV tables, both ways."""
 
 import csv
 import io
@@ -9,9 +9,9 @@ import numpy as np
 from equalizer.signals.signal import FloatArray, Signal
 
 STEP_TOLERANCE = 0.01
-"""Each time step may differ so much from the mean one, as a share; more is no constant rate."""
+"""Largest relative deviation of a time step from the mean one at a constant rate."""
 RATE_TOLERANCE = 1e-5
-"""A rate is taken as the whole number of hertz it lies so close to: time stamps are rounded when printed."""
+"""Relative distance to a whole number of hertz to which a rate is rounded, because printed time stamps are rounded."""
 
 
 class TableError(ValueError):
@@ -73,8 +73,8 @@ def parse_trajectory(text: str) -> Trajectory:
     if kind is None:
         allowed = " or ".join(",".join(kind.header) for kind in TABLE_KINDS)
         raise TableError((f"line 1 reads '{','.join(header)}'; allowed is {allowed}",))
-    table = _numbers(rows[1:], kind)
-    rate_hz = _rate_hz(table[:, 0])
+    table = _read_numbers(rows[1:], kind)
+    rate_hz = _find_rate_hz(table[:, 0])
     signal = Signal(table[:, 1:], rate_hz, kind.quantity, kind.unit, kind.header[1:])
     return Trajectory(signal, float(table[0, 0]))
 
@@ -98,7 +98,7 @@ def require_rate(trajectory: Trajectory, rate_hz: float) -> None:
         raise TableError((f"the rows are at {found:g} Hz, but the model is at {rate_hz:g} Hz; resample them to it",))
 
 
-def _numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
+def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
     width = len(kind.header)
     found, problems = [], []
     for line, row in enumerate(rows, start=2):
@@ -120,7 +120,7 @@ def _numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
     return np.array(found, dtype=np.float64)
 
 
-def _rate_hz(time_s: FloatArray) -> float:
+def _find_rate_hz(time_s: FloatArray) -> float:
     steps = np.diff(time_s)
     mean = float(time_s[-1] - time_s[0]) / len(steps)
     if mean <= 0 or (steps <= 0).any():

@@ -1,4 +1,4 @@
-"""The spring that holds the handle at its place, taken into account where something is played against it.
+"""The virtual spring that holds the handle at its place, and its share in the forces that are played.
 
 A model goes from the force that enters the plant to what comes out. Where a spring adds to the commands, they must
 leave to it what it will do along the planned motion: u = f - s, with the spring's force s = -(k x + b v).

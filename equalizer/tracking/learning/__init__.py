@@ -1,4 +1,4 @@
-"""Forces corrected from what was measured (iterative learning control).
+"""Iterative learning control: forces are corrected from repeated measurements.
 
 `model_inverse` (the learning operator) -> `convergence` (tested before anything is played) -> `iteration` (play,
 compare, correct). Begin at `iteration.py`.

@@ -1,4 +1,4 @@
-"""Whether repeating will converge, before anything is played.
+"""Convergence test of iterative learning control, before anything is played.
 
 Forces that are corrected by u <- u + beta Gm⁻¹ e leave the error (I - beta G Gm⁻¹) e on a linear device: at every
 line its largest singular value says how much of an error survives, at worst, in any direction.
@@ -38,8 +38,9 @@ def convergence(
     band_hz: tuple[float, float],
     beta: float = 1.0,
 ) -> Convergence:
-    """model: (lines, p, p). device: (lines, p, p), or (draws, lines, p, p): a second measurement, or what the device
-    may be within the model's uncertainty. Raises ValueError on other shapes, and where no line lies in the band.
+    """Convergence of learning with the inverse of model (lines, p, p) on device (lines, p, p) or (draws, lines, p, p):
+    a second measurement, or draws from the model's uncertainty. Raises ValueError on other shapes, and where no line
+    lies in the band.
     """
     device = np.asarray(device)[np.newaxis] if np.ndim(device) == 3 else np.asarray(device)
     if model.ndim != 3 or model.shape[1] != model.shape[2] or device.shape[1:] != model.shape:

@@ -1,13 +1,13 @@
-"""Forces that are corrected from what was measured: play, compare, correct, until only noise is left.
+"""Iterative learning control: play, measure, correct the forces, until only noise is left.
 
     u <- u + beta L(band(r - y)),  L the model's inverse
 
-What is taken of an error is its share that is not noise, 1 - (noise / residual)²: all of a large one, less and less
-near the noise floor, so that noise is not written into the forces (with a fixed gain it is, and a good first shot gets
-worse). The gain falls as 1, 1/2, 1/3 ... with every repeat that made things worse; the best forces are kept.
+The correction is the error's share that is not noise, 1 - (noise / residual)²: all of a large error, less and less near
+the noise floor, so that noise is not learned (with a fixed gain it is, and good first forces get worse). The gain falls
+as 1, 1/2, 1/3 ... with every repeat that increased the error; the best forces are kept.
 
-At the ends of the record nothing is corrected: an inverse that cannot act before the first row answers what is missing
-there with an impulse, a handle at rest sticks and is not moved by it, and with every repeat it would grow.
+At the ends of the record nothing is corrected: an inverse that cannot act before the first row answers an error there
+with an impulse; a handle at rest sticks and is not moved by it, so that it would grow with every repeat.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Repetition:
-    """What stays the same from repeat to repeat."""
+    """Settings of an iteration, the same for all repeats."""
 
     wanted: FloatArray
     """(N, p): begins and ends at rest, with time for the forces to act before and after."""
@@ -68,7 +68,7 @@ class Repetition:
 
     @property
     def level(self) -> float:
-        """Of what is wanted, likewise."""
+        """Root mean square of the wanted part in the band, over the judged rows."""
         return self.residual(self.part(self.wanted))
 
     def part(self, samples: FloatArray) -> FloatArray:
@@ -81,13 +81,13 @@ class Repetition:
         start, stop = self.judged or (0, len(self.wanted))
         return float(2 * (high - low) * (stop - start) * self.wanted.shape[1] / self.sample_rate_hz)
 
-    def fitting(self, forces: FloatArray, correction: FloatArray) -> float:
+    def allowed_share(self, forces: FloatArray, correction: FloatArray) -> float:
         """The largest share of a correction, up to 1, that cap and slew allow. Both (N, m)."""
-        share = 1.0 if self.cap is None else fitting_share(forces, correction, self.cap)
+        share = 1.0 if self.cap is None else largest_share(forces, correction, self.cap)
         if self.slew is None:
             return share
         steps, added = (np.diff(rows, axis=0, prepend=0.0, append=0.0) for rows in (forces, correction))
-        return min(share, fitting_share(steps, added, self.slew / self.sample_rate_hz))
+        return min(share, largest_share(steps, added, self.slew / self.sample_rate_hz))
 
     @property
     def limits(self) -> str:
@@ -159,16 +159,17 @@ def next_forces(state: IterationState, measured: FloatArray) -> IterationState:
             f"{repetition.wanted.shape}"
         )
     if state.noise_floor is not None:
-        return _judged(state, measured, state.noise_floor, plays=1)
+        return _judge_measurement(state, measured, state.noise_floor, plays=1)
     if state.first_measured is None:
         return replace(state, first_measured=measured)
     floor = noise_of_repeats(np.stack([state.first_measured, measured]), repetition)
     mean = (state.first_measured + measured) / 2
-    return _judged(replace(state, noise_floor=floor, first_measured=None), mean, floor, plays=2)
+    return _judge_measurement(replace(state, noise_floor=floor, first_measured=None), mean, floor, plays=2)
 
 
 def noise_of_repeats(measured: FloatArray, repetition: Repetition) -> float:
-    """rms in the band of what differs between plays of the same forces, for one play. measured: (plays, N, p)."""
+    """Noise of a single play: rms in the band of differences between plays of the same forces. measured:
+    (plays, N, p)."""
     off = measured - measured.mean(axis=0)
     squares = sum(float(np.sum(repetition.part(each) ** 2)) for each in off)
     return float(np.sqrt(squares / ((len(measured) - 1) * measured[0].size)))
@@ -183,7 +184,7 @@ def rms(samples: FloatArray) -> float:
     return float(np.sqrt(np.mean(samples**2)))
 
 
-def _judged(state: IterationState, measured: FloatArray, floor: float, plays: int) -> IterationState:
+def _judge_measurement(state: IterationState, measured: FloatArray, floor: float, plays: int) -> IterationState:
     repetition = state.repetition
     missing = repetition.part(repetition.wanted - measured)
     residual, noise = repetition.residual(missing), floor / np.sqrt(plays)
@@ -198,38 +199,38 @@ def _judged(state: IterationState, measured: FloatArray, floor: float, plays: in
     # Two measured powers are compared, each with its own scatter.
     limit = noise * np.sqrt(1 + SURE * np.sqrt(4 / repetition.degrees_of_freedom))
     if residual <= limit:
-        return _over(state, Verdict.AT_FLOOR)
+        return _finish(state, Verdict.AT_FLOOR)
     if diverged:
-        return _over(state, Verdict.DIVERGING)
+        return _finish(state, Verdict.DIVERGING)
     signal_share = max(0.0, 1 - (noise / repetition.residual(left)) ** 2)
     gain = min(repetition.first_gain / (1 + setbacks), signal_share)
     if gain < LOWEST_GAIN:
-        return _over(state, Verdict.BEST_KEPT)
-    return _corrected(state, base, left, gain)
+        return _finish(state, Verdict.BEST_KEPT)
+    return _correct_forces(state, base, left, gain)
 
 
-def _over(state: IterationState, verdict: Verdict) -> IterationState:
+def _finish(state: IterationState, verdict: Verdict) -> IterationState:
     return replace(state, forces=state.best, verdict=verdict)
 
 
-def _corrected(state: IterationState, base: FloatArray, left: FloatArray, gain: float) -> IterationState:
+def _correct_forces(state: IterationState, base: FloatArray, left: FloatArray, gain: float) -> IterationState:
     repetition = state.repetition
-    correction = gain * ends_faded(repetition.invert(left), repetition.sample_rate_hz)
-    fitted = repetition.fitting(base, correction)
+    correction = gain * fade_ends(repetition.invert(left), repetition.sample_rate_hz)
+    fitted = repetition.allowed_share(base, correction)
     if fitted < LOWEST_GAIN:
-        return _over(state, Verdict.BEST_KEPT)
+        return _finish(state, Verdict.BEST_KEPT)
     return replace(state, forces=base + fitted * correction, gains=(*state.gains, gain), fitted=(*state.fitted, fitted))
 
 
-def ends_faded(rows: FloatArray, sample_rate_hz: float) -> FloatArray:
-    """(N, m), from zero at the first row to zero at the last."""
+def fade_ends(rows: FloatArray, sample_rate_hz: float) -> FloatArray:
+    """Fade rows (N, m) to zero at the first and the last row."""
     until_end = np.minimum(np.arange(len(rows)), np.arange(len(rows))[::-1])
     inside = np.clip(until_end / (EDGE_S * sample_rate_hz), 0.0, 1.0)
     return np.asarray(rows * (0.5 - 0.5 * np.cos(np.pi * inside))[:, np.newaxis])
 
 
-def fitting_share(forces: FloatArray, correction: FloatArray, cap: float) -> float:
-    """The largest share of `correction`, up to 1, with which no force is longer than `cap`."""
+def largest_share(forces: FloatArray, correction: FloatArray, cap: float) -> float:
+    """The largest share of `correction` (N, m), up to 1, with which no force is longer than `cap`."""
     a = np.sum(correction**2, axis=1)
     b = np.sum(forces * correction, axis=1)
     room = np.maximum(cap**2 - np.sum(forces**2, axis=1), 0.0)

@@ -1,4 +1,4 @@
-"""A model's inverse as one linear operator on records of a fixed length, as repeating needs it."""
+"""A model's inverse as a linear operator on records of a fixed length, for iterative learning."""
 
 from collections.abc import Callable
 
@@ -10,22 +10,24 @@ from equalizer.tracking.feedforward.planned_motion import planned_motion
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.iteration import Invert
 from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.tracking_problem import TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 InverseOfLength = Callable[[int], Invert]
 """From the number of rows to the operator; what it prepares serves every record of that length."""
 
 
-def inverse_of(model: IdentifiedModel, weight: float = 1e-3) -> InverseOfLength:
+def inverse_operator(model: IdentifiedModel, weight: float = 1e-3) -> InverseOfLength:
     def of_length(rows: int) -> Invert:
-        gains = stored_gains(augmented(model, TrackingWeights(weight)), rows)
+        gains = stored_gains(make_tracking_problem(model, TrackingWeights(weight)), rows)
         return lambda wanted: track(gains, wanted).forces
 
     return of_length
 
 
-def under_spring(invert: Invert, spring: VirtualSpring, sample_rate_hz: float, band_hz: tuple[float, float]) -> Invert:
-    """For commands that a spring adds to: what it will do along the planned motion is left to it."""
+def compensate_spring(
+    invert: Invert, spring: VirtualSpring, sample_rate_hz: float, band_hz: tuple[float, float]
+) -> Invert:
+    """The operator for commands to which a spring adds: its force along the planned motion is subtracted."""
     if spring == VirtualSpring():
         return invert
 

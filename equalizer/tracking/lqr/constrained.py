@@ -1,4 +1,4 @@
-"""The best tracking that a cap on the force allows: no clipping, a problem of its own, with its loss stated.
+"""Optimal tracking under a cap on the force (ADMM): a constrained problem instead of clipping, with its loss stated.
 
     least  sum (y - r)' Q (y - r) + u' R u    with    |u_k + already_k| <= cap  at every tick
 
@@ -13,10 +13,10 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.lqr.limits import checked_cap, predicted_peaks, within_cap
+from equalizer.tracking.lqr.limits import force_peaks, project_to_cap, require_cap
 from equalizer.tracking.lqr.lqr import StoredGains, stored_gains, track
 from equalizer.tracking.lqr.lqr_kernel import simulate
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, require_trajectory
 
 OVER_RELAXATION = 1.7
 ROUNDS_BETWEEN_TUNING = 25
@@ -61,17 +61,17 @@ class CapSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Capped:
+class _CappedTask:
     problem: TrackingProblem
     wanted: FloatArray
     already: FloatArray
     cap_n: float
 
     def nearest(self, forces: FloatArray) -> FloatArray:
-        return within_cap(forces + self.already, self.cap_n) - self.already
+        return project_to_cap(forces + self.already, self.cap_n) - self.already
 
     def cost(self, forces: FloatArray) -> float:
-        outputs = _outputs(self.problem, forces)
+        outputs = _simulate_outputs(self.problem, forces)
         outputs[:, : self.problem.outputs] -= self.wanted
         weighed = (outputs @ self.problem.Q * outputs).sum() + (forces @ self.problem.R * forces).sum()
         return float(weighed)
@@ -82,37 +82,37 @@ class _Capped:
         return self.cost(forces) + float((multipliers * forces).sum() - reach)
 
 
-def constrained_track(
+def track_under_cap(
     problem: TrackingProblem,
     wanted: FloatArray,
     cap_n: float,
     already: FloatArray | None = None,
     settings: CapSettings | None = None,
 ) -> CappedForces:
-    """wanted: (N, p), from rest. already: (N, m), forces that are commanded besides and count against the cap.
+    """Track wanted (N, p), from rest. already: (N, m), further forces, which count against the cap.
 
     Raises TrackingError where `already` alone is above the cap, or where the best is not found in so many rounds.
     """
-    r = checked_wanted(problem, wanted)
+    r = require_trajectory(problem, wanted)
     there = np.zeros((len(r), problem.inputs)) if already is None else np.asarray(already, dtype=np.float64)
     if there.shape != (len(r), problem.inputs):
         raise TrackingError(f"already has shape {there.shape}; these forces have ({len(r)}, {problem.inputs})")
-    alone = predicted_peaks(there, checked_cap(cap_n))
+    alone = force_peaks(there, require_cap(cap_n))
     if not alone.fits:
         raise TrackingError(
             f"the other forces alone reach {alone.peak_n:.3g} N at row {alone.at_sample}, above the cap of {cap_n:g} N"
         )
-    task = _Capped(problem, r, there, cap_n)
+    task = _CappedTask(problem, r, there, cap_n)
     free = track(stored_gains(problem, len(r)), r)
-    if predicted_peaks(free.forces + there, cap_n).fits:
-        return _with_loss(task, free.forces, free.forces, 0.0, 0)
-    return _with_loss(task, free.forces, *_alternate(task, free.forces, settings or CapSettings()))
+    if force_peaks(free.forces + there, cap_n).fits:
+        return _state_loss(task, free.forces, free.forces, 0.0, 0)
+    return _state_loss(task, free.forces, *_alternate_directions(task, free.forces, settings or CapSettings()))
 
 
-def _alternate(task: _Capped, start: FloatArray, settings: CapSettings) -> tuple[FloatArray, float, int]:
-    """Forces, gap and rounds."""
-    pull = _first_pull(task.problem)
-    gains = _pulled_gains(task.problem, len(task.wanted), pull)
+def _alternate_directions(task: _CappedTask, start: FloatArray, settings: CapSettings) -> tuple[FloatArray, float, int]:
+    """Alternating direction method of multipliers. Returns forces, relative duality gap and rounds."""
+    pull = _initial_penalty(task.problem)
+    gains = _penalised_gains(task.problem, len(task.wanted), pull)
     z, scaled = task.nearest(start), np.zeros_like(start)
     best, best_cost, bound = z, task.cost(z), -np.inf
     for number in range(1, settings.rounds + 1):
@@ -127,30 +127,30 @@ def _alternate(task: _Capped, start: FloatArray, settings: CapSettings) -> tuple
         gap = max(0.0, (best_cost - bound) / best_cost)
         if gap <= settings.gap:
             return best, gap, number
-        factor = _tuned(u - z, z - before) if number % ROUNDS_BETWEEN_TUNING == 0 else 1.0
+        factor = _penalty_factor(u - z, z - before) if number % ROUNDS_BETWEEN_TUNING == 0 else 1.0
         if factor != 1.0:
             pull, scaled = pull * factor, scaled / factor
-            gains = _pulled_gains(task.problem, len(task.wanted), pull)
+            gains = _penalised_gains(task.problem, len(task.wanted), pull)
     raise TrackingError(
         f"after {settings.rounds} rounds the forces under the cap of {task.cap_n:g} N are only known to be within "
         f"{gap:.2g} of the best cost; scale what is wanted down, or allow a larger gap than {settings.gap:g}"
     )
 
 
-def _tuned(apart: FloatArray, moved: FloatArray) -> float:
-    """What the pull is multiplied by, so that both residuals fall alike (Boyd et al., 3.4.1)."""
+def _penalty_factor(apart: FloatArray, moved: FloatArray) -> float:
+    """Factor on the penalty that balances primal and dual residual (Boyd et al., 3.4.1)."""
     ratio = float(np.linalg.norm(apart) / max(float(np.linalg.norm(moved)), np.finfo(np.float64).tiny))
     return float(np.clip(np.sqrt(ratio), 0.2, 5.0)) if not 1 / 3 < ratio < 3 else 1.0
 
 
-def _first_pull(problem: TrackingProblem) -> float:
-    """Between the smallest curvature of the cost, the force weight, and that of the model's direct answer."""
+def _initial_penalty(problem: TrackingProblem) -> float:
+    """Initial penalty: geometric mean of the force weight and the curvature of the model's direct response."""
     curvature = problem.stage_cost[problem.order :, problem.order :]
     return float(np.sqrt(max(np.linalg.eigvalsh(problem.R)[0], 1e-6) * max(np.trace(curvature), 1.0)))
 
 
-def _pulled_gains(problem: TrackingProblem, samples: int, pull: float) -> StoredGains:
-    """Of the same problem with the forces as further outputs: pull |u - w|² is added, w wanted beside r."""
+def _penalised_gains(problem: TrackingProblem, samples: int, pull: float) -> StoredGains:
+    """Gains of the problem with the penalty pull |u - w|²: the forces are further outputs, w is wanted beside r."""
     p, m = problem.outputs, problem.inputs
     C = np.insert(problem.C, [p] * m, np.zeros((m, problem.order)), axis=0)
     D = np.insert(problem.D, [p] * m, np.eye(m), axis=0)
@@ -158,8 +158,8 @@ def _pulled_gains(problem: TrackingProblem, samples: int, pull: float) -> Stored
     return stored_gains(replace(problem, C=C, D=D, Q=Q, outputs=p + m), samples)
 
 
-def _outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(N, q), with the penalised ones, from rest."""
+def _simulate_outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
+    """(N, q): all outputs, with the penalised ones, to forces (N, m) from rest."""
     outputs, played = np.empty((len(forces), problem.C.shape[0])), np.empty_like(forces)
     every = replace(problem, outputs=problem.C.shape[0]).step
     no_gain = np.zeros((len(forces), problem.inputs, problem.order))
@@ -167,11 +167,11 @@ def _outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
     return outputs
 
 
-def _with_loss(task: _Capped, free: FloatArray, forces: FloatArray, gap: float, rounds: int) -> CappedForces:
+def _state_loss(task: _CappedTask, free: FloatArray, forces: FloatArray, gap: float, rounds: int) -> CappedForces:
     p, size = task.problem.outputs, float(np.linalg.norm(task.wanted)) or 1.0
 
     def error(played: FloatArray) -> float:
-        return float(np.linalg.norm(_outputs(task.problem, played)[:, :p] - task.wanted)) / size
+        return float(np.linalg.norm(_simulate_outputs(task.problem, played)[:, :p] - task.wanted)) / size
 
     loss = TrackingLoss(
         error(free),
@@ -182,4 +182,4 @@ def _with_loss(task: _Capped, free: FloatArray, forces: FloatArray, gap: float, 
         gap,
         rounds,
     )
-    return CappedForces(forces, _outputs(task.problem, forces)[:, :p], loss)
+    return CappedForces(forces, _simulate_outputs(task.problem, forces)[:, :p], loss)

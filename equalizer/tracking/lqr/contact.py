@@ -1,4 +1,4 @@
-"""A recorded transient that starts when a contact is felt: nothing can act before it, and that has a price."""
+"""A recorded transient that starts at a contact: forces are causal, and the error that this costs is stated."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from equalizer.tracking.lqr.turning import TurningTransient, normal_transient
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CausalStart:
-    """Ready before any contact: the normal is all that is still missing. Made by `causal_start`."""
+    """Stored solutions of a transient for every contact normal. Made by `causal_start`."""
 
     basis: RotationBasis
     """The whole transient at once, for a normal (p,)."""
@@ -27,11 +27,11 @@ class CausalStart:
 
     def error(self, normal: FloatArray) -> float:
         """Of the acceleration in the model's band, relative to what is wanted; by the model's own prediction."""
-        return _of_normal(self.deviation, normal)
+        return _relative_error(self.deviation, normal)
 
     def early_error(self, normal: FloatArray) -> float:
         """What it would be, had the forces been allowed to begin before the contact."""
-        return _of_normal(self.early_deviation, normal)
+        return _relative_error(self.early_deviation, normal)
 
     @property
     def worst_error(self) -> float:
@@ -40,8 +40,8 @@ class CausalStart:
 
 
 def causal_start(problem: TrackingProblem, recording: FloatArray, padding: Padding | None = None) -> CausalStart:
-    """recording: (N,), acceleration along the normal from the moment of contact on. padding: the room after it, to come
-    to rest, is played too; that before it serves the comparison only. None = 0.3 s each.
+    """Prepare a recording (N,), the acceleration along the normal from the contact on. padding: the time after it, to
+    come to rest, is played too; that before it serves the comparison only. None = 0.3 s each.
 
     Raises TrackingError where the recording has nothing in the model's band.
     """
@@ -52,10 +52,10 @@ def causal_start(problem: TrackingProblem, recording: FloatArray, padding: Paddi
     gains = stored_gains(problem, len(played))
     basis = normal_basis(gains, played)
     deviation = _deviation(problem, basis, played)
-    return CausalStart(basis, normal_transient(gains, played), deviation, _early(problem, played, room))
+    return CausalStart(basis, normal_transient(gains, played), deviation, _early_deviation(problem, played, room))
 
 
-def _early(problem: TrackingProblem, played: FloatArray, room: Padding) -> FloatArray:
+def _early_deviation(problem: TrackingProblem, played: FloatArray, room: Padding) -> FloatArray:
     before, _ = room.samples(problem.sample_rate_hz)
     padded = np.pad(played, (before, 0))
     return _deviation(problem, normal_basis(stored_gains(problem, len(padded)), padded), padded)
@@ -72,7 +72,7 @@ def _deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatA
     return np.asarray(lines @ lines.T)
 
 
-def _of_normal(deviation: FloatArray, normal: FloatArray) -> float:
+def _relative_error(deviation: FloatArray, normal: FloatArray) -> float:
     n = np.asarray(normal, dtype=np.float64)
     length = float(np.linalg.norm(n))
     if n.shape != deviation.shape[:1] or not (np.isfinite(length) and length > 0):

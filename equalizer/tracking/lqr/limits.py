@@ -1,4 +1,4 @@
-"""Predicted forces against the cap: what is too large is refused with the factor that would fit, never clipped."""
+"""Force limits: forces above the cap are refused with the scale that would fit, never clipped."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from equalizer.signals.signal import FloatArray
 
 
 class ForceLimitError(ValueError):
-    """`peaks`: what was found."""
+    """Forces above the cap. `peaks`: their size."""
 
     def __init__(self, message: str, peaks: "Peaks") -> None:
         super().__init__(message)
@@ -36,9 +36,10 @@ class Peaks:
         return self.cap_n / self.peak_n if self.peak_n > 0 else float("inf")
 
 
-def predicted_peaks(forces: FloatArray, cap_n: float) -> Peaks:
-    """forces: (N, m). Raises ValueError for a cap that is no positive number and for forces that are not finite."""
-    checked_cap(cap_n)
+def force_peaks(forces: FloatArray, cap_n: float) -> Peaks:
+    """Peaks of forces (N, m). Raises ValueError for a cap that is no positive number and for forces that are not
+    finite."""
+    require_cap(cap_n)
     lengths = np.linalg.norm(forces, axis=1)
     if not np.isfinite(lengths).all():
         raise ValueError("forces hold values that are not finite numbers")
@@ -47,9 +48,9 @@ def predicted_peaks(forces: FloatArray, cap_n: float) -> Peaks:
     return Peaks(cap_n, float(lengths.max()), int(lengths.argmax()), float((lengths > cap_n).mean()))
 
 
-def require_within(forces: FloatArray, cap_n: float, sample_rate_hz: float) -> Peaks:
+def require_under_cap(forces: FloatArray, cap_n: float, sample_rate_hz: float) -> Peaks:
     """Raises ForceLimitError where a row of forces, (N, m), is longer than the cap."""
-    peaks = predicted_peaks(forces, cap_n)
+    peaks = force_peaks(forces, cap_n)
     if not peaks.fits:
         # Rounded down, so that the factor that is read still fits.
         scale = np.floor(peaks.largest_scale * 1e4) / 1e4
@@ -62,14 +63,14 @@ def require_within(forces: FloatArray, cap_n: float, sample_rate_hz: float) -> P
     return peaks
 
 
-def checked_cap(cap_n: float) -> float:
+def require_cap(cap_n: float) -> float:
     if not (np.isfinite(cap_n) and cap_n > 0):
         raise ValueError(f"cap_n is {cap_n}; it must be a positive number")
     return cap_n
 
 
-def within_cap(forces: FloatArray, cap_n: float) -> FloatArray:
-    """Each row of (N, m) shortened to the cap where it is longer: the nearest vectors that are allowed."""
+def project_to_cap(forces: FloatArray, cap_n: float) -> FloatArray:
+    """Projection of forces (N, m) on the cap: each row that is longer is shortened to it."""
     lengths = np.linalg.norm(forces, axis=1, keepdims=True)
     # A hair below the cap, so that rounding leaves no row above it.
     shorter = cap_n * (1 - 8 * np.finfo(np.float64).eps) / np.maximum(lengths, cap_n)

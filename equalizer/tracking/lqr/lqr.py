@@ -1,4 +1,4 @@
-"""Feedforward forces that make a model follow a trajectory best, from gains that are computed once.
+"""Finite-horizon linear-quadratic tracking: feedforward forces from gains that are computed once.
 
 No measured signal is fed back. The gains do act on a state, but on that of the simulated model: leaving K x out
 altogether, as "feedback set to zero" could be read, misses the trajectory by most of its own size.
@@ -11,13 +11,13 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr import lqr_kernel, riccati_kernel
-from equalizer.tracking.lqr.riccati import NO_CURVATURE, Gains, checked_terminal_weight
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted, read_only
+from equalizer.tracking.lqr.riccati import NO_CURVATURE, Gains, require_terminal_weight
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only, require_trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredGains:
-    """Serve every trajectory of N samples, whatever it is and wherever the model starts. Made by `stored_gains`."""
+    """Gains for every trajectory of N samples and every initial state. Made by `stored_gains`."""
 
     problem: TrackingProblem
     gains: Gains
@@ -29,7 +29,7 @@ class StoredGains:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tracked:
+class TrackResult:
     forces: FloatArray
     """(N, m), rows one to one with those of the trajectory"""
     predicted: FloatArray
@@ -39,12 +39,12 @@ class Tracked:
 
 
 def stored_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatArray | None = None) -> StoredGains:
-    """The compiled backward recursion, `samples` steps. terminal_weight: P_N, (n, n), of the state's distance from the
+    """Gains by the compiled Riccati recursion, `samples` steps. terminal_weight: P_N, (n, n), of the distance from the
     `final_state` given to `track`. Raises TrackingError where a force has no effect on the cost."""
     if samples < 1:
         raise TrackingError(f"a horizon has {samples} samples; it needs one or more")
     n, m = problem.order, problem.inputs
-    terminal = checked_terminal_weight(problem, terminal_weight)
+    terminal = require_terminal_weight(problem, terminal_weight)
     P, K, H_inverse = terminal.copy(), np.empty((samples, m, n)), np.empty((samples, m, m))
     failed = riccati_kernel.backward(problem.joined, problem.stage_cost, P, K, H_inverse)
     if failed:
@@ -54,20 +54,20 @@ def stored_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatA
 
 def track(
     gains: StoredGains, wanted: FloatArray, x0: FloatArray | None = None, final_state: FloatArray | None = None
-) -> Tracked:
-    """wanted: (N, p), N the length of the gains. x0: the model's state before the first row; None = at rest.
-    final_state: x_f, where the state is drawn to at the end if the gains have a terminal weight; None = rest."""
+) -> TrackResult:
+    """Track wanted (N, p), N the length of the gains. x0: the model's state before the first row; None = at rest.
+    final_state: x_f, the target of the final state if the gains have a terminal weight; None = rest."""
     problem, g = gains.problem, costate_feedforward(gains, wanted, final_state)
     x = problem.state(x0).copy()
     forces, predicted = np.empty_like(g), np.empty((len(g), problem.outputs))
     lqr_kernel.simulate(problem.step, gains.gains.K, g, x, forces, predicted)
-    return Tracked(forces, predicted, x)
+    return TrackResult(forces, predicted, x)
 
 
 def costate_feedforward(gains: StoredGains, wanted: FloatArray, final_state: FloatArray | None = None) -> FloatArray:
-    """(N, m): g of u = g - K x, what the trajectory ahead asks for. Linear in `wanted` and `final_state`."""
+    """(N, m): g of u = g - K x, the feedforward from the trajectory ahead. Linear in `wanted` and `final_state`."""
     problem = gains.problem
-    r = checked_wanted(problem, wanted)
+    r = require_trajectory(problem, wanted)
     if len(r) != len(gains):
         raise TrackingError(f"the trajectory has {len(r)} samples, but the gains are for {len(gains)}")
     v = gains.terminal_weight @ problem.state(final_state)
@@ -77,8 +77,8 @@ def costate_feedforward(gains: StoredGains, wanted: FloatArray, final_state: Flo
 
 
 def periodic_state(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(n,): the state at the first row of `forces`, (T, m), when they are repeated for ever. The end of a fade-in that
-    is drawn there goes over into the loop without a transient. Raises TrackingError on a model that never settles."""
+    """(n,): the state at the first row of forces (T, m) in their periodic steady state. A fade-in that ends there
+    passes into the loop without a transient. Raises TrackingError on an unstable model."""
     _require_stable(problem, "repeated forces lead to no periodic state")
     x = np.zeros(problem.order)
     for force in np.asarray(forces, dtype=np.float64):
@@ -88,9 +88,9 @@ def periodic_state(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
 
 
 def ringing_weight(problem: TrackingProblem) -> FloatArray:
-    """(n, n): the terminal weight that counts all that is still to come. A state that differs by d from the one meant
-    at the end, with forces that go on as meant (none after a transient, the loop after a fade-in), costs d' P_N d in
-    deviations of the outputs for ever after. Raises TrackingError on a model that never settles."""
+    """(n, n): the observability Gramian as terminal weight, which counts the free decay after the end: a final state
+    that is off by d, with forces that go on as intended (none after a transient, the loop after a fade-in), costs
+    d' P_N d in output deviations. Raises TrackingError on an unstable model."""
     _require_stable(problem, "what rings after the end never dies away")
     return np.asarray(solve_discrete_lyapunov(problem.A.T, problem.C.T @ problem.Q @ problem.C))
 

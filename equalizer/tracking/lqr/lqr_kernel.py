@@ -30,7 +30,7 @@ def _add_product(z: FloatArray, matrix: FloatArray, s: FloatArray) -> None:
 def feedforward(
     joined: FloatArray, pulled: FloatArray, K: FloatArray, H_inverse: FloatArray, v: FloatArray, g: FloatArray
 ) -> None:
-    """Fills g (N, m), the part of the forces that the trajectory ahead decides. v: (n,), the costate at the end, which
+    """Fill g (N, m), the forces' feedforward from the trajectory ahead. v: (n,), the costate at the end, which
     becomes that of the start. joined: [A B]; pulled: wanted @ (Q [C D]), (N, n + m)."""
     n, m = joined.shape[0], g.shape[1]
     s = np.empty(n + m)
@@ -83,7 +83,7 @@ def simulate(
     fastmath={"reassoc", "contract"},
 )
 def tick(step: FloatArray, K: FloatArray, g: FloatArray, direction: FloatArray, k: int, live: FloatArray) -> None:
-    """One tick of a transient that may turn: u = sum over c of direction_c g_kc - K_k x_k; no force after the last row.
+    """A tick of a transient that may turn: u = sum over c of direction_c g_kc - K_k x_k; no force after the last row.
 
     g: (N, m, c); direction: (c,); live: (2 n + m + p,): the state, which becomes the next one; then the force of this
     tick; then n numbers of work space; then what the model answers at this tick.
@@ -108,7 +108,7 @@ def tick(step: FloatArray, K: FloatArray, g: FloatArray, direction: FloatArray, 
 def run(
     step: FloatArray, K: FloatArray, g: FloatArray, directions: FloatArray, live: FloatArray, out: FloatArray
 ) -> None:
-    """`tick` for one row after the other of K, g and directions (T, c). out: (T, m + p), force and answer."""
+    """`tick` for all rows of K, g and directions (T, c) in turn. out: (T, m + p), force and response."""
     m, n = K.shape[1], K.shape[2]
     for row in range(directions.shape[0]):
         tick(step, K, g, directions[row], row, live)

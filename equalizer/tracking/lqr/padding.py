@@ -1,4 +1,4 @@
-"""Room before and after a finite trajectory, and what it costs to play only the rows in between.
+"""Zero padding before and after a finite trajectory, and the error of playing only its own rows.
 
 An inverse acts before what is wanted and after it. Zeros wanted on both sides give it room. Where only the trajectory's
 own rows are played, from rest, what lies in the room before is lost, and the forces were made for a motion that is not
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.lqr.lqr import StoredGains, Tracked, stored_gains, track
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted
+from equalizer.tracking.lqr.lqr import StoredGains, TrackResult, stored_gains, track
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, require_trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +30,12 @@ class Padding:
 
 
 CAUSAL = Padding(before_s=0.0)
-"""Nothing before the first row: for a start that was not known, and where the rows alone are played."""
+"""No padding before the first row: for a start that is not known beforehand, and where the rows alone are played."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PaddedTrack:
-    whole: Tracked
+    whole: TrackResult
     """With its room, as it should be played where there is time for it."""
     rows: slice
     """The trajectory's own rows in `whole`."""
@@ -53,20 +53,21 @@ class PaddedTrack:
 def track_padded(
     problem: TrackingProblem, wanted: FloatArray, padding: Padding | None = None, gains: StoredGains | None = None
 ) -> PaddedTrack:
-    """wanted: (N, p), from rest. padding: None = CAUSAL. gains: of the length with padding; None = computed."""
-    r = checked_wanted(problem, wanted)
+    """Track wanted (N, p), from rest, with padding; None = CAUSAL. gains: of the length with padding; None =
+    computed."""
+    r = require_trajectory(problem, wanted)
     before, after = (padding or CAUSAL).samples(problem.sample_rate_hz)
     padded = np.pad(r, ((before, after), (0, 0)))
     whole = track(gains or stored_gains(problem, len(padded)), padded)
     rows = slice(before, before + len(r))
-    cut = answer(problem, whole.forces[rows])
+    cut = simulate_from_rest(problem, whole.forces[rows])
     rate_hz, band_hz = problem.sample_rate_hz, problem.band_hz
     whole_error = band_error(r, whole.predicted[rows], rate_hz, band_hz)
     return PaddedTrack(whole, rows, whole_error, band_error(r, cut, rate_hz, band_hz))
 
 
-def answer(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(N, p): what the model answers to forces (N, m) from rest."""
+def simulate_from_rest(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
+    """(N, p): the model's response to forces (N, m) from rest."""
     x, predicted = np.zeros(problem.order), np.empty((len(forces), problem.outputs))
     for k, force in enumerate(forces):
         s = np.concatenate((x, force)) @ problem.step
@@ -86,8 +87,8 @@ def band_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: 
 
 
 def band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
-    """(2 lines, channels): real and imaginary parts of the lines in the band, with as much rest after the samples as
-    there are samples, so that end and start do not meet."""
+    """(2 lines, channels): real and imaginary parts of the spectrum in the band, zero-padded to twice the length, so
+    that the end does not wrap around to the start."""
     length = max(2 * len(samples), int(np.ceil(4 * rate_hz / (band_hz[1] - band_hz[0]))))
     lines = np.fft.rfftfreq(length, 1 / rate_hz)
     spectrum = np.fft.rfft(samples, length, axis=0)[(lines >= band_hz[0]) & (lines <= band_hz[1])]

@@ -1,7 +1,7 @@
-"""A trajectory that arrives while it is played, known only a little ahead, and what that costs.
+"""Linear-quadratic preview control: a trajectory that arrives while it is played, and the loss of a limited preview.
 
-The gains are those far from any end. What is not yet known is taken as zero, which is the best guess about a signal of
-which nothing else is known: this is linear-quadratic preview control. The inverse of a device that answers a constant
+The gains are the stationary ones. What is not yet known is taken as zero, the best guess about a signal of which
+nothing else is known. The inverse of a device that answers a constant
 force with no acceleration looks far ahead; a low-frequency weight shortens that (`TrackingWeights`), to some 0.2 s, at
 the price of a larger loss with less preview than that, and a small one with all: `preview_loss` weighs them.
 """
@@ -13,9 +13,9 @@ import numpy as np
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr import lqr_kernel
-from equalizer.tracking.lqr.lqr import Tracked
+from equalizer.tracking.lqr.lqr import TrackResult
 from equalizer.tracking.lqr.riccati import stationary_gains
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted, read_only
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only, require_trajectory
 
 LINE_HZ = 0.1
 """Spacing of the lines over which a loss is taken."""
@@ -42,8 +42,8 @@ class PreviewTracker:
 
 @dataclass(frozen=True, slots=True)
 class PreviewLoss:
-    """Relative error of the response over the model's band, all axes wanted alike and with a flat spectrum, for ever.
-    By the model's own prediction."""
+    """Relative error of the response over the model's band, by its own prediction, for a stationary trajectory with
+    equal flat spectra on all axes."""
 
     error: float
     full_error: float
@@ -51,7 +51,8 @@ class PreviewLoss:
 
 
 def preview_tracker(problem: TrackingProblem, preview_samples: int) -> PreviewTracker:
-    """preview_samples: M, the present one counted. Raises TrackingError where there are no stationary gains."""
+    """Tracker with M = preview_samples known samples, the present one counted. Raises TrackingError where there are no
+    stationary gains."""
     if preview_samples < 1:
         raise TrackingError(f"the preview is {preview_samples} samples; the present one at least must be known")
     gains = stationary_gains(problem)
@@ -65,28 +66,28 @@ def preview_tracker(problem: TrackingProblem, preview_samples: int) -> PreviewTr
     return PreviewTracker(problem, K, read_only(ahead))
 
 
-def stream(tracker: PreviewTracker, wanted: FloatArray, x0: FloatArray | None = None) -> Tracked:
-    """A whole trajectory (N, p) as it would be streamed; after its end zero is wanted. Equals `step` row by row."""
+def stream(tracker: PreviewTracker, wanted: FloatArray, x0: FloatArray | None = None) -> TrackResult:
+    """Track a trajectory (N, p) as a stream; after its end zero is wanted. Equals `step` row by row."""
     problem, M = tracker.problem, len(tracker)
-    r = checked_wanted(problem, wanted)
+    r = require_trajectory(problem, wanted)
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(r, ((0, M - 1), (0, 0))), M, axis=0)
     g = np.ascontiguousarray(np.einsum("jmp,npj->nm", tracker.ahead, windows, optimize=True))
     K = np.repeat(tracker.K[np.newaxis], len(r), axis=0)
     x = problem.state(x0).copy()
     forces, predicted = np.empty_like(g), np.empty_like(r)
     lqr_kernel.simulate(problem.step, K, g, x, forces, predicted)
-    return Tracked(forces, predicted, x)
+    return TrackResult(forces, predicted, x)
 
 
 def preview_loss(problem: TrackingProblem, preview_samples: int) -> PreviewLoss:
-    """What the limit of preview costs. Exact per line of the model's band, without a simulation."""
+    """Loss of a limited preview, exact per line of the model's band, without a simulation."""
     tracker = preview_tracker(problem, preview_samples)
     low, high = problem.band_hz
     lines_hz = np.linspace(low, high, max(2, round((high - low) / LINE_HZ) + 1))
     z = np.exp(2j * np.pi * lines_hz / problem.sample_rate_hz)
     played = _closed_response(problem, tracker.K, z)
     seen = np.einsum("lj,jmp->lmp", z[:, np.newaxis] ** np.arange(len(tracker)), tracker.ahead)
-    return PreviewLoss(_error(played @ seen), _error(played @ _everything_ahead(problem, z)))
+    return PreviewLoss(_relative_error(played @ seen), _relative_error(played @ _full_preview(problem, z)))
 
 
 def _closed_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -96,15 +97,15 @@ def _closed_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, F
 
 
 def _closed_response(problem: TrackingProblem, K: FloatArray, z: ComplexArray) -> ComplexArray:
-    """(lines, p, m): from what is added to -K x to the response."""
+    """(lines, p, m): response to forces that are added to -K x."""
     n, p = problem.order, problem.outputs
     closed = problem.A - problem.B @ K
     state = np.linalg.solve(z[:, np.newaxis, np.newaxis] * np.eye(n) - closed, problem.B.astype(complex)[np.newaxis])
     return np.asarray((problem.C[:p] - problem.D[:p] @ K) @ state + problem.D[:p])
 
 
-def _everything_ahead(problem: TrackingProblem, z: ComplexArray) -> ComplexArray:
-    """(lines, m, p): the sum over all samples ahead, in closed form."""
+def _full_preview(problem: TrackingProblem, z: ComplexArray) -> ComplexArray:
+    """(lines, m, p): feedforward with unlimited preview, the sum over all samples ahead in closed form."""
     gains = stationary_gains(problem)
     closed, pull = _closed_loop(problem, gains.K[0])
     turn = z[:, np.newaxis, np.newaxis]
@@ -113,6 +114,6 @@ def _everything_ahead(problem: TrackingProblem, z: ComplexArray) -> ComplexArray
     return np.asarray(gains.H_inverse[0] @ (now + problem.B.T @ costate))
 
 
-def _error(delivered: ComplexArray) -> float:
+def _relative_error(delivered: ComplexArray) -> float:
     p = delivered.shape[-1]
     return float(np.sqrt(np.mean(np.sum(np.abs(delivered - np.eye(p)) ** 2, axis=(1, 2))) / p))

@@ -1,6 +1,6 @@
-"""The backward recursion of the linear-quadratic tracker, written plainly. `riccati_kernel` is the compiled one.
+"""Riccati recursion of the linear-quadratic tracker, written plainly. `riccati_kernel` is the compiled one.
 
-It does not see the trajectory: gains of one model, weights and length serve every trajectory of that length.
+It does not depend on the trajectory: gains of a model, weights and length serve every trajectory of that length.
 Bryson and Ho, Applied Optimal Control, chapter 5, with feedthrough.
 """
 
@@ -22,7 +22,7 @@ NOT_STATIONARY = (
     "feedthrough the force weight must be above zero"
 )
 STATIONARY = 1e-6
-"""One more step may change P by so much, relative to its largest entry."""
+"""Largest change of stationary P over a further step, relative to its largest entry."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,7 @@ def backward_gains(problem: TrackingProblem, samples: int, terminal_weight: Floa
     Raises TrackingError where a force has no effect on the cost.
     """
     n, m = problem.order, problem.inputs
-    P = checked_terminal_weight(problem, terminal_weight)
+    P = require_terminal_weight(problem, terminal_weight)
     K, H_inverse = np.empty((samples, m, n)), np.empty((samples, m, m))
     A, B, C, D, Q, R = problem.A, problem.B, problem.C, problem.D, problem.Q, problem.R
     for k in range(samples - 1, -1, -1):
@@ -81,7 +81,7 @@ def stationary_gains(problem: TrackingProblem) -> Gains:
     return gains
 
 
-def checked_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArray | None) -> FloatArray:
+def require_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArray | None) -> FloatArray:
     """P_N, (n, n), symmetric; zeros where None. Raises TrackingError."""
     n = problem.order
     if terminal_weight is None:

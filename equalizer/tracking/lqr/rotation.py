@@ -1,4 +1,4 @@
-"""Forces for every rotation of a trajectory, from a few stored solutions.
+"""Forces for every rotation of a trajectory by linear combination of a few stored solutions.
 
 The forces are linear in the trajectory, and R r = sum over i, j of R_ij (e_i r_j). So the nine solutions for what axis
 j wants, wanted along axis i, give each rotation as their combination; a recording along one direction needs only three.
@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr.lqr import StoredGains, track
-from equalizer.tracking.lqr.tracking_problem import TrackingError, checked_wanted, read_only
+from equalizer.tracking.lqr.tracking_problem import TrackingError, read_only, require_trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,13 +28,13 @@ class RotationBasis:
 
     def forces(self, direction: FloatArray) -> FloatArray:
         """(N, m). Raises TrackingError on another shape of the direction."""
-        return self._combined(self.stored_forces, direction, self.inputs)
+        return self._combine(self.stored_forces, direction, self.inputs)
 
     def predicted(self, direction: FloatArray) -> FloatArray:
-        """(N, p): what the model answers to these forces."""
-        return self._combined(self.stored_answers, direction, self.direction_shape[0])
+        """(N, p): the model's response to these forces."""
+        return self._combine(self.stored_answers, direction, self.direction_shape[0])
 
-    def _combined(self, stored: FloatArray, direction: FloatArray, columns: int) -> FloatArray:
+    def _combine(self, stored: FloatArray, direction: FloatArray, columns: int) -> FloatArray:
         turned = np.asarray(direction, dtype=np.float64)
         if turned.shape != self.direction_shape:
             raise TrackingError(f"a direction has shape {turned.shape}; this basis takes {self.direction_shape}")
@@ -45,13 +45,13 @@ class RotationBasis:
 def rotation_basis(gains: StoredGains, trajectory: FloatArray) -> RotationBasis:
     """trajectory: (N, p), before it is rotated. p * p solutions."""
     p = gains.problem.outputs
-    return _solved(gains, every_rotation(checked_wanted(gains.problem, trajectory)), (p, p))
+    return _solve_basis(gains, every_rotation(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
 def normal_basis(gains: StoredGains, recording: FloatArray) -> RotationBasis:
     """recording: (N,), to be played along a normal. p solutions."""
     p = gains.problem.outputs
-    return _solved(gains, every_normal(recording, p), (p,))
+    return _solve_basis(gains, every_normal(recording, p), (p,))
 
 
 def every_rotation(trajectory: FloatArray) -> FloatArray:
@@ -68,7 +68,7 @@ def every_normal(recording: FloatArray, outputs: int) -> FloatArray:
     return np.array([np.outer(samples, axis) for axis in np.eye(outputs)])
 
 
-def _solved(gains: StoredGains, wanted: FloatArray, direction_shape: tuple[int, ...]) -> RotationBasis:
+def _solve_basis(gains: StoredGains, wanted: FloatArray, direction_shape: tuple[int, ...]) -> RotationBasis:
     solutions = [track(gains, each) for each in wanted]
     forces = np.array([solution.forces.ravel() for solution in solutions])
     answers = np.array([solution.predicted.ravel() for solution in solutions])

@@ -1,11 +1,11 @@
-"""The oracle of the trackers: the same cost as one dense least-squares problem. Slow, short and obviously right."""
+"""Reference solution of the trackers: the same cost as a dense least-squares problem with a block-Toeplitz matrix."""
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.lqr.riccati import checked_terminal_weight
-from equalizer.tracking.lqr.tracking_problem import TrackingProblem, checked_wanted
+from equalizer.tracking.lqr.riccati import require_terminal_weight
+from equalizer.tracking.lqr.tracking_problem import TrackingProblem, require_trajectory
 
 
 def least_squares_forces(
@@ -15,17 +15,17 @@ def least_squares_forces(
     terminal_weight: FloatArray | None = None,
     final_state: FloatArray | None = None,
 ) -> FloatArray:
-    """(N, m): the forces that `track` must find too. Arguments as there. Time grows with N³, memory with N²."""
-    r = checked_wanted(problem, wanted)
+    """Optimal forces (N, m); arguments as of `track`, which must find the same. Time grows with N³, memory with N²."""
+    r = require_trajectory(problem, wanted)
     N, q = len(r), problem.C.shape[0]
     free, to_end = _free_response(problem, N, problem.state(x0))
     missing = -free
     missing[:, : problem.outputs] += r
-    output_root, force_root = _root(problem.Q), _root(problem.R)
-    end_root = _root(checked_terminal_weight(problem, terminal_weight))
+    output_root, force_root = _matrix_root(problem.Q), _matrix_root(problem.R)
+    end_root = _matrix_root(require_terminal_weight(problem, terminal_weight))
     T = block_toeplitz(problem, N).reshape(N, q, -1)
     rows = [np.einsum("ij,njk->nik", output_root, T).reshape(N * q, -1), np.kron(np.eye(N), force_root)]
-    rows.append(end_root @ _reach(problem, N))
+    rows.append(end_root @ _reachability_matrix(problem, N))
     right = [(missing @ output_root.T).ravel(), np.zeros(N * problem.inputs)]
     right.append(end_root @ (problem.state(final_state) - to_end))
     Qr, Rr = np.linalg.qr(np.vstack(rows))
@@ -33,7 +33,7 @@ def least_squares_forces(
 
 
 def block_toeplitz(problem: TrackingProblem, samples: int) -> FloatArray:
-    """(N q, N m): from all forces to all outputs of a model at rest."""
+    """Block-Toeplitz matrix (N q, N m) from all forces to all outputs of a model at rest."""
     q, m = problem.D.shape
     T = np.zeros((samples, q, samples, m))
     response, state = problem.D, problem.B
@@ -52,7 +52,7 @@ def _free_response(problem: TrackingProblem, samples: int, x: FloatArray) -> tup
     return outputs, x
 
 
-def _reach(problem: TrackingProblem, samples: int) -> FloatArray:
+def _reachability_matrix(problem: TrackingProblem, samples: int) -> FloatArray:
     """(n, N m): from all forces to the state after the last."""
     blocks = [problem.B]
     for _ in range(samples - 1):
@@ -60,7 +60,7 @@ def _reach(problem: TrackingProblem, samples: int) -> FloatArray:
     return np.hstack(blocks[::-1])
 
 
-def _root(weight: FloatArray) -> FloatArray:
+def _matrix_root(weight: FloatArray) -> FloatArray:
     """W with W' W = weight."""
     values, vectors = np.linalg.eigh(weight)
     return np.asarray(np.sqrt(np.clip(values, 0, None))[:, np.newaxis] * vectors.T)

@@ -1,4 +1,4 @@
-"""What a finite-horizon tracker minimises: a model, and what deviations and forces weigh against each other.
+"""Cost of a finite-horizon tracker: a model, and the weights of deviations and forces.
 
     sum over k of (y_k - r_k)' Q (y_k - r_k) + u_k' R u_k,    x_{k+1} = A x_k + B u_k,  y_k = C x_k + D u_k
 
@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 
 
 class TrackingError(ValueError):
-    """A tracking problem that has no sound answer, or numbers that do not fit it."""
+    """A tracking problem without a valid solution, or with arguments that do not fit it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,12 +40,12 @@ class TrackingWeights:
         if not (np.isfinite(self.low_frequency_hz) and self.low_frequency_hz > 0):
             raise TrackingError(f"low_frequency_hz is {self.low_frequency_hz}; it must be a positive number")
         if self.output_weight is not None:
-            object.__setattr__(self, "output_weight", _output_weight(self.output_weight))
+            object.__setattr__(self, "output_weight", _require_output_weight(self.output_weight))
 
 
 @dataclass(frozen=True, eq=False)
 class TrackingProblem:
-    """Matrices of the model with its penalised extra outputs. Made by `augmented`; arrays are read-only."""
+    """Matrices of the model with its penalised extra outputs. Made by `make_tracking_problem`; arrays are read-only."""
 
     A: FloatArray
     """(n, n)"""
@@ -115,8 +115,8 @@ class TrackingProblem:
         return x
 
 
-def augmented(model: IdentifiedModel, weights: TrackingWeights) -> TrackingProblem:
-    """The model and its weights, and the low-passed forces as extra outputs where those are penalised."""
+def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> TrackingProblem:
+    """Problem of a model and its weights, augmented by the low-passed forces as outputs where those are penalised."""
     p, m = model.D.shape
     Q = np.eye(p) if weights.output_weight is None else weights.output_weight
     if Q.shape != (p, p):
@@ -125,15 +125,15 @@ def augmented(model: IdentifiedModel, weights: TrackingWeights) -> TrackingProbl
     if weights.low_frequency_weight > 0:
         # One pole per force, w+ = a w + (1 - a) u, and its newest value as the output.
         a = float(np.exp(-2 * np.pi * weights.low_frequency_hz / model.sample_rate_hz))
-        one = np.eye(m)
-        A, B = block_diag(A, a * one), np.vstack((B, (1 - a) * one))
-        C, D = block_diag(C, a * one), np.vstack((D, (1 - a) * one))
-        Q = block_diag(Q, weights.low_frequency_weight * one)
+        unit = np.eye(m)
+        A, B = block_diag(A, a * unit), np.vstack((B, (1 - a) * unit))
+        C, D = block_diag(C, a * unit), np.vstack((D, (1 - a) * unit))
+        Q = block_diag(Q, weights.low_frequency_weight * unit)
     R = weights.weight * np.eye(m)
     return TrackingProblem(A, B, C, D, Q, R, p, model.sample_rate_hz, model.band_hz)
 
 
-def checked_wanted(problem: TrackingProblem, wanted: FloatArray) -> FloatArray:
+def require_trajectory(problem: TrackingProblem, wanted: FloatArray) -> FloatArray:
     """(N, p), contiguous. Raises TrackingError on another shape and on values that are not finite."""
     r = np.ascontiguousarray(wanted, dtype=np.float64)
     if r.ndim != 2 or r.shape[1] != problem.outputs or not len(r):
@@ -150,7 +150,7 @@ def read_only(values: FloatArray) -> FloatArray:
     return copy
 
 
-def _output_weight(Q: FloatArray) -> FloatArray:
+def _require_output_weight(Q: FloatArray) -> FloatArray:
     Q = read_only(Q)
     if Q.ndim != 2 or Q.shape[0] != Q.shape[1] or not np.isfinite(Q).all() or not np.allclose(Q, Q.T, rtol=1e-12):
         raise TrackingError("output_weight must be a square symmetric matrix of finite numbers")

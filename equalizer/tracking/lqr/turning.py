@@ -1,8 +1,8 @@
-"""A transient that is played while its direction changes: the best forces from where the model is now, at every tick.
+"""A transient whose direction changes while it is played: optimal forces from the model's present state, at each tick.
 
-What the trajectory ahead asks for is linear in the direction, and the gains know neither: so both are stored, and a new
-direction costs one combination of nine numbers per axis. Each tick solves the rest of the trajectory anew, exactly.
-Transients that overlap: one LiveState each, forces added. A transient that replaces another: `restarted`.
+The feedforward of the trajectory ahead is linear in the direction, and the gains do not depend on it: both are stored,
+and a new direction costs a combination of nine numbers per axis. Each tick solves the rest of the trajectory exactly.
+Transients that overlap: a LiveState each, forces added. A transient that replaces another: `restart`.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr import lqr_kernel
 from equalizer.tracking.lqr.lqr import StoredGains, costate_feedforward
 from equalizer.tracking.lqr.rotation import every_normal, every_rotation
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted, read_only
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only, require_trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +41,7 @@ class LiveState:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Turned:
+class TurningResult:
     forces: FloatArray
     """(T, m)"""
     predicted: FloatArray
@@ -51,28 +51,29 @@ class Turned:
 
 
 def turning_transient(gains: StoredGains, trajectory: FloatArray) -> TurningTransient:
-    """trajectory: (N, p), before it is rotated. The gains have a free end, or one that is drawn to rest."""
+    """Transient of a trajectory (N, p), before it is rotated. The gains have a free end, or rest as final state."""
     p = gains.problem.outputs
-    return _transient(gains, every_rotation(checked_wanted(gains.problem, trajectory)), (p, p))
+    return _make_transient(gains, every_rotation(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
 def normal_transient(gains: StoredGains, recording: FloatArray) -> TurningTransient:
-    """recording: (N,), to be played along a normal."""
+    """Transient of a recording (N,), to be played along a normal."""
     p = gains.problem.outputs
-    return _transient(gains, every_normal(recording, p), (p,))
+    return _make_transient(gains, every_normal(recording, p), (p,))
 
 
-def at_rest(transient: TurningTransient) -> LiveState:
+def initial_state(transient: TurningTransient) -> LiveState:
     return LiveState(0, np.zeros(transient.problem.order))
 
 
-def restarted(state: LiveState) -> LiveState:
-    """The first row comes next, from the present motion: what still rings of the former transient is steered out."""
+def restart(state: LiveState) -> LiveState:
+    """State in which the first row comes next, from the present motion: the former transient's free decay is
+    compensated."""
     return LiveState(0, state.x)
 
 
 def step(transient: TurningTransient, state: LiveState, direction: FloatArray) -> tuple[FloatArray, LiveState]:
-    """The force (m,) of this tick, and what comes next. After the last row the force is zero.
+    """The force (m,) of this tick, and the next state. After the last row the force is zero.
 
     Raises TrackingError on another shape of the direction.
     """
@@ -80,12 +81,12 @@ def step(transient: TurningTransient, state: LiveState, direction: FloatArray) -
     return turned.forces[0], turned.state
 
 
-def play(transient: TurningTransient, directions: FloatArray, state: LiveState | None = None) -> Turned:
+def play(transient: TurningTransient, directions: FloatArray, state: LiveState | None = None) -> TurningResult:
     """Many ticks, compiled. directions: (T, p, p) or (T, p), one per tick; state: None = from rest, first row.
 
     Raises TrackingError on another shape of the directions.
     """
-    problem, live = transient.problem, at_rest(transient) if state is None else state
+    problem, live = transient.problem, initial_state(transient) if state is None else state
     turns = np.asarray(directions, dtype=np.float64)
     if turns.shape[1:] != transient.direction_shape:
         raise TrackingError(
@@ -97,9 +98,9 @@ def play(transient: TurningTransient, directions: FloatArray, state: LiveState |
     out = np.empty((len(turns), m + problem.outputs))
     flat = np.ascontiguousarray(turns.reshape(len(turns), -1))
     lqr_kernel.run(problem.step, transient.K[live.tick :], transient.g[live.tick :], flat, numbers, out)
-    return Turned(out[:, :m], out[:, m:], LiveState(live.tick + len(turns), numbers[:n]))
+    return TurningResult(out[:, :m], out[:, m:], LiveState(live.tick + len(turns), numbers[:n]))
 
 
-def _transient(gains: StoredGains, wanted: FloatArray, direction_shape: tuple[int, ...]) -> TurningTransient:
+def _make_transient(gains: StoredGains, wanted: FloatArray, direction_shape: tuple[int, ...]) -> TurningTransient:
     g = np.stack([costate_feedforward(gains, each) for each in wanted], axis=2)
     return TurningTransient(gains.problem, gains.gains.K, read_only(g), direction_shape)

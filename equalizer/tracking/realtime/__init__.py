@@ -1,1 +1,1 @@
-"""What a real-time loop of others needs of a model: all that is computed once, and values to check a translation by."""
+"""Export of a tracker for real-time loops in other languages: precomputed arrays, and cases to verify a translation."""

@@ -1,4 +1,4 @@
-"""What a translation of a controller is compared with: ticks that Python played, below the cap."""
+"""Reference cases to verify a translation of a controller: ticks computed in Python, below the cap."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from equalizer.tracking.lqr.turning import play
 from equalizer.tracking.realtime.realtime_controller import RealtimeController
 
 OF_CAP = 0.9
-"""The largest force of a case: the cap is no part of what is compared."""
+"""Largest force of a case over the cap, because the cap is not compared."""
 
 NO_FORCE = 1e-12
 """Of the cap: what a comparison allows as a difference. A way whose largest force is below it is none."""
@@ -18,7 +18,7 @@ NO_FORCE = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControllerCases:
-    """T ticks of each of the two ways, from rest."""
+    """T ticks of transient and stream, from rest."""
 
     rotations: FloatArray
     """(T, p, p): one that wanders, and no rotation alone: the level changes with it."""
@@ -45,15 +45,15 @@ def controller_cases(controller: RealtimeController, seed: int = 1) -> Controlle
     draw, p = np.random.default_rng(seed), controller.problem.outputs
     ticks = len(controller.transient) + 50
     rotations = np.cumsum(draw.standard_normal((ticks, p, p)), axis=0)
-    rotations *= _to_cap(play(controller.transient, rotations).forces, controller.cap_n, "transient")
+    rotations *= _cap_factor(play(controller.transient, rotations).forces, controller.cap_n, "transient")
     wanted = draw.standard_normal((ticks, p))
-    wanted *= _to_cap(controller.streamed(wanted)[1].forces, controller.cap_n, "stream")
-    bands, tracked = controller.streamed(wanted)
+    wanted *= _cap_factor(controller.simulate_stream(wanted)[1].forces, controller.cap_n, "stream")
+    bands, tracked = controller.simulate_stream(wanted)
     transient_forces = play(controller.transient, rotations).forces
     return ControllerCases(rotations, transient_forces, wanted, bands.low, bands.high, tracked.forces)
 
 
-def _to_cap(forces: FloatArray, cap_n: float, way: str) -> float:
+def _cap_factor(forces: FloatArray, cap_n: float, way: str) -> float:
     longest = float(np.linalg.norm(forces, axis=1).max())
     if not longest >= NO_FORCE * cap_n:
         raise TrackingError(f"the {way} comes to no force: there is nothing to play")

@@ -1,4 +1,4 @@
-"""A model's tracker as numbers that a loop in another language can run: two ways to get a force each tick.
+"""Real-time form of a model's tracker, as arrays for a loop in another language: two ways to get a force each tick.
 
 `transient`: a table of accelerations that is known beforehand, turned into any direction while it is played (stored
 gains and rotation basis). `stream`: accelerations that arrive while they are played, split causally into bands, the
@@ -12,11 +12,16 @@ import numpy as np
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.band_split import Bands, CausalSplit
-from equalizer.tracking.feedforward.feedforward import edges_around
-from equalizer.tracking.lqr.lqr import Tracked, stored_gains
+from equalizer.tracking.feedforward.feedforward import band_edges
+from equalizer.tracking.lqr.lqr import TrackResult, stored_gains
 from equalizer.tracking.lqr.padding import CAUSAL
 from equalizer.tracking.lqr.preview import PreviewLoss, PreviewTracker, preview_loss, preview_tracker, stream
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import (
+    TrackingError,
+    TrackingProblem,
+    TrackingWeights,
+    make_tracking_problem,
+)
 from equalizer.tracking.lqr.turning import TurningTransient, turning_transient
 
 TAP_S, TAP_DECAY_S = 0.2, 0.04
@@ -54,8 +59,8 @@ class RealtimeController:
     def problem(self) -> TrackingProblem:
         return self.tracker.problem
 
-    def streamed(self, wanted: FloatArray) -> tuple[Bands, Tracked]:
-        """What a stream of wanted (N, p) comes to from rest: its bands, and the forces for the middle one.
+    def simulate_stream(self, wanted: FloatArray) -> tuple[Bands, TrackResult]:
+        """Simulate a stream of wanted (N, p) from rest: its bands, and the forces for the middle one.
 
         Row k is of the tick at which row k of what is wanted arrives; played is then the row that came before it by
         the preview less a sample. The cap is not kept here.
@@ -63,7 +68,7 @@ class RealtimeController:
         bands = self.split.split(wanted)
         late = len(self.tracker) - 1
         tracked = stream(self.tracker, np.pad(bands.middle, ((late, 0), (0, 0))))
-        return bands, Tracked(tracked.forces[: len(wanted)], tracked.predicted[: len(wanted)], tracked.final_state)
+        return bands, TrackResult(tracked.forces[: len(wanted)], tracked.predicted[: len(wanted)], tracked.final_state)
 
 
 def realtime_controller(
@@ -74,14 +79,14 @@ def realtime_controller(
     Raises TrackingError for a model without stationary gains and for settings that no loop can run.
     """
     settings = settings or RealtimeSettings()
-    problem = augmented(model, TrackingWeights(settings.weight))
+    problem = make_tracking_problem(model, TrackingWeights(settings.weight))
     wanted = tap(model) if transient is None else transient
     _, after = CAUSAL.samples(model.sample_rate_hz)
     played = np.pad(np.asarray(wanted, dtype=np.float64), ((0, after), (0, 0)))
     preview = max(1, round(settings.preview_s * model.sample_rate_hz))
     return RealtimeController(
         preview_tracker(problem, preview),
-        CausalSplit(edges_around(model), model.sample_rate_hz),
+        CausalSplit(band_edges(model), model.sample_rate_hz),
         turning_transient(stored_gains(problem, len(played)), played),
         preview_loss(problem, preview),
         settings.cap_n,

@@ -1,1 +1,1 @@
-"""One device at many places: models identified at several points, and forces for a place between them."""
+"""Workspace interpolation: models identified at several places, and forces for a place between them."""

@@ -1,4 +1,4 @@
-"""The resonances of a model within its band, cleared of what the fit left there.
+"""Resonances of an identified model within its band, without the fit's spurious poles.
 
 A model of order 26 of a device with four resonances in the band holds more poles there than four: some share a
 resonance between them, some answer noise. So poles only start the search: resonances are fitted to the model's own
@@ -46,8 +46,8 @@ class BandMode:
 
     def response(self, z: ComplexArray) -> ComplexArray:
         """(lines, p, m)"""
-        one, other = 1 / (z - self.pole), 1 / (z - self.pole.conjugate())
-        return np.asarray(one[:, None, None] * self.residue + other[:, None, None] * self.residue.conj())
+        upper, lower = 1 / (z - self.pole), 1 / (z - self.pole.conjugate())
+        return np.asarray(upper[:, None, None] * self.residue + lower[:, None, None] * self.residue.conj())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,15 +88,16 @@ def band_lines(model: IdentifiedModel, band_hz: tuple[float, float]) -> BandLine
 
 
 def band_modes(model: IdentifiedModel, band_hz: tuple[float, float]) -> tuple[BandMode, ...]:
-    """By rising frequency; what damping or weakness keeps from being a resonance is left out."""
+    """Resonances by rising frequency, without those that are too damped or too weak."""
     lines = band_lines(model, band_hz)
     starts = _starts(model, band_hz)
     while len(starts):
-        fitted, residues = _fit(lines, starts, model.sample_rate_hz)
+        fitted, residues = _fit_modes(lines, starts, model.sample_rate_hz)
         modes = [
-            _mode(lines, pair, residue, model.sample_rate_hz) for pair, residue in zip(fitted, residues, strict=True)
+            _make_mode(lines, pair, residue, model.sample_rate_hz)
+            for pair, residue in zip(fitted, residues, strict=True)
         ]
-        kept = np.array([_holds(mode, start, band_hz) for mode, start in zip(modes, starts, strict=True)])
+        kept = np.array([_is_resonance(mode, start, band_hz) for mode, start in zip(modes, starts, strict=True)])
         if kept.all():
             return tuple(sorted(modes, key=lambda mode: mode.natural_hz))
         starts = starts[kept]
@@ -123,8 +124,9 @@ def _starts(model: IdentifiedModel, band_hz: tuple[float, float]) -> FloatArray:
     return np.array([(f, d) for f, d, _ in found], dtype=np.float64).reshape(-1, 2)
 
 
-def _fit(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[FloatArray, ComplexArray]:
-    """Variable projection: poles are searched, residues and remainder are linear. (modes, 2), (modes, p, m)."""
+def _fit_modes(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[FloatArray, ComplexArray]:
+    """Variable projection: poles are searched, residues and remainder are linear. Returns natural frequencies and
+    damping ratios (modes, 2), and residues (modes, p, m)."""
     size = lines.size[:, None]
     wanted = _real_rows((lines.response.reshape(len(size), -1)) / size)
     smooth = lines.smooth_basis / size
@@ -132,8 +134,8 @@ def _fit(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[FloatArr
     def basis(logs: FloatArray) -> FloatArray:
         natural, damping = np.exp(logs.reshape(-1, 2)).T
         poles = _poles(natural, np.minimum(damping, 0.95), rate_hz)
-        one, other = 1 / (lines.z[:, None] - poles), 1 / (lines.z[:, None] - poles.conj())
-        return _real_rows(np.hstack([(one + other) / size, 1j * (one - other) / size, smooth, 1j * smooth]))
+        upper, lower = 1 / (lines.z[:, None] - poles), 1 / (lines.z[:, None] - poles.conj())
+        return _real_rows(np.hstack([(upper + lower) / size, 1j * (upper - lower) / size, smooth, 1j * smooth]))
 
     def left(logs: FloatArray) -> FloatArray:
         orthonormal = np.linalg.qr(basis(logs))[0]
@@ -148,7 +150,7 @@ def _fit(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[FloatArr
     return np.exp(found.x.reshape(-1, 2)), residues
 
 
-def _holds(mode: BandMode, start: FloatArray, band_hz: tuple[float, float]) -> bool:
+def _is_resonance(mode: BandMode, start: FloatArray, band_hz: tuple[float, float]) -> bool:
     low, high = band_hz
     return bool(
         abs(mode.natural_hz / start[0] - 1) < DRIFT
@@ -158,7 +160,7 @@ def _holds(mode: BandMode, start: FloatArray, band_hz: tuple[float, float]) -> b
     )
 
 
-def _mode(lines: BandLines, pair: FloatArray, residue: ComplexArray, rate_hz: float) -> BandMode:
+def _make_mode(lines: BandLines, pair: FloatArray, residue: ComplexArray, rate_hz: float) -> BandMode:
     bare = BandMode(float(pair[0]), min(float(pair[1]), 0.95), residue, 0.0, rate_hz)
     part = np.linalg.norm(bare.response(lines.z), axis=(1, 2)) / lines.size
     return BandMode(bare.natural_hz, bare.damping_ratio, residue, float(part[lines.inside].max()), rate_hz)

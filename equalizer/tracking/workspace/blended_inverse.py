@@ -1,4 +1,4 @@
-"""Between models: each computes its forces, and the forces are blended. Needs no matching: the safe default.
+"""Interpolation by blending the forces of several models. Needs no matching of modes: the safe default.
 
 Always better than blending responses and inverting the blend: where a resonance moves, the mean of two responses has
 two small resonances, and its inverse two notches.
@@ -9,7 +9,7 @@ from equalizer.tracking.workspace.place_weights import place_weights
 from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 
-def blended_at(workspace: WorkspaceModels, place_m: Place) -> ModelsAtPlace:
+def blend_at(workspace: WorkspaceModels, place_m: Place) -> ModelsAtPlace:
     if len(workspace) == 1 and workspace.models[0].place_m is None:
         return ModelsAtPlace(
             place_m, workspace.models, (1.0,), ("the only model does not say where it was identified",)

@@ -1,4 +1,4 @@
-"""Whether repeats at a place will converge, as far as the models say: their uncertainty, and how they differ."""
+"""Convergence test of iterative learning at a place, from the models' uncertainty and their differences."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ LINES = 120
 
 
 def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta: float = 1.0) -> Convergence | None:
-    """What the device may be: every draw of every model's uncertainty and, between places, each model that is used.
+    """Convergence for every draw of every model's uncertainty and, between places, for each model that is used.
     spring: what acts on the device and is not in the models. None where nothing says what the device may be."""
     used = [model for _, model in used_models(at)]
     band_hz = used[0].band_hz
@@ -25,13 +25,13 @@ def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta
             devices += [model_response(model.with_parameters(row), lines_hz) for row in model.samples]
     if not devices:
         return None
-    held = np.array([_under_spring(device, lines_hz, spring) for device in devices])
+    held = np.array([_close_spring_loop(device, lines_hz, spring) for device in devices])
     model_there = np.asarray(np.linalg.inv(at.inverse(lines_hz, weight, spring)), dtype=np.complex128)
     return convergence(model_there, held, lines_hz, band_hz, beta)
 
 
-def _under_spring(device: ComplexArray, frequency_hz: FloatArray, spring: VirtualSpring) -> ComplexArray:
-    """From what is added to the spring's force, rather than from all that enters."""
+def _close_spring_loop(device: ComplexArray, frequency_hz: FloatArray, spring: VirtualSpring) -> ComplexArray:
+    """Response to forces that are added to the spring's, instead of to the total force."""
     share = spring.force_per_acceleration(frequency_hz)[:, None, None]
     around = np.eye(device.shape[1]) - device * share
     return np.asarray(np.linalg.solve(around, device), dtype=np.complex128)

@@ -1,4 +1,4 @@
-"""A wanted acceleration turned into forces at a place: by one model, or by several whose forces are added."""
+"""Feedforward forces at a place, by a single model or by several whose forces are added."""
 
 from dataclasses import replace
 
@@ -8,13 +8,14 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.feedforward import NO_CAP_N, Feedforward, FeedforwardSettings, feedforward
 from equalizer.tracking.learning.iteration import Invert
-from equalizer.tracking.learning.model_inverse import InverseOfLength, inverse_of
-from equalizer.tracking.lqr.limits import require_within
+from equalizer.tracking.learning.model_inverse import InverseOfLength, inverse_operator
+from equalizer.tracking.lqr.limits import require_under_cap
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
 
 def feedforward_at(at: ModelsAtPlace, wanted: Signal, settings: FeedforwardSettings) -> Feedforward:
-    """Error and loss are those of the worst part, each by its own model. Raises what `feedforward` raises."""
+    """Feedforward at a place; error and loss are the worst part's, by its own model. Raises what `feedforward`
+    raises."""
     used = used_models(at)
     if len(used) == 1:
         return feedforward(used[0][1], wanted, settings)
@@ -28,20 +29,20 @@ def feedforward_at(at: ModelsAtPlace, wanted: Signal, settings: FeedforwardSetti
         largest,
         forces=replace(largest.forces, samples=samples),
         error=max(part.error for _, part in parts),
-        peaks=require_within(samples, settings.cap_n, wanted.sample_rate_hz),
+        peaks=require_under_cap(samples, settings.cap_n, wanted.sample_rate_hz),
         loss=max(losses, key=lambda loss: loss.error_capped, default=None),
     )
 
 
 def used_models(at: ModelsAtPlace) -> tuple[tuple[float, IdentifiedModel], ...]:
-    """With their weights; in the band that all of them cover."""
+    """Models with a weight above zero, with their weights, restricted to the band that all of them cover."""
     used = [(weight, model) for weight, model in zip(at.weights, at.models, strict=True) if weight > 0]
     band_hz = max(model.band_hz[0] for _, model in used), min(model.band_hz[1] for _, model in used)
     return tuple((weight, replace(model, band_hz=band_hz)) for weight, model in used)
 
 
 def inverse_at(at: ModelsAtPlace, weight: float) -> InverseOfLength:
-    parts = [(share, inverse_of(model, weight)) for share, model in used_models(at)]
+    parts = [(share, inverse_operator(model, weight)) for share, model in used_models(at)]
 
     def of_length(rows: int) -> Invert:
         inverses = [(share, inverse(rows)) for share, inverse in parts]

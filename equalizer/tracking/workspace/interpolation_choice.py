@@ -1,4 +1,4 @@
-"""Which interpolation is used: decided by places that were identified and are kept out of it."""
+"""Choice of the interpolation by cross-validation on places that were identified and are left out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT
 from equalizer.tracking.feedforward.quality import Quality, quality
-from equalizer.tracking.workspace.blended_inverse import blended_at
+from equalizer.tracking.workspace.blended_inverse import blend_at
 from equalizer.tracking.workspace.modal_interpolation import ModalInterpolation, modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
@@ -25,7 +25,7 @@ LINES = 300
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldOutPlace:
-    """What the device truly answers, as well as that is known, at a place that no given model stands for."""
+    """The device's response, as well as it is known, at a place without a model."""
 
     place_m: Place
     frequency_hz: FloatArray
@@ -57,7 +57,7 @@ class InterpolationChoice:
     """Of all models; None where it is not used."""
 
     def at(self, place_m: Place) -> ModelsAtPlace:
-        return self.modal.at(place_m) if self.modal else blended_at(self.workspace, place_m)
+        return self.modal.at(place_m) if self.modal else blend_at(self.workspace, place_m)
 
 
 def held_out_model(model: IdentifiedModel, band_hz: tuple[float, float]) -> HeldOutPlace:
@@ -84,14 +84,14 @@ def choose_interpolation(
     if modal is None:
         return InterpolationChoice("blended forces", "there is only one model", (), workspace, None)
     checks = tuple(
-        [_check(workspace, modal, place, weight) for place in held_out]
+        [_check_place(workspace, modal, place, weight) for place in held_out]
         if held_out
-        else [_check(*left, weight) for left in _left_out(workspace)]
+        else [_check_place(*left, weight) for left in _leave_one_out(workspace)]
     )
-    return _chosen(workspace, modal, checks)
+    return _choose_by_checks(workspace, modal, checks)
 
 
-def _chosen(
+def _choose_by_checks(
     workspace: WorkspaceModels, modal: ModalInterpolation, checks: tuple[PlaceCheck, ...]
 ) -> InterpolationChoice:
     if not checks:
@@ -119,7 +119,7 @@ def _check_apart(workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace]) -
             )
 
 
-def _left_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]]:
+def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]]:
     found: list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]] = []
     for index, model in enumerate(workspace.models):
         if len(workspace) < 3:
@@ -135,20 +135,20 @@ def _left_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, ModalIn
     return found
 
 
-def _check(
+def _check_place(
     workspace: WorkspaceModels, modal: ModalInterpolation | None, place: HeldOutPlace, weight: float
 ) -> PlaceCheck:
-    blended = _delivered(blended_at(workspace, place.place_m), place, weight)
+    blended = _equalized_response(blend_at(workspace, place.place_m), place, weight)
     if modal is None:
-        return PlaceCheck(place.place_m, quality(blended), None, _error(blended), None)
-    moved = _delivered(modal.at(place.place_m), place, weight)
-    return PlaceCheck(place.place_m, quality(blended), quality(moved), _error(blended), _error(moved))
+        return PlaceCheck(place.place_m, quality(blended), None, _rms_error(blended), None)
+    moved = _equalized_response(modal.at(place.place_m), place, weight)
+    return PlaceCheck(place.place_m, quality(blended), quality(moved), _rms_error(blended), _rms_error(moved))
 
 
-def _delivered(at: ModelsAtPlace, place: HeldOutPlace, weight: float) -> ComplexArray:
+def _equalized_response(at: ModelsAtPlace, place: HeldOutPlace, weight: float) -> ComplexArray:
     return np.asarray(place.response @ at.inverse(place.frequency_hz, weight))
 
 
-def _error(delivered: ComplexArray) -> float:
+def _rms_error(delivered: ComplexArray) -> float:
     largest = np.linalg.norm(delivered - np.eye(delivered.shape[1]), ord=2, axis=(1, 2))
     return float(np.sqrt((largest**2).mean()))

@@ -1,4 +1,4 @@
-"""A model for a place between models: resonances move from one to the next instead of being mixed.
+"""Modal interpolation: a model for a place between models, whose resonances move instead of being mixed.
 
 Resonances of the band are matched, and their frequency, damping and residues interpolated; what is left of each
 model's response is smooth and is interpolated linearly. The sum becomes a model again, on a fixed set of real poles.
@@ -15,7 +15,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.workspace.band_modes import BandLines, BandMode, band_lines, band_modes
-from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError, matched_modes
+from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError, match_modes
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 from equalizer.tracking.workspace.place_weights import place_weights
 from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
@@ -41,10 +41,10 @@ class ModalInterpolation:
 
     def at(self, place_m: Place) -> ModelsAtPlace:
         weights = place_weights(self.workspace.places_m, place_m)
-        modes = [_interpolated(track, weights.smooth) for track in self.tracks]
+        modes = [_interpolate_mode(track, weights.smooth) for track in self.tracks]
         remainder = np.einsum("k,klpm->lpm", weights.linear, self.remainders)
         total = remainder + sum((mode.response(self.lines.z) for mode in modes), np.zeros_like(remainder))
-        model, error = _model(self, modes, remainder, np.linalg.norm(total, axis=(1, 2)))
+        model, error = _assemble_model(self, modes, remainder, np.linalg.norm(total, axis=(1, 2)))
         remarks = [weights.remark] if weights.remark else []
         if error > POOR_FIT:
             remarks.append(f"the model between the given ones is {100 * error:.1f} % off where it is worst")
@@ -56,7 +56,7 @@ def modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
     """Raises ModesDoNotMatchError where it is doubtful which resonances of neighbouring models are the same."""
     band_hz = workspace.band_hz
     modes = [band_modes(model, band_hz) for model in workspace.models]
-    tracks = _tracks(workspace, modes)
+    tracks = _track_modes(workspace, modes)
     lines = [band_lines(model, band_hz) for model in workspace.models]
     remainders = []
     for index, line in enumerate(lines):
@@ -65,8 +65,8 @@ def modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
     return ModalInterpolation(workspace, tracks, lines[0], np.array(remainders))
 
 
-def _tracks(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]) -> tuple[tuple[BandMode, ...], ...]:
-    """Followed from neighbour to neighbour, along the shortest net that joins all places."""
+def _track_modes(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]) -> tuple[tuple[BandMode, ...], ...]:
+    """Follow each resonance from neighbour to neighbour along the minimum spanning tree of the places."""
     places = workspace.places_m
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
     net = minimum_spanning_tree(apart)
@@ -75,7 +75,7 @@ def _tracks(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]) -> 
     for node in order[1:]:
         nearer = int(before[node])
         try:
-            pairs = dict(matched_modes(modes[nearer], modes[node], workspace.band_hz))
+            pairs = dict(match_modes(modes[nearer], modes[node], workspace.band_hz))
         except ModesDoNotMatchError as error:
             raise ModesDoNotMatchError(f"models {nearer + 1} (first) and {node + 1} (second): {error}") from error
         for track in found.values():
@@ -85,7 +85,7 @@ def _tracks(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]) -> 
     return tuple(tuple(modes[k][track[k]] for k in range(len(modes))) for track in whole)
 
 
-def _interpolated(track: Sequence[BandMode], weights: FloatArray) -> BandMode:
+def _interpolate_mode(track: Sequence[BandMode], weights: FloatArray) -> BandMode:
     natural = float(np.exp(weights @ np.log([mode.natural_hz for mode in track])))
     damping = float(np.exp(weights @ np.log([mode.damping_ratio for mode in track])))
     # A residue of an acceleration grows with the frequency: that part moves with the frequency, not with the place.
@@ -101,10 +101,11 @@ def _rank(residue: ComplexArray) -> int:
     return int((sizes > RANK_SHARE * sizes[0]).sum())
 
 
-def _model(
+def _assemble_model(
     prepared: ModalInterpolation, modes: Sequence[BandMode], remainder: ComplexArray, size: FloatArray
 ) -> tuple[IdentifiedModel, float]:
-    """Resonances as they are, the remainder in least squares on fixed poles; and its worst relative error."""
+    """State-space model of the resonances and of the remainder, which is fitted on fixed real poles; and the
+    remainder's worst relative error."""
     first, lines = prepared.workspace.models[0], prepared.lines
     poles = _smooth_poles(prepared.workspace.band_hz, first.sample_rate_hz)
     basis = np.hstack([(1 - poles) / (lines.z[:, None] - poles), np.ones((len(lines.z), 1))]) / size[:, None]
@@ -115,7 +116,7 @@ def _model(
     error = float(np.linalg.norm(basis @ solved - wanted, axis=1).max())
     p, m = remainder.shape[1:]
     gains = solved.reshape(len(poles) + 1, p, m)
-    blocks = [_real_mode(mode) for mode in modes]
+    blocks = [_realise_mode(mode) for mode in modes]
     A = block_diag(*(block[0] for block in blocks), np.kron(np.diag(poles), np.eye(m)))
     B = np.vstack(
         [*(block[1] for block in blocks), np.tile(np.eye(m), (len(poles), 1)) * np.repeat(1 - poles, m)[:, None]]
@@ -139,8 +140,8 @@ def _smooth_poles(band_hz: tuple[float, float], rate_hz: float) -> FloatArray:
     return np.asarray(np.exp(-2 * np.pi * np.geomspace(low, high, count) / rate_hz))
 
 
-def _real_mode(mode: BandMode) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """R / (z - p) and its conjugate with real matrices; two states for each rank of R."""
+def _realise_mode(mode: BandMode) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Real state-space matrices A, B, C of R / (z - p) and its conjugate; two states for each rank of R."""
     u, s, v = np.linalg.svd(mode.residue)
     rank = int((s > 1e-9 * s[0]).sum())
     p = mode.pole

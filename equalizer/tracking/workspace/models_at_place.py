@@ -1,4 +1,4 @@
-"""What plays at a place: one model, or several whose forces are added."""
+"""Models that compute forces at a place: a single one, or several whose forces are added."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,12 +26,12 @@ class ModelsAtPlace:
         self, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
     ) -> ComplexArray:
         """Steady-state forces per wanted output, (lines, m, p)."""
-        parts = [w * inverse_response(model, frequency_hz, weight, spring) for w, model in self._used()]
+        parts = [w * inverse_response(model, frequency_hz, weight, spring) for w, model in self._used_models()]
         return np.asarray(sum(parts), dtype=np.complex128)
 
     def forces(self, track: Callable[[IdentifiedModel], FloatArray]) -> FloatArray:
-        """Of a trajectory, whatever `track` returns for one model: the sum by weights."""
-        return np.asarray(sum(w * track(model) for w, model in self._used()), dtype=np.float64)
+        """Forces of a trajectory: the weighted sum of what `track` returns for each model."""
+        return np.asarray(sum(w * track(model) for w, model in self._used_models()), dtype=np.float64)
 
-    def _used(self) -> list[tuple[float, IdentifiedModel]]:
+    def _used_models(self) -> list[tuple[float, IdentifiedModel]]:
         return [(w, model) for w, model in zip(self.weights, self.models, strict=True) if w > 0]

@@ -1,4 +1,4 @@
-"""How much each of several points counts at a place between them."""
+"""Interpolation weights of scattered points at a place between them."""
 
 from dataclasses import dataclass
 
@@ -11,17 +11,18 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.workspace.workspace_models import Place
 
 FLAT = 0.05
-"""Points that spread less than this share of their largest spread in some direction are taken to lie flat in it:
-else triangulation would make slivers of hand-placed points, and neighbours would not be neighbours."""
+"""Relative spread below which points are taken as flat in a direction: else the triangulation of hand-placed points
+would have slivers that join distant points."""
 OUTSIDE_M = 1e-3
-"""Nearer to the points' hull than this counts as inside."""
+"""Distance to the points' hull up to which a place counts as inside."""
 SUM_TO_ONE = 1e6
-"""Weight of that condition against distances, of order 1, when the nearest point of the hull is sought."""
+"""Weight of the condition that weights sum to 1, against distances of order 1, in the search for the nearest point of
+the hull."""
 
 BEND = 0.35
-"""Of the smooth functions, per distance between neighbours: smaller is closer to a parabola."""
+"""Shape parameter of the radial functions times the distance between neighbours: smaller is closer to a parabola."""
 ROUNDING = 1e-6
-"""Points that count less count nothing: each costs a computation of its forces."""
+"""Weights below this are set to zero, because each point costs a computation of its forces."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,8 +46,8 @@ class PlaceWeights:
 
 
 def place_weights(points_m: FloatArray, place_m: Place | FloatArray) -> PlaceWeights:
-    """points_m: (points, 3), all different. Along a line, over a surface or in a volume, as the points lie: on their
-    Delaunay triangulation. Not by inverse distance, whose slope vanishes at every point."""
+    """Weights of points_m (points, 3), all different, at a place, on their Delaunay triangulation: along a line, over a
+    surface or in a volume, as the points lie. Inverse distance would have zero slope at every point."""
     points = np.asarray(points_m, dtype=np.float64)
     place = np.asarray(place_m, dtype=np.float64)
     if len(points) == 1:
@@ -54,26 +55,26 @@ def place_weights(points_m: FloatArray, place_m: Place | FloatArray) -> PlaceWei
         return PlaceWeights(alone, alone, float(np.linalg.norm(place - points[0])))
     centre = points.mean(axis=0)
     scale = float(np.linalg.norm(points - centre, axis=1).max())
-    flat = _flattening(points - centre)
+    flat = _spread_directions(points - centre)
     spread, wanted = (points - centre) @ flat.T / scale, flat @ (place - centre) / scale
     inside = _nearest_in_hull(spread, wanted)
     nearest = inside @ flat * scale + centre
     outside_m = float(np.linalg.norm(place - nearest))
-    return PlaceWeights(_linear(spread, inside), _smooth(spread, inside), outside_m)
+    return PlaceWeights(_linear_weights(spread, inside), _smooth_weights(spread, inside), outside_m)
 
 
-def _flattening(offsets: FloatArray) -> FloatArray:
-    """(dimensions, 3): the directions in which the points spread, as many as keep them apart."""
+def _spread_directions(offsets: FloatArray) -> FloatArray:
+    """(dimensions, 3): principal directions in which the points spread, as many as keep them distinct."""
     _, spreads, directions = np.linalg.svd(offsets, full_matrices=False)
     rank = int((spreads > FLAT * spreads[0]).sum())
     full = int((spreads > 1e-9 * spreads[0]).sum())
-    whole = _closest(offsets)
-    while rank < full and _closest(offsets @ directions[:rank].T) < 0.5 * whole:
+    whole = _smallest_distance(offsets)
+    while rank < full and _smallest_distance(offsets @ directions[:rank].T) < 0.5 * whole:
         rank += 1
     return np.asarray(directions[:rank])
 
 
-def _closest(points: FloatArray) -> float:
+def _smallest_distance(points: FloatArray) -> float:
     apart = np.linalg.norm(points[:, None] - points[None], axis=2)
     return float(apart[np.triu_indices(len(points), 1)].min())
 
@@ -84,7 +85,7 @@ def _nearest_in_hull(points: FloatArray, place: FloatArray) -> FloatArray:
     return np.asarray(weights @ points / weights.sum())
 
 
-def _linear(points: FloatArray, place: FloatArray) -> FloatArray:
+def _linear_weights(points: FloatArray, place: FloatArray) -> FloatArray:
     count, dimensions = points.shape
     if dimensions == 1:
         order = np.argsort(points[:, 0])
@@ -107,9 +108,9 @@ def _linear(points: FloatArray, place: FloatArray) -> FloatArray:
     return weights
 
 
-def _smooth(points: FloatArray, place: FloatArray) -> FloatArray:
-    """Multiquadric radial functions with a linear part. Their width makes them nearly parabolas between three points:
-    a cubic spline's curvature vanishes at the outer ones, where a device's need not."""
+def _smooth_weights(points: FloatArray, place: FloatArray) -> FloatArray:
+    """Multiquadric radial basis functions with a linear part, so wide that they are nearly parabolas between three
+    points: a cubic spline's curvature vanishes at the outer ones, where a device's need not."""
     apart = np.linalg.norm(points[:, None] - points[None], axis=2)
     nearest = np.median(np.partition(apart, 1, axis=1)[:, 1])
     cardinal = RBFInterpolator(points, np.eye(len(points)), kernel="multiquadric", epsilon=BEND / nearest, degree=1)

@@ -1,4 +1,4 @@
-"""The models of one device, each identified at a place of its own."""
+"""Models of a device, each identified at another place of its workspace."""
 
 from dataclasses import dataclass
 
@@ -78,6 +78,6 @@ def _check_places(models: tuple[IdentifiedModel, ...]) -> None:
         )
     places = np.array([model.place_m for model in models], dtype=np.float64)
     apart = np.linalg.norm(places[:, None] - places[None], axis=2) + np.eye(len(places))
-    one, other = np.unravel_index(int(apart.argmin()), apart.shape)
-    if apart[one, other] < SAME_PLACE_M:
-        raise WorkspaceError(f"models {one + 1} and {other + 1} were identified at the same place; give one of them")
+    first, second = np.unravel_index(int(apart.argmin()), apart.shape)
+    if apart[first, second] < SAME_PLACE_M:
+        raise WorkspaceError(f"models {first + 1} and {second + 1} were identified at the same place; give one of them")

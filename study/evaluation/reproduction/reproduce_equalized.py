@@ -8,7 +8,7 @@ from analysis.evaluation.reproduction.played_response import PlayedResponse, sca
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.periodic_inverse import periodic_command
-from equalizer.tracking.workspace.blended_inverse import blended_at
+from equalizer.tracking.workspace.blended_inverse import blend_at
 from equalizer.tracking.workspace.modal_interpolation import modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace

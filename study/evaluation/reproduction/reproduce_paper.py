@@ -10,8 +10,8 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids
 from analysis.psychophysics.study_analysis import analyse_study
 from equalizer.identification.frequency_response.coupling_onset import coupling_onset
 from equalizer.identification.frequency_response.resonances import find_resonances
-from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, transfer_estimate
-from equalizer.identification.state_space.held_out import HeldOut, held_out
+from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, estimate_transfer
+from equalizer.identification.state_space.held_out import HeldOut, validate_on_test
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from study.devices.opening import FRICTIONLESS
@@ -60,7 +60,7 @@ def identify_or_load(
         asked = IdentifyPlan((recorded.path,), path, plan.band_hz, plan.order, with_spring=True)
         model = identify_model(asked, on_share).model
     on_share(1.0)
-    return ReproducedModel(model, held_out(model, (from_excitation(recorded.recording),)))
+    return ReproducedModel(model, validate_on_test(model, (from_excitation(recorded.recording),)))
 
 
 def _kept(path: Path, plan: ReproductionPlan, source: Path) -> IdentifiedModel | None:
@@ -173,7 +173,7 @@ def _results(
     try:
         device = _measure_device(recordings["sweep"].recording)
         shapes = _ellipsoids(recordings["ellipsoid"].recording)
-        estimate = transfer_estimate((from_excitation(centre),))
+        estimate = estimate_transfer((from_excitation(centre),))
     except (TransferEstimateError, ValueError) as problem:
         raise StudyError(
             "The recordings do not carry the figures",

@@ -14,7 +14,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFitRefused,
     MechanicalFitSettings,
 )
-from equalizer.identification.mechanical.mechanical_level import AsOnePiece, as_one_piece, without_friction
+from equalizer.identification.mechanical.mechanical_level import RigidBody, fit_rigid_body, remove_friction_damping
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
@@ -53,7 +53,7 @@ class WrittenTwin:
     model: MechanicalModel
     """As written."""
     fit: MechanicalFit
-    piece: AsOnePiece
+    piece: RigidBody
     notes: tuple[str, ...]
     """Sentences: assumptions, effect of friction."""
 
@@ -80,7 +80,7 @@ def write_twin(
     )
     try:
         fit = fit_mechanical_model([strong], settings, lambda share: on_progress(0.3 + 0.6 * share), plan.device)
-        piece = as_one_piece(fit, strong, weaker, settings)
+        piece = fit_rigid_body(fit, strong, weaker, settings)
     except MechanicalFitRefused as refusal:
         raise StudyError(
             TITLE,
@@ -89,7 +89,7 @@ def write_twin(
             saved="Nothing was written.",
         ) from refusal
     model = replace(
-        without_friction(fit.model, piece.of_friction),
+        remove_friction_damping(fit.model, piece.of_friction),
         name=f"{plan.device} omega.3, as identified" if plan.device == "simulated" else f"{plan.device}, as identified",
         tolerance=piece.tolerance,
         provenance=_provenance(plan, protocol, strong, fit),
@@ -167,7 +167,7 @@ def _provenance(plan: TwinPlan, protocol: RecordingProtocol, strong: Recording, 
     }
 
 
-def _notes(strong: Recording, fit: MechanicalFit, piece: AsOnePiece) -> tuple[str, ...]:
+def _notes(strong: Recording, fit: MechanicalFit, piece: RigidBody) -> tuple[str, ...]:
     spring = strong.meta.get("feedback") or {}
     stiffness = float(spring.get("stiffness_n_per_m", 0.0))
     return (

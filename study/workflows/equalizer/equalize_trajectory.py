@@ -12,7 +12,7 @@ from equalizer.tracking.bands.two_models import BandFacts, banded_feedforward
 from equalizer.tracking.compensation.known_physics import Compensation, compensate
 from equalizer.tracking.feedforward.feedforward import Feedforward, FeedforwardSettings
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, require_rate
-from equalizer.tracking.lqr.limits import ForceLimitError, Peaks, require_within
+from equalizer.tracking.lqr.limits import ForceLimitError, Peaks, require_under_cap
 from equalizer.tracking.workspace.feedforward_at_place import feedforward_at
 from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
@@ -89,7 +89,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
         compensation = _compensate(plan, solved, models.largest, physics, amplitude_n)
     samples = solved.forces.samples if compensation is None else compensation.forces
     forces = replace(solved.forces, samples=samples)
-    peaks = require_within(samples, plan.cap_n, forces.sample_rate_hz)
+    peaks = require_under_cap(samples, plan.cap_n, forces.sample_rate_hz)
     return EqualizedTrajectory(
         plan, wanted, Trajectory(forces, wanted.start_s), models, solved, peaks, bands, compensation
     )

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from equalizer.plant.model_quality import quality_document, quality_sentence
-from equalizer.tracking.feedforward.feedforward import within_band
+from equalizer.tracking.feedforward.feedforward import extract_band
 from study.workflows.equalizer.equalize_trajectory import EqualizedTrajectory
 
 WORTH_SAYING = 0.01
@@ -126,7 +126,7 @@ def _prediction_line(done: EqualizedTrajectory) -> str:
 
 def _force_outside(done: EqualizedTrajectory) -> float:
     forces = done.forces.signal.samples
-    outside = forces - within_band(done.models.nearest, forces)
+    outside = forces - extract_band(done.models.nearest, forces)
     return float(np.linalg.norm(outside) / np.linalg.norm(forces))
 
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
-from equalizer.tracking.compensation.effect_roles import why_not
-from equalizer.tracking.compensation.without_effects import without_effects
+from equalizer.tracking.compensation.effect_roles import reason_not_compensated
+from equalizer.tracking.compensation.without_effects import subtract_effects
 from study.errors import StudyError
 
 LEFT_OUT = 0.005
@@ -32,7 +32,7 @@ def removable_effects(physics: MechanicalModel) -> list[str]:
     return [
         f"{effect.kind}{f' on {effect.axis}' if effect.axis else ''} ({_numbers(effect)})"
         for effect in physics.effects
-        if not why_not(effect)
+        if not reason_not_compensated(effect)
     ]
 
 

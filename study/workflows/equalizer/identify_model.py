@@ -8,7 +8,7 @@ import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError
-from equalizer.identification.state_space.held_out import HeldOut, held_out
+from equalizer.identification.state_space.held_out import HeldOut, validate_on_test
 from equalizer.identification.state_space.identify import Identified
 from equalizer.identification.state_space.identify_recordings import IdentifiedRecordings, identify_recordings
 from equalizer.identification.state_space.misfit import misfit_of_estimate
@@ -85,7 +85,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     try:
         found = identify_recordings(recordings, settings, plan.smooth, on_progress)
         model = _at_place(plan, recordings, found.identified.model, physics)
-        tested = held_out(model, recordings)
+        tested = validate_on_test(model, recordings)
         model = replace(model, quality=_quality(found, recordings, tested))
     except (TransferEstimateError, IdentificationRefused) as refusal:
         raise _no_model(str(refusal)) from refusal

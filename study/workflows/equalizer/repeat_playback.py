@@ -9,7 +9,7 @@ import numpy as np
 
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.learning.iteration import IterationState, Repetition, Verdict, begin, next_forces, noise_of_rest
-from equalizer.tracking.learning.model_inverse import under_spring
+from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.lqr.padding import CAUSAL
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, Fault, Played
@@ -102,7 +102,7 @@ def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
         )
     after = CAUSAL.samples(rate_hz)[1]
     wanted = np.pad(signal.samples, ((0, after), (0, 0)))
-    invert = under_spring(plan.inverse(len(wanted)), plan.spring, rate_hz, plan.band_hz)
+    invert = compensate_spring(plan.inverse(len(wanted)), plan.spring, rate_hz, plan.band_hz)
     inside, limits = band_part(wanted, rate_hz, plan.band_hz), plan.settings.limits
     repetition = Repetition(
         wanted=inside,

@@ -10,8 +10,8 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.convergence import Convergence
-from equalizer.tracking.learning.iteration import LOWEST_GAIN, Verdict, fitting_share
-from equalizer.tracking.learning.model_inverse import under_spring
+from equalizer.tracking.learning.iteration import LOWEST_GAIN, Verdict, largest_share
+from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.workspace.convergence_at_place import convergence_at
 from equalizer.tracking.workspace.feedforward_at_place import inverse_at
 from study.errors import StudyError
@@ -164,9 +164,9 @@ def _first(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSprin
     rate_hz, band_hz = solved.wanted.signal.sample_rate_hz, solved.models.band_hz
     forces = solved.forces.signal.samples
     wanted = band_part(solved.wanted.signal.samples, rate_hz, band_hz)
-    held = under_spring(lambda _: np.zeros_like(forces), spring, rate_hz, band_hz)(wanted)
+    held = compensate_spring(lambda _: np.zeros_like(forces), spring, rate_hz, band_hz)(wanted)
     # Forces at the cap leave no room to carry the spring too; what then lacks is an error like any other.
-    return forces + fitting_share(forces, held, solved.plan.cap_n) * held
+    return forces + largest_share(forces, held, solved.plan.cap_n) * held
 
 
 def _refusal(happened: str, do_now: str) -> StudyError:

@@ -11,7 +11,7 @@ from analysis.reports.identification_report import (
 from equalizer.identification.frequency_response.coupling_onset import coupling_onset
 from equalizer.identification.frequency_response.frequency_bands import PUBLISHED_DIRECTION_LIMIT_HZ, frequency_bands
 from equalizer.identification.frequency_response.resonances import find_resonances
-from equalizer.identification.state_space.order_report import OrderReport, order_report
+from equalizer.identification.state_space.order_report import OrderReport, compare_orders
 from equalizer.identification.state_space.refusals import IdentificationRefused
 from equalizer.identification.state_space.settings import IdentificationSettings
 from study.local_clock import local_now
@@ -61,7 +61,7 @@ def _order(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> Or
     needed_s = FREER * device.identified.relaxed[0].decay_s if device.identified.relaxed else None
     settings = IdentificationSettings(device.plan.band_hz, asked, device.plan.longest_decay_s or needed_s)
     try:
-        return order_report(device.fitted, settings, orders, on_progress)
+        return compare_orders(device.fitted, settings, orders, on_progress)
     except IdentificationRefused:  # half of the lines are too few for the order: then there is nothing to compare
         return None
 

@@ -2,7 +2,7 @@
 
 from exchange import Data, Model, run
 
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.recording import Recording, Segment
@@ -22,7 +22,7 @@ def recording_of(data: Data) -> Recording:
 def identified(data: Data, options: dict) -> Model:
     recording = recording_of(data)
     settings = IdentificationSettings(data.band_hz, data.order)
-    model = identify(transfer_estimate([recording]), settings, records=(recording,)).model
+    model = identify(estimate_transfer([recording]), settings, records=(recording,)).model
     return Model(model.A, model.B, model.C, model.D, model.sample_rate_hz)
 
 

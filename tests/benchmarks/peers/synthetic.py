@@ -10,7 +10,7 @@ import plants
 from exchange import Data
 from run_hapteq import recording_of
 
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.settings import IdentificationSettings
 
 PERIODS = 2
@@ -44,7 +44,7 @@ class Experiment:
         told = (plants.RATE_HZ, self.command, response, starts, starts + PERIODS * period, period)
         bare = Data(*told, nothing, nothing, nothing, 0.0, self.band_hz, self.order)
         began_s = time.process_time()
-        lines = transfer_estimate([recording_of(bare)])
+        lines = estimate_transfer([recording_of(bare)])
         cpu_s = time.process_time() - began_s
         lines = lines.of_lines(lines.reliable).within(*IdentificationSettings(self.band_hz, self.order).fitted_hz)
         estimate = (lines.frequency_hz, lines.response, np.sqrt(lines.noise_variance), cpu_s)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.tracking.lqr.tracking_problem import TrackingProblem, TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingProblem, TrackingWeights, make_tracking_problem
 
 PEAK_GAIN = 10.0
 """Largest singular value of the response over all frequencies: rho is read against its square."""
@@ -37,7 +37,7 @@ def model_of() -> Callable[..., IdentifiedModel]:
 def problem_of() -> Callable[..., TrackingProblem]:
     def make(order, seed, weight=1e-3, low_frequency_weight=0.0, **kind) -> TrackingProblem:
         weights = TrackingWeights(weight, low_frequency_weight=low_frequency_weight)
-        return augmented(random_model(order, seed, **kind), weights)
+        return make_tracking_problem(random_model(order, seed, **kind), weights)
 
     return make
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical.open_tolerance import opened
+from equalizer.identification.mechanical.open_tolerance import widen_tolerance
 
 SEED = 4
 
@@ -20,7 +20,7 @@ def said(axes):
         given = axes.recorded(axes.Physics(**physics), SEED, seconds=10.0, rate_hz=200.0, noise=1e-4)
         response = replace(given.response, samples=changed(given.response.samples))
         recording = replace(given, response=response)
-        model = opened(fit_mechanical_model([recording], name="fitted").model)
+        model = widen_tolerance(fit_mechanical_model([recording], name="fitted").model)
         found = diagnose([recording], model, DiagnosisSettings(fitted=True), map, lambda said, share: None)
         return found.diagnosis
 

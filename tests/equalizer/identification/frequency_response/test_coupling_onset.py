@@ -6,7 +6,7 @@ import pytest
 from equalizer.identification.frequency_response.coupling import worst_coupling
 from equalizer.identification.frequency_response.coupling_onset import OnsetRule, coupling_onset
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 
 
 def response_of(coupling, frequency_hz, noise=1e-4, seed=1) -> FrequencyResponse:
@@ -104,7 +104,7 @@ def test_the_synthetic_device_couples_from_nine_hertz_on(plants, synthetic):
     exact = worst_coupling(plants.omega_like().response(fine))
     mean = [exact[np.abs(np.log2(fine / at)) < 1 / 24].mean() for at in fine]
     true = fine[np.argmax(np.array(mean) > 0.25)]
-    found = coupling_onset(transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 30.0),)))
+    found = coupling_onset(estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 30.0),)))
     assert found.frequency_hz == pytest.approx(true, abs=0.04)
     assert found.interval_hz[0] < true < found.interval_hz[1]
     assert "25 %" in found.rule and "1/12 octave" in found.rule

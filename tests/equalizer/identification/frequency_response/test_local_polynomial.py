@@ -3,15 +3,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.frequency_response.local_polynomial import smoothed
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.local_polynomial import smooth_response
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 
 
 @pytest.fixture(scope="module")
 def pairs(plants, synthetic):
     """Estimates of 30 s sweeps of the fitted band, and what smoothing makes of them."""
-    estimates = [transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 30.0, seed=seed),)) for seed in range(3)]
-    return [(estimate, smoothed(estimate)) for estimate in estimates]
+    estimates = [estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 30.0, seed=seed),)) for seed in range(3)]
+    return [(estimate, smooth_response(estimate)) for estimate in estimates]
 
 
 def test_the_error_falls_by_the_factor_of_seventeen_lines_and_a_parabola(pairs, plants, synthetic):
@@ -41,7 +41,7 @@ def test_the_variance_of_the_smooth_response_is_that_of_its_errors(pairs, plants
 
 def test_without_noise_a_peak_that_is_too_narrow_shows_in_the_variance(plants, synthetic):
     """Lines 0.2 Hz apart: seventeen of them span the whole resonance."""
-    smooth = smoothed(transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 5.0, noise=0.0),)))
+    smooth = smooth_response(estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0, noise=0.0),)))
     peak = smooth.within(10.0, 12.0)
     left = np.abs(peak.response - plants.omega_like().response(peak.frequency_hz)) ** 2
     assert left.mean() < 4 * peak.noise_variance.mean()
@@ -52,7 +52,7 @@ def test_a_parabola_is_left_as_it_is(pairs):
     estimate = pairs[0][0]
     parabola = (1 + 2j) * (estimate.frequency_hz - 9.0) ** 2 + 3.0
     exact = replace(estimate, response=np.broadcast_to(parabola[:, None, None], estimate.response.shape))
-    assert np.allclose(smoothed(exact).response, exact.response, rtol=1e-9)
+    assert np.allclose(smooth_response(exact).response, exact.response, rtol=1e-9)
 
 
 def test_frequencies_reliability_and_channels_stay_and_a_remark_says_what_was_done(pairs):
@@ -65,6 +65,6 @@ def test_frequencies_reliability_and_channels_stay_and_a_remark_says_what_was_do
 def test_too_few_lines_are_refused(pairs):
     estimate = pairs[0][0]
     with pytest.raises(ValueError, match="smoothing takes 17 lines at a time, but there are 16"):
-        smoothed(estimate.of_lines(np.arange(len(estimate)) < 16))
+        smooth_response(estimate.of_lines(np.arange(len(estimate)) < 16))
     with pytest.raises(ValueError, match="a polynomial of order 2 needs more than 3 lines"):
-        smoothed(estimate, neighbours=1)
+        smooth_response(estimate, neighbours=1)

@@ -3,7 +3,7 @@ import pytest
 
 from equalizer.identification.frequency_response.resonances import COUPLING, GAIN, ResonanceSearch, find_resonances
 from equalizer.identification.frequency_response.single_mode import fit_single_mode
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 
 
 @pytest.fixture(scope="module")
@@ -11,7 +11,7 @@ def found(plants, synthetic):
     """From 1 to 500 Hz, five seeds."""
     search = ResonanceSearch(draws=60)
     return [
-        find_resonances(transfer_estimate((synthetic.sweeps(plants, 1.0, 500.0, 20.0, seed=seed),)), search)
+        find_resonances(estimate_transfer((synthetic.sweeps(plants, 1.0, 500.0, 20.0, seed=seed),)), search)
         for seed in range(5)
     ]
 
@@ -66,16 +66,16 @@ def test_intervals_are_as_wide_as_the_estimates_spread(found):
 
 
 def test_nothing_is_found_where_there_is_only_a_slope(plants, synthetic):
-    band = transfer_estimate((synthetic.sweeps(plants, 4.5, 8.5, 10.0),)).within(4.6, 8.4)
+    band = estimate_transfer((synthetic.sweeps(plants, 4.5, 8.5, 10.0),)).within(4.6, 8.4)
     assert find_resonances(band) == ()
 
 
 def test_peaks_lower_than_asked_are_passed_over(plants, synthetic):
-    estimate = transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 10.0),))
+    estimate = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 10.0),))
     prominent = find_resonances(estimate, ResonanceSearch(prominence_db=15.0))
     assert len(prominent) < len(find_resonances(estimate))
 
 
 def test_without_a_reliable_line_there_is_nothing_to_find(plants, synthetic):
-    estimate = transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 5.0),))
+    estimate = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0),))
     assert find_resonances(estimate.of_lines(~estimate.reliable).within(0.0, 3.0)) == ()

@@ -8,7 +8,7 @@ import pytest
 from equalizer.identification.frequency_response.transfer_estimate import (
     EstimateSettings,
     TransferEstimateError,
-    transfer_estimate,
+    estimate_transfer,
 )
 from equalizer.signals.multisine import lines_between, multisines
 from equalizer.signals.recording import Segment
@@ -35,14 +35,14 @@ def random_multisines(plants, odd=False):
 
 
 def test_without_noise_the_truth_comes_out(plants, synthetic):
-    estimate = transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 5.0, noise=0.0),))
+    estimate = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0, noise=0.0),))
     assert synthetic.errors(estimate, plants.omega_like()).max() < 1e-6
     assert (estimate.input_channels, estimate.output_channels) == (synthetic.FORCES, synthetic.ACCELERATIONS)
     assert (estimate.input_unit, estimate.output_unit) == ("N", "m/s^2")
 
 
 def test_the_sweeps_of_the_notes_reach_about_one_percent(plants, synthetic):
-    estimate = transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 30.0),))
+    estimate = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 30.0),))
     assert 0.008 < synthetic.rms_error(estimate, plants.omega_like()) < 0.012
     assert synthetic.errors(estimate, plants.omega_like()).max() < 0.032
 
@@ -53,14 +53,14 @@ def test_the_stated_variance_is_the_variance_of_the_errors(plants, synthetic, pe
     truth, ratios = plants.omega_like(), []
     for seed in range(5):
         recording = synthetic.sweeps(plants, 4.5, 37.0, 5.0, seed=seed, periods=periods)
-        band = transfer_estimate((recording,), EstimateSettings()).within(5.0, 35.0)
+        band = estimate_transfer((recording,), EstimateSettings()).within(5.0, 35.0)
         ratios.append(np.abs(band.response - truth.response(band.frequency_hz)) ** 2 / band.noise_variance)
     assert lowest < np.mean(ratios) < highest
 
 
 def test_noise_that_is_ten_times_smaller_is_said_to_be(plants, synthetic):
     loud, quiet = (
-        transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=3, noise=noise),)).within(5.0, 35.0)
+        estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=3, noise=noise),)).within(5.0, 35.0)
         for noise in (1.0, 0.1)
     )
     assert np.median(loud.noise_variance / quiet.noise_variance) == pytest.approx(100.0, rel=0.05)
@@ -72,21 +72,21 @@ def test_a_smooth_estimate_of_one_period_is_at_least_as_noisy_as_the_rest_before
     samples = recording.response.samples.copy()
     samples[: synthetic.REST] = np.random.default_rng(3).standard_normal((synthetic.REST, 3)) * plants.SENSOR_RMS
     noisy = replace(recording, response=replace(recording.response, samples=samples))
-    without, with_rest = (transfer_estimate((each,)).within(5.0, 35.0) for each in (recording, noisy))
+    without, with_rest = (estimate_transfer((each,)).within(5.0, 35.0) for each in (recording, noisy))
     assert np.median(with_rest.noise_variance) > 20 * np.median(without.noise_variance)
 
 
 def test_a_spring_drops_out_of_the_estimate(plants, synthetic):
     recording = synthetic.under_a_spring(plants, synthetic.axes(plants.sweep(4.5, 37.0, 5.0)), 300.0, noise=0.0)
-    estimate = transfer_estimate((recording,))
+    estimate = estimate_transfer((recording,))
     assert synthetic.errors(estimate, plants.omega_like()).max() < 1e-6
     naive = replace(recording, command=recording.excitation)
-    assert synthetic.errors(transfer_estimate((naive,)), plants.omega_like()).max() > 0.1
+    assert synthetic.errors(estimate_transfer((naive,)), plants.omega_like()).max() > 0.1
 
 
 def test_below_the_spring_lines_are_not_reliable_and_a_remark_says_so(plants, synthetic):
     recording = replace(synthetic.sweeps(plants, 1.0, 37.0, 5.0), meta={"feedback": {"natural_frequency_hz": 3.5}})
-    estimate = transfer_estimate((replace(recording, excitation=recording.command),))
+    estimate = estimate_transfer((replace(recording, excitation=recording.command),))
     assert not estimate.reliable[estimate.frequency_hz < 3.85].any()
     assert estimate.reliable[(estimate.frequency_hz > 3.9) & (estimate.frequency_hz < 35.0)].all()
     assert any("virtual spring (3.5 Hz)" in remark for remark in estimate.remarks)
@@ -95,11 +95,11 @@ def test_below_the_spring_lines_are_not_reliable_and_a_remark_says_so(plants, sy
 def test_a_spring_whose_share_was_not_recorded_is_remarked(plants, synthetic):
     recording = synthetic.sweeps(plants, 4.5, 37.0, 5.0)
     sprung = replace(recording, meta={"feedback": {"natural_frequency_hz": 3.5}})
-    assert any("was not recorded" in remark for remark in transfer_estimate((sprung,)).remarks)
+    assert any("was not recorded" in remark for remark in estimate_transfer((sprung,)).remarks)
 
 
 def test_lines_outside_the_sweep_are_not_reliable(plants, synthetic):
-    estimate = transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 5.0),))
+    estimate = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0),))
     inside = estimate.frequency_hz[estimate.reliable]
     assert 3.8 < inside.min() < 4.6
     assert 36.5 < inside.max() < 39.0
@@ -107,25 +107,25 @@ def test_lines_outside_the_sweep_are_not_reliable(plants, synthetic):
 
 
 def test_lines_that_drown_in_noise_are_not_reliable(plants, synthetic):
-    estimate = transfer_estimate((synthetic.sweeps(plants, 1.0, 400.0, 5.0, periods=3, noise=20.0),))
+    estimate = estimate_transfer((synthetic.sweeps(plants, 1.0, 400.0, 5.0, periods=3, noise=20.0),))
     assert not estimate.reliable[estimate.frequency_hz < 2.0].any()
     assert (estimate.coherence[estimate.reliable] >= 0.5).all()
     assert any("noise is more than 50 %" in remark for remark in estimate.remarks)
 
 
 def test_coherence_is_high_where_the_noise_is_low(plants, synthetic):
-    band = transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=3),)).within(5.0, 35.0)
+    band = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=3),)).within(5.0, 35.0)
     assert band.coherence.min() > 0.98
 
 
 def test_multisines_with_phases_of_their_own_tell_all_axes(plants, synthetic):
     recording = synthetic.played(plants, random_multisines(plants), kind="multisine", noise=0.0)
-    assert synthetic.errors(transfer_estimate((recording,)), plants.omega_like()).max() < 1e-6
+    assert synthetic.errors(estimate_transfer((recording,)), plants.omega_like()).max() < 1e-6
 
 
 def test_lines_that_an_odd_multisine_leaves_silent_are_left_out(plants, synthetic):
     recording = synthetic.played(plants, random_multisines(plants, odd=True), kind="multisine")
-    band = transfer_estimate((recording,)).within(5.0, 35.0)
+    band = estimate_transfer((recording,)).within(5.0, 35.0)
     assert np.allclose(np.round(band.frequency_hz * 5.0) % 2, 1)
     # Phases drawn at random are nearly the same in two experiments at some lines.
     assert 0.5 < band.reliable.mean() < 1.0
@@ -134,7 +134,7 @@ def test_lines_that_an_odd_multisine_leaves_silent_are_left_out(plants, syntheti
 
 def test_recordings_of_different_periods_meet_at_the_lines_that_they_share(plants, synthetic):
     long, short = (synthetic.sweeps(plants, 4.5, 37.0, seconds, seed=int(seconds)) for seconds in (6.0, 4.0))
-    alone, together = transfer_estimate((long,)), transfer_estimate((long, short))
+    alone, together = estimate_transfer((long,)), estimate_transfer((long, short))
     # Every sixth of a hertz, every fourth, and once where both meet: at the halves.
     assert len(together.within(5.0, 34.9)) == 180 + 120 - 60
     shared = np.isclose(together.frequency_hz * 2 % 1, 0) & together.reliable
@@ -146,18 +146,18 @@ def test_recordings_of_different_periods_meet_at_the_lines_that_they_share(plant
 def test_axes_recorded_apart_are_joined(plants, synthetic):
     waves = synthetic.axes(plants.sweep(4.5, 37.0, 5.0))
     parts = tuple(synthetic.played(plants, [wave], noise=0.0) for wave in waves)
-    assert synthetic.errors(transfer_estimate(parts), plants.omega_like()).max() < 1e-6
+    assert synthetic.errors(estimate_transfer(parts), plants.omega_like()).max() < 1e-6
 
 
 def test_a_period_with_a_gap_is_left_out(plants, synthetic):
     recording = synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=3, noise=0.0)
-    estimate = transfer_estimate((with_gap(recording, synthetic.REST + 5500),))
+    estimate = estimate_transfer((with_gap(recording, synthetic.REST + 5500),))
     assert synthetic.errors(estimate, plants.omega_like()).max() < 1e-6
     assert "One period was left out, because samples are missing in it." in estimate.remarks
 
 
 def test_a_single_period_is_kept_with_a_remark(plants, synthetic):
-    estimate = transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=1, noise=0.0),))
+    estimate = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=1, noise=0.0),))
     assert 1e-4 < synthetic.rms_error(estimate, plants.omega_like()) < 0.05
     assert any("3 segments had one usable period only" in remark for remark in estimate.remarks)
 
@@ -166,14 +166,14 @@ def test_what_is_kept_for_testing_is_not_used(plants, synthetic):
     recording = synthetic.sweeps(plants, 4.5, 37.0, 5.0)
     kept = tuple(replace(segment, role="test") for segment in recording.segments[:1])
     with pytest.raises(TransferEstimateError, match="3 inputs need 3 independent experiments"):
-        transfer_estimate((replace(recording, segments=kept + recording.segments[1:]),))
+        estimate_transfer((replace(recording, segments=kept + recording.segments[1:]),))
 
 
 def test_noise_of_others_is_averaged_over_windows(plants, synthetic):
     command = np.random.default_rng(5).standard_normal((60_000, 3))
     sensor = np.random.default_rng(6).standard_normal(command.shape) * plants.SENSOR_RMS
     recording = synthetic.recording_of(command, plants.omega_like().play(command) + sensor)
-    band = transfer_estimate((recording,)).within(5.0, 35.0)
+    band = estimate_transfer((recording,)).within(5.0, 35.0)
     true = plants.omega_like().response(band.frequency_hz)
     assert synthetic.rms_error(band, plants.omega_like()) < 0.12
     assert 0.5 < np.mean(np.abs(band.response - true) ** 2 / band.noise_variance) < 2.0
@@ -186,7 +186,7 @@ def test_a_single_axis_device_needs_one_experiment(plants, synthetic):
     one = replace(
         synthetic.recording_of(whole.command.samples[:, :1], whole.response.samples[:, :2]), segments=whole.segments[:1]
     )
-    band = transfer_estimate((one,)).within(5.0, 35.0)
+    band = estimate_transfer((one,)).within(5.0, 35.0)
     true = plants.omega_like().response(band.frequency_hz)[:, :2, :1]
     assert np.abs(band.response / true - 1).max() < 1e-4
 
@@ -194,15 +194,15 @@ def test_a_single_axis_device_needs_one_experiment(plants, synthetic):
 def test_nothing_that_tells_is_refused_with_what_would_do(plants, synthetic):
     quiet = synthetic.recording_of(np.zeros((2000, 3)), np.zeros((2000, 3)), (Segment(0, 2000, "rest"),))
     with pytest.raises(TransferEstimateError, match="record a sweep or a multisine along every axis"):
-        transfer_estimate((quiet,))
+        estimate_transfer((quiet,))
     with pytest.raises(TransferEstimateError, match="there is no recording"):
-        transfer_estimate(())
+        estimate_transfer(())
 
 
 def test_one_axis_driven_three_times_is_refused(plants, synthetic):
     wave = plants.sweep(4.5, 37.0, 3.0)[:, None] * np.eye(3)[0]
     with pytest.raises(TransferEstimateError, match="Record every axis by itself"):
-        transfer_estimate((synthetic.played(plants, [wave] * 3),))
+        estimate_transfer((synthetic.played(plants, [wave] * 3),))
 
 
 def test_recordings_that_do_not_belong_together_are_refused(plants, synthetic):
@@ -210,12 +210,12 @@ def test_recordings_that_do_not_belong_together_are_refused(plants, synthetic):
     faster = synthetic.recording_of(np.zeros((10, 3)), np.zeros((10, 3)))
     volts = Signal(faster.command.samples, 1000.0, "voltage", "V", ("a", "b", "c"))
     with pytest.raises(TransferEstimateError, match="recording 2 has the command channels a, b, c in V"):
-        transfer_estimate((first, replace(faster, command=volts)))
+        estimate_transfer((first, replace(faster, command=volts)))
 
 
 def test_orthogonal_multisines_leave_no_line_without_all_directions(plants, synthetic):
     lines = lines_between(4.5, 37.0, 5000, synthetic.RATE, odd_only=True)
     waves = multisines(lines, 5000, 1.5, 3, 3, seed=4)
-    band = transfer_estimate((synthetic.played(plants, waves, kind="multisine"),)).within(5.0, 35.0)
+    band = estimate_transfer((synthetic.played(plants, waves, kind="multisine"),)).within(5.0, 35.0)
     assert band.reliable.all()
     assert synthetic.errors(band, plants.omega_like()).max() < 0.06

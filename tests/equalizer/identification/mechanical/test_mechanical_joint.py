@@ -5,8 +5,8 @@ import pytest
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings
-from equalizer.identification.mechanical.mechanical_level import without_friction
-from equalizer.identification.mechanical.mechanical_structure import across_joint
+from equalizer.identification.mechanical.mechanical_level import remove_friction_damping
+from equalizer.identification.mechanical.mechanical_structure import insert_joint
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
@@ -30,7 +30,7 @@ def played(model, commands) -> np.ndarray:
 
 
 def test_all_the_mass_moves_as_one_below_the_joint_and_damping_stays_at_the_drive():
-    joined = across_joint(one_piece(), 1, 2e4 * ONE, 1e-4)
+    joined = insert_joint(one_piece(), 1, 2e4 * ONE, 1e-4)
     assert joined.mass.sum() == pytest.approx(0.28)
     np.testing.assert_allclose(joined.stiffness.sum(axis=0), 0.0)
     assert joined.damping.sum() == pytest.approx(9.0)
@@ -72,6 +72,6 @@ def test_mass_damping_and_resonance_are_recovered_across_a_joint(motor, handle):
 
 
 def test_what_is_frictions_is_taken_off_where_the_drive_is():
-    joined = across_joint(one_piece(), 1, 2e4 * ONE, 1e-4)
-    freed = without_friction(joined, np.array([4.0]))
+    joined = insert_joint(one_piece(), 1, 2e4 * ONE, 1e-4)
+    freed = remove_friction_damping(joined, np.array([4.0]))
     np.testing.assert_allclose(joined.damping - freed.damping, [[4.0, 0.0], [0.0, 0.0]], atol=1e-9)

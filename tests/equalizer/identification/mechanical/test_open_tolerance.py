@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.mechanical.open_tolerance import opened
+from equalizer.identification.mechanical.open_tolerance import widen_tolerance
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 
 ONE = np.eye(2)
@@ -19,7 +19,7 @@ def fitted() -> MechanicalModel:
 
 
 def test_damping_is_opened_by_half_so_that_friction_can_be_told_from_it():
-    tolerance = opened(fitted()).tolerance
+    tolerance = widen_tolerance(fitted()).tolerance
     assert tolerance is not None
     assert tolerance.mass_kg == pytest.approx(0.03)
     assert tolerance.damping_n_s_per_m == pytest.approx(4.0)
@@ -29,5 +29,5 @@ def test_damping_is_opened_by_half_so_that_friction_can_be_told_from_it():
 
 def test_a_tolerance_that_is_wider_already_stays():
     wide = replace(fitted(), tolerance=Tolerance(damping_n_s_per_m=9.0))
-    tolerance = opened(wide).tolerance
+    tolerance = widen_tolerance(wide).tolerance
     assert tolerance is not None and tolerance.damping_n_s_per_m == 9.0 and tolerance.modes == 0.03

@@ -7,7 +7,7 @@ import pytest
 
 from equalizer.identification.state_space.canonical_variate import (
     canonical_variate,
-    decimation,
+    decimation_factor,
     driven_records,
     poles_and_shapes,
 )
@@ -59,8 +59,8 @@ def turned(pole):
 
 
 def test_the_rate_is_brought_down_to_the_band():
-    assert decimation(1000.0, 35.0) == 8
-    assert decimation(1000.0, 450.0) == 1
+    assert decimation_factor(1000.0, 35.0) == 8
+    assert decimation_factor(1000.0, 450.0) == 1
 
 
 def test_test_segments_rest_and_holes_are_left_out(plants, synthetic):

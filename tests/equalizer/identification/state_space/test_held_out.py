@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.state_space.held_out import held_out
+from equalizer.identification.state_space.held_out import validate_on_test
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -30,7 +30,7 @@ def recorded(plants, periods: int, period: int, seed: int = 3, role: str = "test
 
 
 def test_the_truth_errs_by_the_noise_and_no_more(plants, truth):
-    found = held_out(truth, [recorded(plants, periods=3, period=4000)])
+    found = validate_on_test(truth, [recorded(plants, periods=3, period=4000)])
     assert found.seconds == 4.0
     assert found.error == pytest.approx(found.noise, rel=0.15)
     assert found.error < 0.02
@@ -38,17 +38,17 @@ def test_the_truth_errs_by_the_noise_and_no_more(plants, truth):
 
 def test_a_wrong_gain_is_seen_as_what_it_is(plants, truth):
     wrong = replace(truth, C=1.1 * truth.C)
-    assert held_out(wrong, [recorded(plants, periods=3, period=4000)]).error == pytest.approx(0.1, abs=0.005)
+    assert validate_on_test(wrong, [recorded(plants, periods=3, period=4000)]).error == pytest.approx(0.1, abs=0.005)
 
 
 def test_what_is_not_periodic_is_compared_whole_and_tells_no_noise(plants, truth):
-    found = held_out(truth, [recorded(plants, periods=1, period=0)])
+    found = validate_on_test(truth, [recorded(plants, periods=1, period=0)])
     assert found.noise is None
     assert found.error < 0.03
 
 
 def test_without_a_test_segment_there_is_nothing_to_say(plants, truth):
-    assert held_out(truth, [recorded(plants, periods=2, period=4000, role="fit")]) is None
+    assert validate_on_test(truth, [recorded(plants, periods=2, period=4000, role="fit")]) is None
 
 
 def test_missing_samples_and_other_devices_are_refused(plants, truth):
@@ -56,6 +56,6 @@ def test_missing_samples_and_other_devices_are_refused(plants, truth):
     holes = good.response.samples.copy()
     holes[5000] = np.nan
     with pytest.raises(ValueError, match="missing values"):
-        held_out(truth, [replace(good, response=replace(good.response, samples=holes))])
+        validate_on_test(truth, [replace(good, response=replace(good.response, samples=holes))])
     with pytest.raises(ValueError, match="cannot test a model at 500"):
-        held_out(replace(truth, sample_rate_hz=500.0), [good])
+        validate_on_test(replace(truth, sample_rate_hz=500.0), [good])

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
-from equalizer.identification.state_space.candidates import best
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
+from equalizer.identification.state_space.candidates import choose_best
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.refusals import IdentificationRefused
 from equalizer.identification.state_space.settings import IdentificationSettings
@@ -105,7 +105,7 @@ def test_time_records_give_a_start_of_their_own(plants, measuring, synthetic, ce
     recording = synthetic.sweeps(plants, 4.5, 37.0, 20.0, seed=4)
     settings = replace(QUICK, order=20)
     heard: list[float] = []
-    found = identify(transfer_estimate([recording]), settings, (recording,), heard.append)
+    found = identify(estimate_transfer([recording]), settings, (recording,), heard.append)
     assert [candidate.name for candidate in found.candidates] == [
         "warped subspace, horizon 10",
         "canonical variates, horizon 16",
@@ -123,5 +123,5 @@ def test_records_of_something_else_are_refused(plants, synthetic, response):
 def test_a_fit_by_cancellation_is_chosen_last_and_named(response, found):
     assert found.chosen.sane
     wild = [replace(found.chosen, outside_gain=1e4, cost=0.1), found.chosen]
-    assert best(wild) is found.chosen
-    assert best(wild[:1]) is wild[0]
+    assert choose_best(wild) is found.chosen
+    assert choose_best(wild[:1]) is wild[0]

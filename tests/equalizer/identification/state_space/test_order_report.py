@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from equalizer.identification.state_space.order_report import dense_multiply_adds, multiply_adds, order_report
+from equalizer.identification.state_space.order_report import compare_orders, dense_multiply_adds, multiply_adds
 
 
 @pytest.fixture(scope="module")
 def report(plants, measuring):
     plant = measuring.small_plant(plants)
-    return order_report(measuring.noisy(plant, np.arange(4.6, 38, 0.05), 0.3, 4), orders=(8, 4, 6, 12))
+    return compare_orders(measuring.noisy(plant, np.arange(4.6, 38, 0.05), 0.3, 4), orders=(8, 4, 6, 12))
 
 
 def test_the_true_order_is_seen_and_suggested(report):
@@ -33,5 +33,5 @@ def test_a_tick_costs_what_its_matrices_cost(report):
 def test_the_share_done_is_told(plants, measuring):
     heard: list[float] = []
     response = measuring.noisy(measuring.small_plant(plants), np.arange(4.6, 38, 0.2), 0.3, 4)
-    order_report(response, orders=(4, 6), on_progress=heard.append)
+    compare_orders(response, orders=(4, 6), on_progress=heard.append)
     assert heard == [0.0, 0.5, 1.0]

@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from equalizer.identification.state_space.modal_form import ModalForm, modal_form
-from equalizer.identification.state_space.refinement import fitted, input_matrices, refine
+from equalizer.identification.state_space.refinement import complete_form, refine, solve_input_matrices
 from equalizer.identification.state_space.stable_poles import largest_radius
-from equalizer.identification.state_space.weighted_lines import weighted_lines
+from equalizer.identification.state_space.weighted_lines import weight_lines
 
 RADIUS = largest_radius(0.5, 1000.0)
 
@@ -19,7 +19,7 @@ def plant(plants, measuring):
 
 @pytest.fixture(scope="module")
 def lines(measuring, plant):
-    return weighted_lines([measuring.noisy(plant, np.arange(5, 35, 0.2), 0.3, seed=7)], (5.0, 35.0))
+    return weight_lines([measuring.noisy(plant, np.arange(5, 35, 0.2), 0.3, seed=7)], (5.0, 35.0))
 
 
 def disturbed(plant, seed, size):
@@ -30,9 +30,9 @@ def disturbed(plant, seed, size):
 
 
 def test_input_matrices_are_exact_where_poles_and_outputs_are(measuring, plant):
-    exact = weighted_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
+    exact = weight_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
     form = modal_form(plant.A, plant.C)
-    B, D = input_matrices(form, exact)
+    B, D = solve_input_matrices(form, exact)
     assert np.abs(form.from_states(exact.z) @ B + D - exact.response).max() < 1e-9 * np.abs(exact.response).max()
     assert np.abs(D).max() < 1e-8 * np.abs(exact.response).max()
 
@@ -49,7 +49,7 @@ def test_a_general_optimizer_finds_nothing_cheaper(plant, lines):
         return np.concatenate([errors.real.ravel(), errors.imag.ravel()])
 
     ours = lines.cost(found.response(lines.z))
-    for each in (found, fitted(start, lines)):
+    for each in (found, complete_form(start, lines)):
         numbers = np.concatenate([part.ravel() for part in (each.form.a, each.form.b, each.form.C, each.B, each.D)])
         theirs = 2 * least_squares(residuals, numbers, x_scale="jac", max_nfev=60).cost
         assert ours <= theirs * (1 + 1e-5)
@@ -59,11 +59,11 @@ def test_a_step_is_taken_only_if_it_lowers_the_cost(plant, lines):
     start = disturbed(plant, 2, 0.05)
     costs = [lines.cost(refine(start, lines, RADIUS, steps).response(lines.z)) for steps in (1, 2, 4, 8, 30)]
     assert costs == sorted(costs, reverse=True)
-    assert costs[-1] < 0.5 * lines.cost(fitted(start, lines).response(lines.z))
+    assert costs[-1] < 0.5 * lines.cost(complete_form(start, lines).response(lines.z))
 
 
 def test_the_bound_holds_where_the_data_ask_for_a_slower_pole(measuring, plant):
-    lines = weighted_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
+    lines = weight_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
     radius = largest_radius(0.02, 1000.0)
     assert np.abs(np.linalg.eigvals(plant.A)).max() > radius
     found = refine(modal_form(0.9 * plant.A, plant.C), lines, radius)

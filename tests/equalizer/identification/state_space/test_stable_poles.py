@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equalizer.identification.state_space.stable_poles import bounded_blocks, largest_radius, reflected
+from equalizer.identification.state_space.stable_poles import largest_radius, stabilise_blocks, stabilise_poles
 
 PARTS = st.floats(-3, 3)
 
@@ -16,19 +16,19 @@ def test_a_pole_at_the_bound_falls_to_one_over_e_in_the_time_given():
 
 def test_an_unstable_pole_is_mirrored_and_a_stable_one_left_alone():
     poles = np.array([2.0 + 0j, 0.3 + 0.4j, 1.25j])
-    np.testing.assert_allclose(reflected(poles, 0.999), [0.5, 0.3 + 0.4j, 0.8j])
+    np.testing.assert_allclose(stabilise_poles(poles, 0.999), [0.5, 0.3 + 0.4j, 0.8j])
 
 
 def test_a_mirrored_pole_too_close_to_the_circle_goes_to_the_bound():
-    assert np.abs(reflected(np.array([1.0001 + 0j]), 0.998))[0] == pytest.approx(0.998)
+    assert np.abs(stabilise_poles(np.array([1.0001 + 0j]), 0.998))[0] == pytest.approx(0.998)
 
 
 @given(a=PARTS, b=PARTS)
 @settings(max_examples=100, deadline=None)
 def test_blocks_end_within_the_bound_and_stay_where_they_were_inside_it(a, b):
     radius = 0.99
-    new_a, new_b = bounded_blocks(np.array([a]), np.array([b]), radius)
+    new_a, new_b = stabilise_blocks(np.array([a]), np.array([b]), radius)
     root = np.sqrt(new_b.astype(complex))
     assert max(abs(new_a + root)[0], abs(new_a - root)[0]) <= radius * (1 + 1e-7)
-    again_a, again_b = bounded_blocks(new_a, new_b, radius)
+    again_a, again_b = stabilise_blocks(new_a, new_b, radius)
     np.testing.assert_allclose([again_a, again_b], [new_a, new_b], atol=1e-6)

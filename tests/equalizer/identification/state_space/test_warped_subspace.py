@@ -5,11 +5,11 @@ import pytest
 
 from equalizer.identification.state_space.warped_subspace import (
     default_horizon,
+    estimate_subspace,
     poles_and_shapes,
     warp_coefficient,
-    warped_subspace,
 )
-from equalizer.identification.state_space.weighted_lines import weighted_lines
+from equalizer.identification.state_space.weighted_lines import weight_lines
 
 BAND = (5.0, 35.0)
 
@@ -21,15 +21,15 @@ def test_the_map_puts_the_centre_of_the_band_at_a_quarter_turn():
 
 def test_poles_come_out_exactly_where_there_is_no_noise(plants, measuring):
     plant = measuring.small_plant(plants)
-    lines = weighted_lines([measuring.exact(plant, np.arange(5, 35, 0.1))], BAND)
-    form = poles_and_shapes(warped_subspace(lines, default_horizon(6, 3), 13.2), 6, 0.9999)
+    lines = weight_lines([measuring.exact(plant, np.arange(5, 35, 0.1))], BAND)
+    form = poles_and_shapes(estimate_subspace(lines, default_horizon(6, 3), 13.2), 6, 0.9999)
     np.testing.assert_allclose(np.sort_complex(form.poles), np.sort_complex(np.linalg.eigvals(plant.A)), atol=1e-9)
 
 
 def test_singular_values_stand_clear_of_the_noise_as_often_as_there_are_states(plants, measuring):
     plant = measuring.small_plant(plants)
-    lines = weighted_lines([measuring.noisy(plant, np.arange(5, 35, 0.05), 0.3, seed=5)], BAND)
-    values = warped_subspace(lines, 8, 13.2).singular_values
+    lines = weight_lines([measuring.noisy(plant, np.arange(5, 35, 0.05), 0.3, seed=5)], BAND)
+    values = estimate_subspace(lines, 8, 13.2).singular_values
     assert values[5] > 2
     assert values[6:] == pytest.approx(1.0, abs=0.3)
 
@@ -39,7 +39,7 @@ def test_pure_noise_shows_no_state(measuring):
     frequency = np.arange(5, 35, 0.05)
     real, imaginary = random.standard_normal((2, len(frequency), 3, 3))
     noise = measuring.response_of(frequency, (real + 1j * imaginary) / np.sqrt(2), 1.0)
-    values = warped_subspace(weighted_lines([noise], BAND), 8, 13.2).singular_values
+    values = estimate_subspace(weight_lines([noise], BAND), 8, 13.2).singular_values
     assert values.max() < 1.3
 
 
@@ -50,8 +50,8 @@ def test_outputs_of_very_different_noise_are_brought_to_one_measure(plants, meas
     random = np.random.default_rng(9)
     real, imaginary = random.standard_normal((2, len(frequency), 3, 3))
     values = plant.response(frequency) + deviation * (real + 1j * imaginary) / np.sqrt(2)
-    lines = weighted_lines([measuring.response_of(frequency, values, deviation**2)], BAND)
-    subspace = warped_subspace(lines, 8, 13.2)
+    lines = weight_lines([measuring.response_of(frequency, values, deviation**2)], BAND)
+    subspace = estimate_subspace(lines, 8, 13.2)
     assert subspace.singular_values[7:] == pytest.approx(1.0, abs=0.3)
     found = np.sort_complex(poles_and_shapes(subspace, 6, 0.9999).poles)
     np.testing.assert_allclose(found, np.sort_complex(np.linalg.eigvals(plant.A)), atol=4e-3)

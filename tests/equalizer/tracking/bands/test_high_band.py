@@ -6,11 +6,11 @@ from equalizer.tracking.bands.high_band import (
     HighBandSettings,
     MeasuredResponse,
     ModelledResponse,
-    delivered,
     high_band_forces,
     minimum_phase,
-    one_dof,
-    one_dof_at_once,
+    predict_acceleration,
+    project_to_one_dof,
+    reduce_to_one_dof,
 )
 
 RATE_HZ = 1000.0
@@ -36,18 +36,18 @@ def levels(samples):
 
 def test_one_degree_of_freedom_keeps_the_energy_of_every_line():
     wanted = np.random.default_rng(2).standard_normal((1000, 3))
-    assert levels(one_dof(wanted)) == pytest.approx(levels(wanted), rel=1e-9)
+    assert levels(reduce_to_one_dof(wanted)) == pytest.approx(levels(wanted), rel=1e-9)
     opposed = np.column_stack([wanted[:, 0], -wanted[:, 0], np.zeros(1000)])
-    assert levels(one_dof(opposed)) == pytest.approx(levels(opposed), rel=1e-6)
+    assert levels(reduce_to_one_dof(opposed)) == pytest.approx(levels(opposed), rel=1e-6)
 
 
 def test_one_degree_of_freedom_at_once_keeps_energy_and_onset():
     wanted = np.random.default_rng(2).standard_normal((1000, 3))
     wanted[:400] = 0
-    signal = one_dof_at_once(wanted)
+    signal = project_to_one_dof(wanted)
     assert np.linalg.norm(signal) == pytest.approx(np.linalg.norm(wanted))
     assert not signal[:400].any()
-    assert not one_dof_at_once(np.zeros((10, 3))).any()
+    assert not project_to_one_dof(np.zeros((10, 3))).any()
 
 
 @pytest.mark.parametrize("shared", [True, False])
@@ -96,7 +96,7 @@ def test_a_response_measured_at_lines_serves_like_a_model(device_model, source, 
 def test_what_is_delivered_is_what_the_device_plays(plants, source, burst):
     forces = high_band_forces(burst, RATE_HZ, source).forces
     played = plants.omega_like().play(forces)
-    assert np.linalg.norm(delivered(forces, RATE_HZ, source) - played) < 1e-6 * np.linalg.norm(played)
+    assert np.linalg.norm(predict_acceleration(forces, RATE_HZ, source) - played) < 1e-6 * np.linalg.norm(played)
 
 
 def test_minimum_phase_keeps_the_gain_and_is_causal():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
@@ -16,12 +16,12 @@ from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_roles import IN_MODEL, SENSORS
 from equalizer.tracking.compensation.known_forces import LAWS, deadband_share, equivalent_impedance
 from equalizer.tracking.compensation.known_physics import compensate
-from equalizer.tracking.compensation.without_effects import without_effects
+from equalizer.tracking.compensation.without_effects import subtract_effects
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.planned_motion import planned_motion
 from equalizer.tracking.learning.iteration import rms
 from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.tracking_problem import TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 RATE_HZ, BAND_HZ, AROUND, PERIOD = 1000.0, (5.0, 35.0), 300, 10_000
 FORCES, ACCELERATIONS = ("fx", "fy", "fz"), ("ax", "ay", "az")
@@ -57,7 +57,7 @@ def wanted() -> np.ndarray:
 
 
 def inverse(model, wanted) -> np.ndarray:
-    return track(stored_gains(augmented(model, TrackingWeights(weight=1e-3)), len(wanted)), wanted).forces
+    return track(stored_gains(make_tracking_problem(model, TrackingWeights(weight=1e-3)), len(wanted)), wanted).forces
 
 
 def error(device, forces, wanted) -> float:
@@ -92,7 +92,7 @@ def driven_together(plants, device, newtons=1.0) -> list[Recording]:
 
 def identified(recordings) -> IdentifiedModel:
     settings = IdentificationSettings(draws=0, longer_horizons=(0,), record_horizons=())
-    return identify(transfer_estimate(recordings), settings).model
+    return identify(estimate_transfer(recordings), settings).model
 
 
 @pytest.mark.parametrize(("level", "without", "with_it"), [(0.1, 0.15, 0.025), (0.3, 0.4, 0.04)])
@@ -107,7 +107,7 @@ def test_from_recordings_freed_of_friction_a_linear_model_is_identified(rubbing,
     device, known = rubbing.rubbing(plants.modes_of(), 0.1), physics(friction(0.1))
     recordings = driven_together(plants, device)
     as_recorded = identified(recordings)
-    freed = identified([without_effects(recording, known, (4.5, 37)) for recording in recordings])
+    freed = identified([subtract_effects(recording, known, (4.5, 37)) for recording in recordings])
     forces = compensate(inverse(freed, wanted), wanted, freed, known, None).forces
     assert error(device, inverse(as_recorded, wanted), wanted) > 0.07
     assert error(device, forces, wanted) < 0.03
@@ -262,15 +262,15 @@ def test_only_whole_recordings_of_accelerations_can_be_freed(rubbing, plants):
     recording = recorded(rubbing.rubbing(plants.modes_of(), 0.0), np.zeros((PERIOD, 3)), 1)
     positions = Signal(recording.response.samples, RATE_HZ, "position", "m", ("x", "y", "z"))
     with pytest.raises(ValueError, match="integrated from accelerations"):
-        without_effects(replace(recording, response=positions), physics(), (4.5, 37))
+        subtract_effects(replace(recording, response=positions), physics(), (4.5, 37))
     holed = recording.response.samples.copy()
     holed[5] = np.nan
     missing = replace(recording, response=replace(recording.response, samples=holed))
     with pytest.raises(ValueError, match="missing samples"):
-        without_effects(missing, physics(), (4.5, 37))
+        subtract_effects(missing, physics(), (4.5, 37))
 
 
 def test_a_recording_without_effects_stays_as_it_is(rubbing, plants):
     recording = recorded(rubbing.rubbing(plants.modes_of(), 0.0), plants.multisine(4.5, 37), 1)
-    freed = without_effects(recording, physics(effect("viscous_damping", damping=3.0)), (4.5, 37))
+    freed = subtract_effects(recording, physics(effect("viscous_damping", damping=3.0)), (4.5, 37))
     np.testing.assert_array_equal(freed.command.samples, recording.command.samples)

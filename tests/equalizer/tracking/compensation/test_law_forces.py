@@ -10,7 +10,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.known_physics import compensate
 from equalizer.tracking.compensation.law_forces import COMMANDS, FOLDED, REMEMBERS, SENSED, SEVERAL
-from equalizer.tracking.compensation.without_effects import without_effects
+from equalizer.tracking.compensation.without_effects import subtract_effects
 
 RATE_HZ, BAND_HZ, N = 1000.0, (5.0, 35.0), 1000
 FORCES, ACCELERATIONS = ("fx", "fy", "fz"), ("ax", "ay", "az")
@@ -59,7 +59,7 @@ def test_a_recording_is_freed_of_a_law_as_of_the_catalogues_same_law(text, named
         Signal(WANTED, RATE_HZ, "acceleration", "m/s^2", ACCELERATIONS),
     )
     one, other = (
-        without_effects(recording, physics(effect), (5.0, 35.0)).command.samples for effect in (found(text), named)
+        subtract_effects(recording, physics(effect), (5.0, 35.0)).command.samples for effect in (found(text), named)
     )
     assert np.std(other - PUSHED) > 0
     assert one == pytest.approx(other, abs=1e-9)

@@ -11,14 +11,14 @@ from equalizer.tracking.learning.iteration import (
     Repetition,
     Verdict,
     begin,
-    fitting_share,
+    largest_share,
     next_forces,
     noise_of_repeats,
     noise_of_rest,
     rms,
 )
 from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.tracking_problem import TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 RATE_HZ, BAND_HZ, AROUND = 1000.0, (5.0, 35.0), 300
 SEEDS = range(5)
@@ -43,7 +43,7 @@ def wanted() -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def invert(model, wanted):
-    gains = stored_gains(augmented(model, TrackingWeights(weight=1e-3)), len(wanted))
+    gains = stored_gains(make_tracking_problem(model, TrackingWeights(weight=1e-3)), len(wanted))
     return lambda rows: track(gains, rows).forces
 
 
@@ -229,15 +229,15 @@ def test_what_fits_under_a_cap_is_not_above_it_by_rounding():
     for seed in range(200):
         forces, correction = np.random.default_rng(seed).standard_normal((2, 20, 3))
         cap = 1.01 * float(np.linalg.norm(forces, axis=1).max())
-        fitted = forces + fitting_share(forces, 10 * correction, cap) * 10 * correction
+        fitted = forces + largest_share(forces, 10 * correction, cap) * 10 * correction
         assert np.linalg.norm(fitted, axis=1).max() <= cap
 
 
 def test_the_share_that_fits_ends_at_the_cap():
     forces, correction = np.array([[1.0, 0.0], [0.0, 0.5]]), np.array([[2.0, 1.0], [0.0, 0.1]])
-    share = fitting_share(forces, correction, 2.0)
+    share = largest_share(forces, correction, 2.0)
     assert np.linalg.norm(forces + share * correction, axis=1).max() == pytest.approx(2.0)
-    assert fitting_share(forces, correction, 10.0) == 1.0
+    assert largest_share(forces, correction, 10.0) == 1.0
 
 
 def test_first_forces_above_the_cap_are_refused(repetition, wanted):

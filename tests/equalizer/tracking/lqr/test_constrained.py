@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from equalizer.tracking.lqr.constrained import CapSettings, constrained_track
+from equalizer.tracking.lqr.constrained import CapSettings, track_under_cap
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.toeplitz import block_toeplitz
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 
 def walk(samples, seed):
@@ -47,7 +47,7 @@ def test_the_capped_forces_are_those_of_a_dense_solver(problem_of, share, seed, 
     problem, wanted = problem_of(6, seed, 1e-2, low_frequency_weight), walk(14, seed)
     cap_n = share * free_peak(problem, wanted)
     already = 0.3 * cap_n * np.sin(np.arange(14))[:, None] * np.array([0.6, 0.0, 0.8])
-    capped = constrained_track(problem, wanted, cap_n, already, CapSettings(gap=1e-10, rounds=20000))
+    capped = track_under_cap(problem, wanted, cap_n, already, CapSettings(gap=1e-10, rounds=20000))
     forces, cost = dense_optimum(problem, wanted, cap_n, already)
     assert capped.loss.cost_capped == pytest.approx(cost, rel=1e-6)
     assert np.abs(capped.forces - forces).max() < 1e-3 * cap_n
@@ -55,10 +55,10 @@ def test_the_capped_forces_are_those_of_a_dense_solver(problem_of, share, seed, 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
 def test_the_cap_holds_exactly_and_the_loss_is_less_than_that_of_clipping(device_model, share):
-    problem, t = augmented(device_model, TrackingWeights(1e-3)), np.arange(300) / 1000
+    problem, t = make_tracking_problem(device_model, TrackingWeights(1e-3)), np.arange(300) / 1000
     wanted = 20 * (np.exp(-t / 0.05) * np.sin(2 * np.pi * 20 * t))[:, None] * np.array([1, 0.3, -0.4])
     cap_n = share * free_peak(problem, wanted)
-    capped = constrained_track(problem, wanted, cap_n)
+    capped = track_under_cap(problem, wanted, cap_n)
     loss = capped.loss
     assert np.linalg.norm(capped.forces, axis=1).max() <= cap_n
     assert loss.gap <= 1e-5
@@ -71,7 +71,7 @@ def test_the_cap_holds_exactly_and_the_loss_is_less_than_that_of_clipping(device
 
 def test_a_cap_that_does_not_bind_costs_nothing(problem_of):
     problem, wanted = problem_of(6, 3), walk(50, 3)
-    capped = constrained_track(problem, wanted, 1.01 * free_peak(problem, wanted))
+    capped = track_under_cap(problem, wanted, 1.01 * free_peak(problem, wanted))
     assert np.array_equal(capped.forces, track(stored_gains(problem, 50), wanted).forces)
     assert (capped.loss.lost, capped.loss.gap, capped.loss.rounds) == (0.0, 0.0, 0)
 
@@ -79,8 +79,8 @@ def test_a_cap_that_does_not_bind_costs_nothing(problem_of):
 def test_the_stated_gap_bounds_how_far_the_cost_is_from_the_best(problem_of):
     problem, wanted = problem_of(8, 4), walk(60, 4)
     cap_n = 0.4 * free_peak(problem, wanted)
-    rough = constrained_track(problem, wanted, cap_n, settings=CapSettings(gap=0.05)).loss
-    best = constrained_track(problem, wanted, cap_n, settings=CapSettings(gap=1e-8, rounds=20000)).loss
+    rough = track_under_cap(problem, wanted, cap_n, settings=CapSettings(gap=0.05)).loss
+    best = track_under_cap(problem, wanted, cap_n, settings=CapSettings(gap=1e-8, rounds=20000)).loss
     assert best.cost_capped <= rough.cost_capped <= best.cost_capped / (1 - rough.gap)
 
 
@@ -90,8 +90,8 @@ def test_what_has_no_answer_under_the_cap_is_refused(problem_of):
     others = np.zeros((30, 3))
     others[7] = 2 * cap_n
     with pytest.raises(TrackingError, match="the other forces alone reach .* N at row 7, above the cap of"):
-        constrained_track(problem, wanted, cap_n, others)
+        track_under_cap(problem, wanted, cap_n, others)
     with pytest.raises(TrackingError, match=r"already has shape \(29, 3\); these forces have \(30, 3\)"):
-        constrained_track(problem, wanted, cap_n, others[1:])
+        track_under_cap(problem, wanted, cap_n, others[1:])
     with pytest.raises(TrackingError, match="after 3 rounds the forces under the cap .* are only known to be within"):
-        constrained_track(problem, wanted, cap_n, settings=CapSettings(gap=1e-9, rounds=3))
+        track_under_cap(problem, wanted, cap_n, settings=CapSettings(gap=1e-9, rounds=3))

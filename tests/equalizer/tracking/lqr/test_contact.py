@@ -4,7 +4,7 @@ import pytest
 from equalizer.tracking.lqr.contact import causal_start
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.padding import band_error
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 from equalizer.tracking.lqr.turning import play
 
 NORMALS = [np.eye(3)[0], np.array([1.0, 2.0, -2.0]) / 3, np.array([0.0, 0.6, 0.8])]
@@ -12,7 +12,7 @@ NORMALS = [np.eye(3)[0], np.array([1.0, 2.0, -2.0]) / 3, np.array([0.0, 0.6, 0.8
 
 @pytest.fixture(scope="module")
 def problem(device_model):
-    return augmented(device_model, TrackingWeights())
+    return make_tracking_problem(device_model, TrackingWeights())
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from equalizer.tracking.lqr.lqr import costate_feedforward, periodic_state, ringing_weight, stored_gains, track
-from equalizer.tracking.lqr.padding import answer
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, augmented
+from equalizer.tracking.lqr.padding import simulate_from_rest
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 
 @pytest.fixture(scope="module")
@@ -12,7 +12,7 @@ def noise(plants):
 
 
 def test_what_is_predicted_is_what_the_device_plays(device_model, plants, noise):
-    played = track(stored_gains(augmented(device_model, TrackingWeights()), 1000), noise)
+    played = track(stored_gains(make_tracking_problem(device_model, TrackingWeights()), 1000), noise)
     truth = plants.omega_like().play(played.forces)
     assert played.predicted == pytest.approx(truth, abs=1e-9)
     assert np.linalg.norm(truth - noise) < 2e-3 * np.linalg.norm(noise)
@@ -37,23 +37,23 @@ def test_the_second_half_from_where_the_first_ended_is_the_second_half(problem_o
 
 
 def test_leaving_out_the_simulated_state_misses_most_of_the_trajectory(device_model, noise):
-    problem = augmented(device_model, TrackingWeights())
-    literal = answer(problem, costate_feedforward(stored_gains(problem, 1000), noise))
+    problem = make_tracking_problem(device_model, TrackingWeights())
+    literal = simulate_from_rest(problem, costate_feedforward(stored_gains(problem, 1000), noise))
     assert np.linalg.norm(literal - noise) > 0.5 * np.linalg.norm(noise)
 
 
 def test_a_fade_in_that_is_drawn_to_the_loop_s_state_leaves_no_transient(device_model):
-    problem, time_s = augmented(device_model, TrackingWeights()), np.arange(600) / 1000
+    problem, time_s = make_tracking_problem(device_model, TrackingWeights()), np.arange(600) / 1000
     loop = np.column_stack([np.sin(2 * np.pi * 10 * time_s[:100]), np.zeros((100, 2))])
     start = periodic_state(problem, loop)
-    steady = answer(problem, np.tile(loop, (100, 1)))[-100:]
+    steady = simulate_from_rest(problem, np.tile(loop, (100, 1)))[-100:]
     wanted = np.tile(steady, (6, 1)) * np.minimum(1, time_s / 0.3)[:, None]
     free = track(stored_gains(problem, 600), wanted)
     drawn = track(stored_gains(problem, 600, ringing_weight(problem)), wanted, final_state=start)
     held = track(stored_gains(problem, 600, 1e3 * ringing_weight(problem)), wanted, final_state=start)
 
     def ringing(faded) -> float:
-        after = answer(problem, np.vstack([faded.forces, np.tile(loop, (10, 1))]))[600:]
+        after = simulate_from_rest(problem, np.vstack([faded.forces, np.tile(loop, (10, 1))]))[600:]
         return float(np.abs(after - np.tile(steady, (10, 1))).max() / np.abs(steady).max())
 
     assert ringing(held) < 1e-4 < ringing(drawn) < 5e-3 < 0.02 < ringing(free)
@@ -82,7 +82,7 @@ def test_what_never_settles_is_refused(model_of, question):
     numbers = model.parameters.copy()
     numbers[:16] *= 1.1
     with pytest.raises(TrackingError, match="not stable"):
-        question(augmented(model.with_parameters(numbers), TrackingWeights()))
+        question(make_tracking_problem(model.with_parameters(numbers), TrackingWeights()))
 
 
 @pytest.mark.parametrize(

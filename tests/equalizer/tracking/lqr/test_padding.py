@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.padding import CAUSAL, Padding, answer, band_error, track_padded
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, augmented
+from equalizer.tracking.lqr.padding import CAUSAL, Padding, band_error, simulate_from_rest, track_padded
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 
 @pytest.fixture(scope="module")
 def problem(device_model):
-    return augmented(device_model, TrackingWeights())
+    return make_tracking_problem(device_model, TrackingWeights())
 
 
 @pytest.fixture(scope="module")
@@ -55,14 +55,14 @@ def test_room_after_the_end_lets_the_device_come_to_rest(problem, noise):
     def ringing(padding) -> float:
         forces = track_padded(problem, noise, padding).whole.forces[:800]
         forces = np.vstack([forces, still[: 800 - len(forces)]])
-        return float(np.linalg.norm(answer(problem, forces)[500:]))
+        return float(np.linalg.norm(simulate_from_rest(problem, forces)[500:]))
 
     assert ringing(CAUSAL) < 0.2 * ringing(Padding(0.0, 0.0))
 
 
 def test_a_light_force_weight_does_not_blow_up_slow_forces(device_model, noise):
     peaks = [
-        np.abs(track_padded(augmented(device_model, TrackingWeights(weight)), noise).forces).max()
+        np.abs(track_padded(make_tracking_problem(device_model, TrackingWeights(weight)), noise).forces).max()
         for weight in (1e-3, 1e-2)
     ]
     assert max(peaks) < 1.5

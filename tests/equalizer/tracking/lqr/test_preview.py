@@ -3,12 +3,14 @@ import pytest
 
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.preview import preview_loss, preview_tracker, stream
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 
 @pytest.fixture(scope="module")
 def problems(device_model):
-    return [augmented(device_model, TrackingWeights(1e-2, low_frequency_weight=weight)) for weight in (0.0, 0.3)]
+    return [
+        make_tracking_problem(device_model, TrackingWeights(1e-2, low_frequency_weight=weight)) for weight in (0.0, 0.3)
+    ]
 
 
 def test_full_preview_is_the_finite_horizon_far_from_its_end(problem_of, difference):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.riccati import backward_gains, stationary_gains
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 
 @settings(max_examples=20, deadline=None)
@@ -59,11 +59,11 @@ def test_a_terminal_weight_of_another_shape_is_refused(problem_of):
 
 def test_nor_are_there_stationary_ones(device_model):
     with pytest.raises(TrackingError, match="there are no stationary gains: .* the force weight must be above zero"):
-        stationary_gains(augmented(device_model, TrackingWeights(0.0)))
+        stationary_gains(make_tracking_problem(device_model, TrackingWeights(0.0)))
 
 
 def test_a_growing_motion_that_no_force_reaches_has_no_stationary_gains(model_of):
     model = model_of(2, 0)
     unreached = replace(model, A=np.diag([1.1, 0.5]), B=np.vstack([np.zeros(3), np.ones(3)]))
     with pytest.raises(TrackingError, match="there are no stationary gains: .* must die away by itself"):
-        stationary_gains(augmented(unreached, TrackingWeights()))
+        stationary_gains(make_tracking_problem(unreached, TrackingWeights()))

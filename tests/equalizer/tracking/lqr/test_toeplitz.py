@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.toeplitz import block_toeplitz, least_squares_forces
-from equalizer.tracking.lqr.tracking_problem import TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 AGREEMENT = {1.0: 1e-10, 1e-2: 1e-10, 1e-4: 1e-10, 1e-6: 1e-9}
 
@@ -27,7 +27,7 @@ def test_riccati_equals_dense_least_squares(problem_of, difference, weight, feed
 
 @pytest.mark.parametrize("weight", AGREEMENT)
 def test_and_on_a_device_s_own_equations(device_model, difference, weight):
-    problem = augmented(device_model, TrackingWeights(weight))
+    problem = make_tracking_problem(device_model, TrackingWeights(weight))
     wanted = np.random.default_rng(0).standard_normal((250, 3))
     found = track(stored_gains(problem, 250), wanted).forces
     assert difference(found, least_squares_forces(problem, wanted)) <= AGREEMENT[weight]
@@ -40,7 +40,7 @@ def test_and_on_a_device_s_own_equations(device_model, difference, weight):
 def test_with_any_output_weight_terminal_weight_and_target(model_of, difference, order, size, seed, samples, weight):
     draw = np.random.default_rng(seed).standard_normal
     root = draw((size, size))
-    problem = augmented(model_of(order, seed, size=size), TrackingWeights(weight, root @ root.T))
+    problem = make_tracking_problem(model_of(order, seed, size=size), TrackingWeights(weight, root @ root.T))
     end_root, wanted, x0, end = draw((order, order)), draw((samples, size)), draw(order), draw(order)
     terminal = end_root @ end_root.T
     found = track(stored_gains(problem, samples, terminal), wanted, x0, end).forces

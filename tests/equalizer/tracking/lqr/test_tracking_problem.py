@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 
 def test_without_a_low_frequency_weight_the_model_is_taken_as_it_is(model_of):
     model = model_of(6, 0)
-    problem = augmented(model, TrackingWeights(0.5))
+    problem = make_tracking_problem(model, TrackingWeights(0.5))
     assert (problem.A == model.A).all() and (problem.D == model.D).all()
     assert np.array_equal(problem.R, 0.5 * np.eye(3)) and np.array_equal(problem.Q, np.eye(3))
     assert (problem.order, problem.inputs, problem.outputs) == (6, 3, 3)
@@ -25,7 +25,9 @@ def test_the_low_frequency_output_is_a_first_order_low_pass_of_the_force(problem
 def test_a_low_frequency_weight_keeps_slow_force_down(device_model):
     wanted = np.zeros((1000, 3))
     wanted[:, 0] = 1.0
-    free, held = (augmented(device_model, TrackingWeights(1e-5, low_frequency_weight=w)) for w in (0.0, 10.0))
+    free, held = (
+        make_tracking_problem(device_model, TrackingWeights(1e-5, low_frequency_weight=w)) for w in (0.0, 10.0)
+    )
     mean = [np.abs(track(stored_gains(problem, 1000), wanted).forces[:, 0].mean()) for problem in (free, held)]
     assert mean[1] < 0.2 * mean[0]
 
@@ -61,4 +63,4 @@ def test_weights_that_cannot_weigh_are_refused(arguments, message):
 
 def test_an_output_weight_of_another_size_is_refused(model_of):
     with pytest.raises(TrackingError, match="3 outputs need"):
-        augmented(model_of(4, 0), TrackingWeights(output_weight=np.eye(2)))
+        make_tracking_problem(model_of(4, 0), TrackingWeights(output_weight=np.eye(2)))

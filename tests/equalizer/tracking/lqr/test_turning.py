@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.rotation import rotation_basis
 from equalizer.tracking.lqr.toeplitz import least_squares_forces
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, augmented
-from equalizer.tracking.lqr.turning import at_rest, normal_transient, play, restarted, step, turning_transient
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
+from equalizer.tracking.lqr.turning import initial_state, normal_transient, play, restart, step, turning_transient
 
 N = 120
 
@@ -32,7 +32,7 @@ def test_each_turn_is_a_new_solution_from_the_present_state(
 
 
 def test_and_on_a_device_s_own_equations(device_model, random_rotation, difference, trajectory):
-    problem = augmented(device_model, TrackingWeights(1e-4))
+    problem = make_tracking_problem(device_model, TrackingWeights(1e-4))
     transient = turning_transient(stored_gains(problem, N), trajectory)
     before = play(transient, np.tile(random_rotation(0), (50, 1, 1)))
     after = play(transient, np.tile(random_rotation(1), (N - 50, 1, 1)), before.state)
@@ -45,7 +45,7 @@ def test_and_on_a_device_s_own_equations(device_model, random_rotation, differen
 def test_a_turn_at_every_tick_is_solved_anew_at_every_tick(problem_of, random_rotation, difference, trajectory, seeds):
     problem = problem_of(5, 1, 1e-2)
     transient, state = turning_transient(stored_gains(problem, N), trajectory), None
-    state = at_rest(transient)
+    state = initial_state(transient)
     for tick, seed in enumerate(seeds):
         R = random_rotation(seed)
         right = least_squares_forces(problem, trajectory[tick:] @ R.T, state.x)[0]
@@ -63,7 +63,7 @@ def test_without_a_turn_it_is_the_rotation_basis(problem_of, random_rotation, tr
 def test_steps_are_the_compiled_run(problem_of, random_rotation, trajectory):
     transient = turning_transient(stored_gains(problem_of(6, 0), N), trajectory)
     turns = np.array([random_rotation(k) for k in range(N + 5)])
-    state, forces = at_rest(transient), []
+    state, forces = initial_state(transient), []
     for R in turns:
         force, state = step(transient, state, R)
         forces.append(force)
@@ -100,7 +100,7 @@ def test_a_restart_steers_out_what_still_rings(problem_of, difference, trajector
     problem, turns = problem_of(6, 0), np.tile(np.eye(3), (N, 1, 1))
     transient = turning_transient(stored_gains(problem, N), trajectory)
     first = play(transient, turns[:30])
-    again = play(transient, turns, restarted(first.state))
+    again = play(transient, turns, restart(first.state))
     assert difference(again.forces, least_squares_forces(problem, trajectory, first.state.x)) <= 1e-10
 
 
@@ -114,4 +114,4 @@ def test_after_the_last_row_no_force_is_played_and_the_model_rings_out(problem_o
 def test_a_direction_of_another_shape_is_refused(problem_of, trajectory):
     transient = turning_transient(stored_gains(problem_of(4, 0), N), trajectory)
     with pytest.raises(TrackingError, match=r"shape \(3,\); this transient takes \(3, 3\)"):
-        step(transient, at_rest(transient), np.ones(3))
+        step(transient, initial_state(transient), np.ones(3))

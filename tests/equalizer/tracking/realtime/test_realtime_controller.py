@@ -16,7 +16,7 @@ def controller(device_model):
 
 def test_a_stream_is_the_preview_tracker_one_sample_after_the_other(controller):
     wanted = np.random.default_rng(3).standard_normal((200, 3))
-    bands, tracked = controller.streamed(wanted)
+    bands, tracked = controller.simulate_stream(wanted)
     np.testing.assert_allclose(bands.total, wanted, atol=1e-12)
     known, x, preview = np.zeros((50, 3)), np.zeros(controller.problem.order), len(controller.tracker)
     assert preview == 50
@@ -32,7 +32,7 @@ def test_a_stream_is_played_late_by_its_preview_less_a_sample(device_model):
     time_s = np.arange(3000) / 1000
     wanted = np.zeros((3000, 3))
     wanted[:, 1] = np.sin(2 * np.pi * 15 * time_s)
-    bands, tracked = controller.streamed(wanted)
+    bands, tracked = controller.simulate_stream(wanted)
     late = 199
     answered, meant = tracked.predicted[1500:, 1], bands.middle[1500 - late : 3000 - late, 1]
     assert np.linalg.norm(answered - meant) < 0.05 * np.linalg.norm(meant)

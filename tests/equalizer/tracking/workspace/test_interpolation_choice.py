@@ -63,10 +63,10 @@ def test_modes_that_match_only_with_the_place_left_out_are_no_reason_to_trust_th
 
 def test_a_check_where_blending_does_better_is_obeyed(workspaces, three):
     """A place that is the blend: the truth there is the inverse of the mean inverse."""
-    from equalizer.tracking.workspace.blended_inverse import blended_at
+    from equalizer.tracking.workspace.blended_inverse import blend_at
 
     place = workspaces.place_m(0.3)
-    truth = np.linalg.inv(blended_at(three, place).inverse(LINES))
+    truth = np.linalg.inv(blend_at(three, place).inverse(LINES))
     choice = choose_interpolation(three, [HeldOutPlace(place, LINES, truth)])
     assert choice.interpolation == "blended forces"
     assert choice.reason.startswith("forces are blended (error at 1 place held out:")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from equalizer.tracking.workspace.band_modes import BandMode
-from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError, matched_modes, mode_likeness
+from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError, match_modes, mode_likeness
 
 BAND = (5.0, 35.0)
 SHAPES = np.random.default_rng(4).standard_normal((6, 3))
@@ -16,16 +16,16 @@ def mode(natural_hz, shape, share=0.5, factor=1.0):
 def test_modes_keep_their_partners_when_all_move_past_where_others_were():
     ones = [mode(11.0, 0), mode(13.2, 1), mode(22.5, 2)]
     others = [mode(1.2 * each.natural_hz, k, factor=0.8j) for k, each in enumerate(ones)]
-    assert matched_modes(ones, others, BAND) == ((0, 0), (1, 1), (2, 2))
+    assert match_modes(ones, others, BAND) == ((0, 0), (1, 1), (2, 2))
 
 
 def test_modes_that_cross_are_followed_by_their_shape():
-    assert matched_modes([mode(11.0, 0), mode(12.0, 1)], [mode(11.2, 1), mode(11.8, 0)], BAND) == ((0, 1), (1, 0))
+    assert match_modes([mode(11.0, 0), mode(12.0, 1)], [mode(11.2, 1), mode(11.8, 0)], BAND) == ((0, 1), (1, 0))
 
 
 def test_a_weak_mode_and_one_outside_the_band_may_stay_alone():
     ones = [mode(11.0, 0), mode(20.0, 3, share=0.05), mode(37.0, 4)]
-    assert matched_modes(ones, [mode(11.5, 0)], BAND) == ((0, 0),)
+    assert match_modes(ones, [mode(11.5, 0)], BAND) == ((0, 0),)
 
 
 @pytest.mark.parametrize(
@@ -39,13 +39,13 @@ def test_a_weak_mode_and_one_outside_the_band_may_stay_alone():
 )
 def test_doubt_is_refused(ones, others, words):
     with pytest.raises(ModesDoNotMatchError, match=words):
-        matched_modes(ones, others, BAND)
+        match_modes(ones, others, BAND)
 
 
 def test_a_mode_that_changed_its_shape_altogether_is_refused():
     other = BandMode(11.0, 0.05, np.outer(np.cross(SHAPES[0], SHAPES[1]), SHAPES[0]).astype(complex), 0.5, 1000.0)
     with pytest.raises(ModesDoNotMatchError, match="differ in shape"):
-        matched_modes([mode(11.0, 0)], [other], BAND)
+        match_modes([mode(11.0, 0)], [other], BAND)
 
 
 def test_likeness_ignores_a_complex_factor():

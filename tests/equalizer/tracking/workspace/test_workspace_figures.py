@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from equalizer.tracking.workspace.blended_inverse import blended_at
+from equalizer.tracking.workspace.blended_inverse import blend_at
 from equalizer.tracking.workspace.modal_interpolation import modal_interpolation
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
@@ -23,7 +23,7 @@ def test_also_where_modes_do_not_change_linearly_along_the_way(workspaces, three
 
 
 def test_blended_forces_are_a_safe_second_and_the_model_of_the_centre_is_bad(workspaces, three):
-    blended = workspaces.worst(lambda place_m: blended_at(three, place_m))
+    blended = workspaces.worst(lambda place_m: blend_at(three, place_m))
     centre = workspaces.worst(lambda place_m: ModelsAtPlace(place_m, three.models[:1], (1.0,)))
     assert (blended.flatness_db, blended.coupling_db) < (3.0, -15.0)
     assert centre.flatness_db > 2 * blended.flatness_db

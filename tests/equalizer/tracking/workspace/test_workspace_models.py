@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.tracking.workspace.blended_inverse import blended_at
+from equalizer.tracking.workspace.blended_inverse import blend_at
 from equalizer.tracking.workspace.workspace_models import WorkspaceError, WorkspaceModels
 
 
@@ -47,7 +47,7 @@ def test_no_model_is_refused():
 
 
 def test_a_single_model_without_a_place_serves_everywhere_and_that_is_said(model):
-    at = blended_at(WorkspaceModels((replace(model, place_m=None),)), (0.03, 0.0, 0.0))
+    at = blend_at(WorkspaceModels((replace(model, place_m=None),)), (0.03, 0.0, 0.0))
     assert at.weights == (1.0,)
     assert at.remarks == ("the only model does not say where it was identified",)
 
@@ -55,15 +55,15 @@ def test_a_single_model_without_a_place_serves_everywhere_and_that_is_said(model
 def test_forces_are_blended_not_models(model):
     """Half of what each model asks for; the mean of the models would ask for something else."""
     strong = moved(model, 0.02, C=3 * np.eye(2))
-    at = blended_at(WorkspaceModels((model, strong)), (0.01, 0.0, 0.0))
+    at = blend_at(WorkspaceModels((model, strong)), (0.01, 0.0, 0.0))
     asked = at.inverse(np.array([10.0]), weight=0.0)[0]
-    parts = [blended_at(WorkspaceModels((each,)), (0, 0, 0)).inverse(np.array([10.0]), 0.0)[0] for each in at.models]
+    parts = [blend_at(WorkspaceModels((each,)), (0, 0, 0)).inverse(np.array([10.0]), 0.0)[0] for each in at.models]
     np.testing.assert_allclose(asked, (parts[0] + parts[1]) / 2)
     np.testing.assert_allclose(at.forces(lambda each: each.C), 2 * np.eye(2))
 
 
 def test_a_model_that_does_not_count_is_not_asked(model):
-    at = blended_at(WorkspaceModels((model, moved(model, 0.02))), (0.0, 0.0, 0.0))
+    at = blend_at(WorkspaceModels((model, moved(model, 0.02))), (0.0, 0.0, 0.0))
     asked = []
     at.forces(lambda each: asked.append(each) or np.zeros(1))
     assert asked == [model]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.signal import Signal
@@ -14,7 +14,7 @@ from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.iteration import Verdict, rms
-from equalizer.tracking.learning.model_inverse import inverse_of
+from equalizer.tracking.learning.model_inverse import inverse_operator
 from protocols.definition.apparatus import SafetySettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import SweepSegment
@@ -60,7 +60,7 @@ def inverse(tmp_path_factory):
     out = tmp_path_factory.mktemp("model") / "band.h5"
     record_device(RecordingPlan(protocol, "simulated", (0.0, 0.0, 0.0), seed=3, out=out), lambda _: None)
     settings = IdentificationSettings(draws=0, longer_horizons=(0,), record_horizons=())
-    return inverse_of(identify(transfer_estimate([read_recording(out)]), settings).model)
+    return inverse_operator(identify(estimate_transfer([read_recording(out)]), settings).model)
 
 
 @pytest.fixture
