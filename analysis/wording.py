@@ -1,4 +1,4 @@
-"""Numbers as text: the same everywhere, and a dash where there is none."""
+"""Formatting of numbers and lists as text, the same everywhere; a dash where there is no number."""
 
 import re
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ _UNTIMED = (
     (r"\(s\)", "(samples)"),
     (r"(?<=\d) s\b", " samples"),
 )
-"""Units that hang on time, and what they are where samples are numbered and the rate of 1 Hz is nominal."""
+"""Units that depend on time, and their replacements where samples are numbered and the rate of 1 Hz is nominal."""
 
 NONE = "–"
 _NAMED = 12
@@ -28,8 +28,8 @@ def number(value: float | None, digits: int = 2) -> str:
     return NONE if value is None else typeset(f"{value:.{digits}f}")
 
 
-def signed(value: float, digits: int = 2) -> str:
-    """With its sign, also where it is positive."""
+def signed_number(value: float, digits: int = 2) -> str:
+    """The number with its sign, also where it is positive."""
     return typeset(f"{value:+.{digits}f}")
 
 
@@ -39,7 +39,7 @@ CUT_NOTE = (
 )
 
 
-def marked_if_cut(value: float | None, cut: bool, digits: int = 2) -> str:
+def mark_cut(value: float | None, cut: bool, digits: int = 2) -> str:
     """The value, followed by "cut" where the cap cut into it."""
     return f"{number(value, digits)} cut" if cut and value is not None else number(value, digits)
 
@@ -55,7 +55,7 @@ def p_value(p: float | None) -> str:
 
 
 def p_text(p: float | None) -> str:
-    """With its letter, as it stands in a sentence."""
+    """A p-value with its letter, for a sentence."""
     text = p_value(p)
     return f"p {text}" if text.startswith("<") else f"p = {text}"
 
@@ -64,29 +64,29 @@ def f_text(df_first: int | None, df_second: int | None, f: float | None) -> str:
     return f"F({count(df_first)}, {count(df_second)}) = {number(f)}"
 
 
-def listed(things: Sequence[str]) -> str:
+def conjoin(things: Sequence[str]) -> str:
     """ "a, b and c"; a long list is cut and says by how much."""
     if len(things) > _NAMED:
         return f"{', '.join(things[:_NAMED])} and {len(things) - _NAMED} more"
     return " and ".join((", ".join(things[:-1]), things[-1])) if len(things) > 1 else "".join(things)
 
 
-def capital(sentence: str) -> str:
+def capitalise(sentence: str) -> str:
     return sentence[:1].upper() + sentence[1:]
 
 
-def begun(sentence: str) -> str:
-    """With a capital, unless the name of a file or an effect comes first: that stays as it is."""
+def begin_sentence(sentence: str) -> str:
+    """The sentence with a capital, unless it begins with the name of a file or an effect."""
     named = any(mark in sentence.partition(" ")[0] for mark in "./\\_")
-    return sentence if named else capital(sentence)
+    return sentence if named else capitalise(sentence)
 
 
-def ended(sentence: str) -> str:
+def end_sentence(sentence: str) -> str:
     return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."
 
 
 def untimed_text(text: str) -> str:
-    """A sentence or label of a recording of which no time is known, without seconds and hertz."""
+    """A sentence or label of a recording without known time, in samples instead of seconds and hertz."""
     for unit, instead in _UNTIMED:
         text = re.sub(unit, instead, text)
     return text

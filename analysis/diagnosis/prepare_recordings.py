@@ -15,7 +15,7 @@ from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.found_segments import find_segments
 from analysis.diagnosis.data.input_checks import FEW_CYCLES, NothingToDiagnose, require_different, require_something
 from analysis.diagnosis.first_model.plain_form import plain_form
-from analysis.wording import begun, listed
+from analysis.wording import begin_sentence, conjoin
 from equalizer.signals.recording import Recording
 
 STILL = 1e-9
@@ -79,7 +79,7 @@ def _drop_constant_position(recordings: Sequence[Recording]) -> PreparedRecordin
     dead = [name for name, stands in zip(positions[0].channels, still, strict=True) if stands]
     if not dead:
         return PreparedRecordings(tuple(recordings))
-    return _without_position(recordings, f"Position {listed(dead)} never changes")
+    return _without_position(recordings, f"Position {conjoin(dead)} never changes")
 
 
 def _without_position(recordings: Sequence[Recording], why: str) -> PreparedRecordings:

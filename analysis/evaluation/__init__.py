@@ -1,4 +1,4 @@
-"""How well the product does its work, as findings judged by stated rules.
+"""Evaluation of the product: findings judged by stated rules.
 
 `proof` scores blind answers of the diagnosis; `reproduction` puts the published figures beside what came out here.
 Begin at `proof/score.py`.

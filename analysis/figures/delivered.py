@@ -1,4 +1,4 @@
-"""What the device delivered for what was commanded, frequency by frequency."""
+"""Figure of delivered acceleration over commanded level, frequency by frequency."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from protocols.trial import Trial
 
 _COLUMNS = 3
 _RASTER_FROM = 400
-"""So many points are drawn as a picture, or the page grows by a line of text per point."""
+"""Number of points from which they are rasterised, because each adds a line of text to the page."""
 
 
 def draw_delivered(trials: Sequence[Trial]) -> Figure:

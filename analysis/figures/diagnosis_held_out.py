@@ -1,4 +1,4 @@
-"""Held-out data: a stretch where the effect shows, measured and predicted, and the errors of all channels."""
+"""Figure of held-out data: an excerpt in which the effect shows, measured and predicted, and all channels' errors."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, say_noth
 from equalizer.signals.signal import FloatArray
 
 _CYCLES = 5.0
-"""Of what the effect changes, in the stretch that is shown."""
+"""Cycles of the effect's change in the excerpt."""
 _SHORTEST_S, _LONGEST_S = 0.1, 3.0
 _MARKERS = {"before": "s", "retuned": "D", "after": "o"}
 _STRETCHES = 60
@@ -34,7 +34,7 @@ class Excerpt:
 
 def held_out_picture(courses: Sequence[Course], noise_rms: Mapping[str, float], errors: ChannelErrors) -> Picture:
     """errors: by stage and channel, in units of the noise."""
-    excerpt = telling_excerpt(courses, noise_rms)
+    excerpt = find_excerpt(courses, noise_rms)
     where = ""
     if excerpt is not None:
         where = (
@@ -47,20 +47,20 @@ def held_out_picture(courses: Sequence[Course], noise_rms: Mapping[str, float], 
         caption=f"{where}{'Right: e' if where else 'E'}rror of each channel over all held-out samples in units of its "
         "noise; at the line there is nothing but noise. Nothing was fitted to or chosen by these data.",
         figure=draw_held_out(excerpt, noise_rms, errors),
-        alternative=_in_words(errors),
+        alternative=_alternative_text(errors),
     )
 
 
-def telling_excerpt(courses: Sequence[Course], noise_rms: Mapping[str, float]) -> Excerpt | None:
-    """The held-out stretch and channel where re-tuned and final prediction differ most, in units of the noise; where
-    they never do, where as given and final do."""
+def find_excerpt(courses: Sequence[Course], noise_rms: Mapping[str, float]) -> Excerpt | None:
+    """The held-out excerpt and channel where re-tuned and final prediction differ most, in units of the noise; where
+    they do not differ, those where given and final do. None without a difference."""
     for each in ("retuned", "before"):
         best: tuple[float, Excerpt] | None = None
         for course in courses:
             noise = np.array([noise_rms.get(name, np.nan) for name in course.channels])
             change = np.nan_to_num((getattr(course, each) - course.after) / noise)
             for start, stop in course.tested:
-                found = _strongest(course, change[start:stop], start)
+                found = _strongest_excerpt(course, change[start:stop], start)
                 if found is not None and (best is None or found[0] > best[0]):
                     best = found
         if best is not None and best[0] > 0.1:
@@ -68,10 +68,10 @@ def telling_excerpt(courses: Sequence[Course], noise_rms: Mapping[str, float]) -
     return None
 
 
-def _strongest(course: Course, change: FloatArray, start: int) -> tuple[float, Excerpt] | None:
+def _strongest_excerpt(course: Course, change: FloatArray, start: int) -> tuple[float, Excerpt] | None:
     if not len(change):
         return None
-    channel = int(np.argmax(_telling(change)))
+    channel = int(np.argmax(_visibility(change)))
     signal = change[:, channel]
     rms, speed = float(np.std(signal)), float(np.sqrt(np.mean(np.diff(signal, prepend=signal[0]) ** 2)))
     if not signal.any():
@@ -81,13 +81,13 @@ def _strongest(course: Course, change: FloatArray, start: int) -> tuple[float, E
     length = int(np.clip(_CYCLES * cycle_s, _SHORTEST_S, _LONGEST_S) * course.sample_rate_hz)
     length = min(max(length, 8), len(signal))
     places = np.unique(np.linspace(0, len(signal) - length, _STRETCHES).astype(int))
-    strengths = [float(_telling(signal[at : at + length])) for at in places]
+    strengths = [float(_visibility(signal[at : at + length])) for at in places]
     at = int(places[int(np.argmax(strengths))])
     return max(strengths), Excerpt(course, channel, start + at, start + at + length)
 
 
-def _telling(change: FloatArray) -> FloatArray:
-    """What moves tells more than what stands off."""
+def _visibility(change: FloatArray) -> FloatArray:
+    """Weight of a change for the excerpt: its variance, and little of its mean square, because motion shows more."""
     return np.asarray(np.var(change, axis=0) + _STANDING * np.mean(change, axis=0) ** 2)
 
 
@@ -164,7 +164,7 @@ def _draw_stage(axes: Axes, stage: Stage, values: FloatArray, rows: FloatArray) 
     axes.plot(values, at, _MARKERS[stage.name], color=stage.colour, markersize=5)
 
 
-def _in_words(errors: ChannelErrors) -> str:
+def _alternative_text(errors: ChannelErrors) -> str:
     sentences = []
     for stage in STAGES:
         if stage.name in errors:

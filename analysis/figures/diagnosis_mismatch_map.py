@@ -1,4 +1,4 @@
-"""Where model and device disagree: channel by octave, per input and level; as given, re-tuned, with what was found."""
+"""Figure of the mismatch map: residual by channel and octave, per input and level, for the three predictions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ from analysis.figures.style import BLACK, GREY, new_figure, say_nothing_to_draw
 from equalizer.signals.signal import FloatArray
 
 _LOUDEST = 300.0
-"""In units of the noise: the end of the colours at least."""
+"""Smallest upper end of the colour scale, in units of the noise."""
 _DARK = 0.62
-"""Of the colours' range, from which on numbers are white."""
+"""Share of the colour scale from which numbers are white."""
 _LETTER_IN = 0.075
 """Width of a letter beside the map."""
 _ROW_IN, _BETWEEN_IN = 0.25, 0.2
 """Height of a row of cells, and between panels."""
 _MOST_LEVELS = 4
 _NUMBERED = 1.15
-"""Below it a cell is as good as noise and stays bare."""
+"""Residual over noise below which a cell has no number."""
 _SQUARE = ((-0.46, -0.46), (0.46, -0.46), (0.46, 0.46), (-0.46, 0.46), (-0.46, -0.46))
 _UNIT = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
 _WIDTH_IN = 8.8
@@ -57,7 +57,7 @@ def mismatch_map_pictures(maps: Maps, unit: str = "N") -> tuple[Picture, ...]:
 def driving_inputs(maps: Maps) -> tuple[str, ...]:
     """The one with most mismatch first."""
     inputs = {cell.input for cells in maps.values() for cell in cells}
-    return tuple(sorted(inputs, key=lambda each: (-_worst(maps, each), each)))
+    return tuple(sorted(inputs, key=lambda each: (-_worst_mismatch(maps, each), each)))
 
 
 def mismatch_map_picture(maps: Maps, number: int, unit: str) -> Picture:
@@ -68,22 +68,23 @@ def mismatch_map_picture(maps: Maps, number: int, unit: str) -> Picture:
         title=f"Where model and device disagree, driven by {input_}",
         caption="Residual in units of what noise alone would leave: 1 is noise. Framed: more than noise and "
         "what the model errs by elsewhere, at a false discovery rate of 1 %. Rows: measured channels; columns: "
-        f"octaves, by their lower edge{_level_words(maps, input_, unit)}; grey: not driven there; without "
-        f"a number: below {_NUMBERED:g}." + _grouped_words(maps, input_),
+        f"octaves, by their lower edge{_level_text(maps, input_, unit)}; grey: not driven there; without "
+        f"a number: below {_NUMBERED:g}." + _group_text(maps, input_),
         figure=draw_mismatch_map(maps, input_, unit),
         folded=number > 0,
-        alternative=_in_words(maps, input_),
+        alternative=_alternative_text(maps, input_),
     )
 
 
 def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
-    """One row of panels per level, one column per stage; all in one pair of axes, for a pair each takes seconds."""
-    layout = _layout(maps, input_)
+    """A row of panels per level, a column per stage; all in a single pair of axes, because a pair each takes
+    seconds."""
+    layout = _make_layout(maps, input_)
     if not layout.stages or not layout.bands:
         return say_nothing_to_draw(new_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
     figure = new_figure(_WIDTH_IN, 0.9 + len(layout.levels) * (_BETWEEN_IN + _ROW_IN * len(layout.channels)))
-    axes, beside = _placed_axes(figure, layout)
-    table, frames = _filled(maps, input_, layout)
+    axes, beside = _add_axes(figure, layout)
+    table, frames = _fill_table(maps, input_, layout)
     panels = [layout.corner(row, column) for row, column in np.ndindex(len(layout.levels), len(layout.stages))]
     size = np.array([len(layout.bands), len(layout.channels)])
     corners = [(panel - 0.5) + _UNIT * size for panel in panels]
@@ -91,13 +92,13 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
         axes.add_collection(PolyCollection(corners, facecolors=face, edgecolors=edge, linewidths=0.5, zorder=order))
     height, width = table.shape
     extent = (-0.5, width / _FINE - 0.5, height / _FINE - 0.5, -0.5)
-    loudest = _loudest(table)
+    loudest = _colour_limit(table)
     image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, loudest), aspect="auto",
                         interpolation="nearest", extent=extent)  # fmt: skip
     axes.add_collection(LineCollection(frames, colors=BLACK, linewidths=0.9, zorder=3), autolim=False)
     if len(layout.bands) <= _NUMBERS_FIT:
         _write_numbers(axes, table, panels, layout)
-    _label(axes, layout, unit)
+    _label_axes(axes, layout, unit)
     bar = figure.colorbar(image, cax=beside)
     ratio_ticks(bar.ax.yaxis, 1.0, loudest)
     bar.set_label("residual / noise", fontsize=9)
@@ -105,36 +106,36 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
     return figure
 
 
-def _loudest(table: FloatArray) -> float:
-    """The end of the colours: none of the cells is beyond it, so that the worst can be told from the next."""
+def _colour_limit(table: FloatArray) -> float:
+    """Upper end of the colour scale, above all cells, so that the worst differs from the next."""
     most = float(np.nanmax(table, initial=1.0))
     return _LOUDEST if most <= _LOUDEST else float(10 ** np.ceil(np.log10(most)))
 
 
-def _upright(layout: _Layout) -> bool:
-    """Levels are written along the panels' sides; else, where those are too short, behind the channels."""
+def _fits_upright(layout: _Layout) -> bool:
+    """Whether levels fit upright along the panels' sides; else they are written behind the channels."""
     longest = max((len(f"at {level:.3g} N m") for level in layout.levels), default=0)
     return _LETTER_IN * (longest - 2) <= _BETWEEN_IN + _ROW_IN * len(layout.channels)
 
 
 def _row_label(channel: tuple[str, str], level: float, layout: _Layout) -> str:
-    said = _channel(channel, layout)
-    return said if _upright(layout) or not level else f"{said} at {level:.3g}"
+    said = _channel_label(channel, layout)
+    return said if _fits_upright(layout) or not level else f"{said} at {level:.3g}"
 
 
-def _placed_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:
-    """The map and the bar of its colours. What stands around them is known, and need not be measured."""
+def _add_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:
+    """Axes of the map and of its colour bar, laid out by computed sizes instead of a layout engine."""
     figure.set_layout_engine("none")
     width, height = figure.get_size_inches()
     longest = max(len(_row_label(channel, level, layout)) for channel in layout.channels for level in layout.levels)
-    left = (0.33 if any(layout.levels) and _upright(layout) else 0.1) + _LETTER_IN * longest
+    left = (0.33 if any(layout.levels) and _fits_upright(layout) else 0.1) + _LETTER_IN * longest
     bottom, top, right = 0.5 / height, 1 - 0.26 / height, 1 - 1.15 / width
     axes = figure.add_axes((left / width, bottom, right - left / width, top - bottom))
     beside = figure.add_axes((right + 0.09 / width, bottom + 0.05 * (top - bottom), 0.22 / width, 0.9 * (top - bottom)))
     return axes, beside
 
 
-def _filled(maps: Maps, input_: str, layout: _Layout) -> tuple[FloatArray, list[FloatArray]]:
+def _fill_table(maps: Maps, input_: str, layout: _Layout) -> tuple[FloatArray, list[FloatArray]]:
     """Residual over noise, _FINE squared points to a cell, NaN between panels and where nothing was driven; and the
     frames of what is significant."""
     rows, columns = len(layout.levels), len(layout.stages)
@@ -144,7 +145,7 @@ def _filled(maps: Maps, input_: str, layout: _Layout) -> tuple[FloatArray, list[
     frames: list[FloatArray] = []
     for column, stage in enumerate(layout.stages):
         for cell in (each for each in maps[stage.name] if each.input == input_):
-            corner = layout.corner(_level(layout, cell), column)
+            corner = layout.corner(_level_group(layout, cell), column)
             within = layout.bands.index(cell.band_hz), layout.channels.index((cell.output, cell.quantity))
             x, y = (round(_FINE * at) for at in corner + within)
             part = table[y : y + _FINE, x : x + _FINE]
@@ -160,11 +161,11 @@ def _write_numbers(axes: Axes, table: FloatArray, panels: Sequence[FloatArray], 
             x, y = float(corner[0]) + column, float(corner[1]) + row
             value = table[round(_FINE * y), round(_FINE * x)]
             if value >= _NUMBERED:
-                colour = "white" if np.log(value) > _DARK * np.log(_loudest(table)) else BLACK
-                axes.text(x, y, _short(value), ha="center", va="center", fontsize=6.2, color=colour)
+                colour = "white" if np.log(value) > _DARK * np.log(_colour_limit(table)) else BLACK
+                axes.text(x, y, _format_short(value), ha="center", va="center", fontsize=6.2, color=colour)
 
 
-def _label(axes: Axes, layout: _Layout, unit: str) -> None:
+def _label_axes(axes: Axes, layout: _Layout, unit: str) -> None:
     stages, levels = range(len(layout.stages)), range(len(layout.levels))
     xs = [layout.corner(0, column)[0] + band for column in stages for band in range(len(layout.bands))]
     ys = [layout.corner(row, 0)[1] + channel for row in levels for channel in range(len(layout.channels))]
@@ -179,14 +180,14 @@ def _label(axes: Axes, layout: _Layout, unit: str) -> None:
                       textcoords="offset points", fontsize=10)  # fmt: skip
     middle = (len(layout.channels) - 1) / 2
     for row in levels:
-        if layout.levels[row] and _upright(layout):
+        if layout.levels[row] and _fits_upright(layout):
             axes.annotate(
                 f"at {layout.levels[row]:.3g} {unit}".rstrip(), (0.02, layout.corner(row, 0)[1] + middle),
                 xycoords=("figure fraction", "data"), rotation="vertical", ha="center", va="center", fontsize=10,
             )  # fmt: skip
 
 
-def _layout(maps: Maps, input_: str) -> _Layout:
+def _make_layout(maps: Maps, input_: str) -> _Layout:
     cells = [item for each in maps.values() for item in each if item.input == input_]
     levels = sorted({cell.amplitude for cell in cells})
     groups = [part for part in np.array_split(levels, min(_MOST_LEVELS, len(levels))) if len(part)] if levels else []
@@ -198,32 +199,32 @@ def _layout(maps: Maps, input_: str) -> _Layout:
     )
 
 
-def _level(layout: _Layout, cell: MismatchCell) -> int:
-    """Number of its group, for which the group's highest level stands."""
+def _level_group(layout: _Layout, cell: MismatchCell) -> int:
+    """Number of the cell's group of levels, which is named by its highest level."""
     return next(row for row, level in enumerate(layout.levels) if cell.amplitude <= level)
 
 
-def _channel(channel: tuple[str, str], layout: _Layout) -> str:
+def _channel_label(channel: tuple[str, str], layout: _Layout) -> str:
     name, quantity = channel
     return f"{name} ({quantity})" if [each for each, _ in layout.channels].count(name) > 1 else name
 
 
-def _short(value: float) -> str:
+def _format_short(value: float) -> str:
     if value >= 999.5:
         return f"{value / 1e3:.1f}k" if value < 9950 else f"{min(value / 1e3, 999):.0f}k"
     return f"{value:.1f}".removesuffix(".0") if value < 9.95 else f"{value:.0f}"
 
 
-def _worst(maps: Maps, input_: str) -> float:
+def _worst_mismatch(maps: Maps, input_: str) -> float:
     return max((cell.in_noise for cells in maps.values() for cell in cells if cell.input == input_), default=0.0)
 
 
-def _level_words(maps: Maps, input_: str, unit: str) -> str:
+def _level_text(maps: Maps, input_: str, unit: str) -> str:
     levels = {cell.amplitude for cells in maps.values() for cell in cells if cell.input == input_}
     return f", at levels of the excitation{f' in {unit}' if unit else ''}" if any(levels) else ""
 
 
-def _grouped_words(maps: Maps, input_: str) -> str:
+def _group_text(maps: Maps, input_: str) -> str:
     levels = {cell.amplitude for cells in maps.values() for cell in cells if cell.input == input_}
     if len(levels) <= _MOST_LEVELS:
         return ""
@@ -232,7 +233,7 @@ def _grouped_words(maps: Maps, input_: str) -> str:
     )
 
 
-def _in_words(maps: Maps, input_: str) -> str:
+def _alternative_text(maps: Maps, input_: str) -> str:
     sentences = []
     for stage in STAGES:
         cells = [each for each in maps.get(stage.name, ()) if each.input == input_]

@@ -13,7 +13,7 @@ from analysis.figures.diagnosis_rivals import rivals_pictures
 from analysis.figures.diagnosis_signature import signature_pictures
 from analysis.figures.diagnosis_state_maps import state_map_pictures
 from analysis.figures.picture import Picture
-from analysis.figures.untimed import in_samples
+from analysis.figures.untimed import count_in_samples
 
 
 def diagnosis_pictures(found: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:
@@ -44,7 +44,7 @@ def diagnosis_drawings(found: Findings) -> list[Part]:
 
 
 def _timed(draw: Callable[[], Sequence[Picture]], timed: bool) -> Sequence[Picture]:
-    return draw() if timed else [in_samples(picture) for picture in draw()]
+    return draw() if timed else [count_in_samples(picture) for picture in draw()]
 
 
 def _remainder(found: Findings) -> list[Picture]:

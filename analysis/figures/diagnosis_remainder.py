@@ -1,4 +1,4 @@
-"""What is left over on held-out data, over frequency, beside the noise."""
+"""Figure of the residual spectrum on held-out data, beside the noise."""
 
 from collections.abc import Sequence
 
@@ -26,7 +26,7 @@ def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
         caption="Amplitude densities in sixths of an octave. Where the solid line lies on the grey band, all but noise "
         "is explained; where it lies above, something is not.",
         figure=draw_remainder(spectra),
-        alternative=" ".join(_in_words(each) for each in spectra),
+        alternative=" ".join(_alternative_text(each) for each in spectra),
     )
 
 
@@ -64,7 +64,7 @@ def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
     axes.tick_params(labelsize=8)
 
 
-def _in_words(spectrum: RemainderSpectrum) -> str:
+def _alternative_text(spectrum: RemainderSpectrum) -> str:
     over = spectrum.after / spectrum.noise
     if not np.isfinite(over).any():
         return f"{spectrum.channel}: the noise is not known."

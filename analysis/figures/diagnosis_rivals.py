@@ -1,4 +1,4 @@
-"""What else was tried in a named effect's place, and how much error each leaves."""
+"""Figure of the rival explanations of a named effect, and the error that each leaves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,8 +26,8 @@ _ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
-    """One explanation with its errors: mean over channels (geometric) of error / noise, 1 = noise alone."""
+class TriedExplanation:
+    """An explanation with its errors: geometric mean over channels of error / noise; 1 = noise alone."""
 
     words: str
     seen: float
@@ -36,25 +36,25 @@ class Tried:
     """On held-out data; NaN where these were not looked at."""
 
 
-def tried_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) -> tuple[Tried, ...]:
-    """The best of each hypothesis: first the round's first, which need not have the least error where a simpler one is
-    as good; then the others by their errors."""
-    best: dict[object, Tried] = {}
+def list_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) -> tuple[TriedExplanation, ...]:
+    """The best fit of each hypothesis: first the round's choice, which need not have the smallest error where it is
+    simpler and as good; then the others by their errors."""
+    best: dict[object, TriedExplanation] = {}
     for item in round_:
         words = ", ".join(_claim_words(claim, axes) for claim in item.fitted.hypothesis.claims[-1:])
-        best.setdefault(item.fitted.hypothesis.key, _tried(words, item.score))
+        best.setdefault(item.fitted.hypothesis.key, _make_explanation(words, item.score))
     chosen, others = list(best.values())[:1], list(best.values())[1:]
     return (*chosen, *sorted(others, key=lambda each: each.seen))[:MOST_RIVALS]
 
 
 def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
     """One per effect for which several were tried."""
-    retuned = _tried("re-tuned, no physics", explanation.retuned.score)
+    retuned = _make_explanation("re-tuned, no physics", explanation.retuned.score)
     pictures = []
     several = [number for number, round_ in enumerate(explanation.rounds, start=1) if len(round_) > 1]
     for number in several[: len(_ORDINALS)]:
         round_ = explanation.rounds[number - 1]
-        tried, held = tried_explanations(round_, axes), number <= len(explanation.steps)
+        tried, held = list_explanations(round_, axes), number <= len(explanation.steps)
         if tried:
             pictures.append(
                 Picture(
@@ -67,13 +67,13 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
                     + " Dashed: the re-tuned model alone.",
                     figure=draw_rivals(tried, retuned, held),
                     folded=not held,
-                    alternative=" ".join(_in_words(each) for each in tried),
+                    alternative=" ".join(_alternative_text(each) for each in tried),
                 )
             )
     return tuple(pictures)
 
 
-def draw_rivals(tried: Sequence[Tried], retuned: Tried, held: bool = True) -> Figure:
+def draw_rivals(tried: Sequence[TriedExplanation], retuned: TriedExplanation, held: bool = True) -> Figure:
     """The chosen one on top, marked where it is held to be true."""
     if not tried:
         return say_nothing_to_draw(new_figure(7.4, 1.4), "Nothing was tried.")
@@ -96,7 +96,7 @@ def draw_rivals(tried: Sequence[Tried], retuned: Tried, held: bool = True) -> Fi
     axes.set_ylim(len(tried) - 0.5, -0.5)
     axes.grid(False, axis="y")
     values = np.array([*(each.seen for each in tried), *(each.test for each in tried), retuned.seen])
-    _scale(axes, values[np.isfinite(values)])
+    _scale_axis(axes, values[np.isfinite(values)])
     axes.set_xlabel("Error / noise", fontsize=9.5)
     return figure
 
@@ -108,12 +108,12 @@ def _mark(axes: Axes, at: float, words: str, side: Literal["left", "right"]) -> 
     )  # fmt: skip
 
 
-def _in_words(rival: Tried) -> str:
+def _alternative_text(rival: TriedExplanation) -> str:
     held_out = f", held-out {rival.test:.3g}" if np.isfinite(rival.test) else ""
     return f"{rival.words}: {rival.seen:.3g}{held_out}."
 
 
-def _scale(axes: Axes, values: FloatArray) -> None:
+def _scale_axis(axes: Axes, values: FloatArray) -> None:
     low, high = min(0.9, 0.9 * float(values.min(initial=1.0))), 1.15 * float(values.max(initial=1.0))
     axes.set_xscale("log" if high > 4 else "linear")
     axes.set_xlim(low, max(high, 1.5))
@@ -129,10 +129,10 @@ def _claim_words(claim: Claim, axes: Sequence[str]) -> str:
     return f"{noun}, {axes[site] if site < len(axes) else site + 1}" if len(axes) > 1 else noun
 
 
-def _tried(words: str, score: FitScore) -> Tried:
+def _make_explanation(words: str, score: FitScore) -> TriedExplanation:
     seen = np.concatenate([score.fit, score.choose])
-    return Tried(words, _mean(seen), _mean(score.test))
+    return TriedExplanation(words, _geometric_mean(seen), _geometric_mean(score.test))
 
 
-def _mean(values: FloatArray) -> float:
+def _geometric_mean(values: FloatArray) -> float:
     return float(np.exp(np.mean(np.log(np.maximum(values, 1e-6)))))

@@ -1,4 +1,4 @@
-"""What shows a named effect: what is missing without it, against what it hangs on, with the fitted law on it."""
+"""Figure of a named effect's signature: the residual without it over its variable, with the fitted law."""
 
 from collections.abc import Sequence
 
@@ -26,7 +26,7 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
             "per bin; bars: two standard errors. Line: the fitted law, simulated and averaged alike."
             + (_ROUNDED if signature.of.startswith("missing") else ""),
             figure=draw_signature(signature),
-            alternative=_in_words(signature),
+            alternative=_alternative_text(signature),
         )
         for number, signature in enumerate(signatures, start=1)
     )
@@ -38,8 +38,8 @@ def draw_signature(signature: Signature) -> Figure:
         return say_nothing_to_draw(figure, "Too few samples show this effect to draw it.")
     axes = figure.add_subplot()
     plain_axes(axes)
-    along, x_factor = _label(signature.along, signature.measured_at)
-    of, y_factor = _label(signature.of, np.concatenate([signature.measured, signature.law]))
+    along, x_factor = _scaled_label(signature.along, signature.measured_at)
+    of, y_factor = _scaled_label(signature.of, np.concatenate([signature.measured, signature.law]))
     spectrum = signature.along.startswith("frequency")
     axes.errorbar(
         x_factor * signature.measured_at, y_factor * signature.measured, yerr=2 * y_factor * signature.spread,
@@ -65,7 +65,7 @@ def draw_signature(signature: Signature) -> Figure:
     return figure
 
 
-def _label(said: str, values: FloatArray) -> tuple[str, float]:
+def _scaled_label(said: str, values: FloatArray) -> tuple[str, float]:
     """ "velocity of x (m/s)" as "Velocity of x (mm/s)", with the factor that goes with it."""
     words, bracket, rest = said.rpartition(" (")
     if not bracket or "/√" in rest or rest.startswith("Hz"):
@@ -74,7 +74,7 @@ def _label(said: str, values: FloatArray) -> tuple[str, float]:
     return f"{words[:1].upper()}{words[1:]} ({scale.unit})", scale.factor
 
 
-def _in_words(signature: Signature) -> str:
+def _alternative_text(signature: Signature) -> str:
     if not len(signature.measured_at) or not len(signature.law_at):
         return ""
     order = np.argsort(signature.law_at)

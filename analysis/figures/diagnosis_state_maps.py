@@ -1,4 +1,4 @@
-"""The missing force over the states of motion, and the force's loops: seen without any name."""
+"""Figures of the missing force over the states of motion, and of its loops, without reference to named effects."""
 
 from collections.abc import Sequence
 
@@ -12,11 +12,11 @@ from analysis.diagnosis.unit_wording import scale_of, share_text
 from analysis.figures.diagnosis_style import AFTER, BEFORE, MEASURED
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes
-from analysis.wording import listed, typeset
+from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
 _SEEN = 0.998
-"""Share of the single samples that a panel is wide enough for: outliers must not make the rest flat."""
+"""Share of the samples within a panel's limits, so that outliers do not flatten the rest."""
 
 
 def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
@@ -26,7 +26,7 @@ def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
     first = maps[0]
     along = f" along {first.axis}" if len(maps) > 1 else ""
     others = [f"{share_text(each.share)} along {each.axis}" for each in maps[1:]]
-    beside = f" Not drawn: {listed(others)}." if others else ""
+    beside = f" Not drawn: {conjoin(others)}." if others else ""
     left = f" Blue: mean of what is left {first.completed}." if first.completed else ""
     states = Picture(
         name="state-map",
@@ -34,8 +34,8 @@ def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
         caption=f"What {first.model} {'lack' if ' and ' in first.model else 'lacks'} as a force on the device; grey: "
         f"single samples; black: mean per bin, with two standard errors.{left} A flat line at zero says that nothing "
         f"depends on that state. Rms: {share_text(first.share)} of the force.{beside}",
-        figure=_states(first),
-        alternative=" ".join(_in_words(view, first.unit) for view in first.views),
+        figure=_draw_states(first),
+        alternative=" ".join(_alternative_text(view, first.unit) for view in first.views),
     )
     said = f", and {first.completed}" if first.completed else ""
     loops = Picture(
@@ -43,13 +43,13 @@ def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
         title=f"The force{along} over a stretch of the motion",
         caption=f"About one period, where the travel is widest: the force as it was, as {first.model} would need it"
         f"{said}. The area inside a loop over the position is work that is lost.",
-        figure=_loops(first),
-        alternative=_loop_in_words(first),
+        figure=_draw_loops(first),
+        alternative=_loop_text(first),
     )
     return states, loops
 
 
-def _states(maps: StateMaps) -> Figure:
+def _draw_states(maps: StateMaps) -> Figure:
     figure = new_figure(8.8, 5.6)
     scale = scale_of(maps.unit, max(float(np.abs(view.mean).max(initial=0.0)) for view in maps.views))
     limits = _limits([np.concatenate([view.cloud, view.mean]) for view in maps.views], scale.factor)
@@ -82,7 +82,7 @@ def _draw_view(axes: Axes, view: StateView, factor: float) -> None:
     axes.locator_params(axis="x", nbins=6)
 
 
-def _loops(maps: StateMaps) -> Figure:
+def _draw_loops(maps: StateMaps) -> Figure:
     figure = new_figure(8.8, 3.9)
     every = [each for loop in maps.loops for each in (loop.measured, loop.before, loop.after)]
     scale = scale_of(maps.unit, float(np.abs(np.concatenate(every)).max(initial=0.0)))
@@ -118,7 +118,7 @@ def _limits(values: Sequence[FloatArray], factor: float) -> tuple[float, float]:
     return float(min(low, 0.0)) - room, float(max(high, 0.0)) + room
 
 
-def _in_words(view: StateView, unit: str) -> str:
+def _alternative_text(view: StateView, unit: str) -> str:
     if not len(view.mean):
         return f"Against {view.along}: too few samples."
     low, high = int(np.argmin(view.mean)), int(np.argmax(view.mean))
@@ -128,7 +128,7 @@ def _in_words(view: StateView, unit: str) -> str:
     return f"Against {view.along}: mean missing force from {ends[0]} to {ends[1]}."
 
 
-def _loop_in_words(maps: StateMaps) -> str:
+def _loop_text(maps: StateMaps) -> str:
     loop = maps.loops[0]
     size = max(float(np.std(loop.measured)), 1e-300)
     kinds = ((maps.model, loop.before), (maps.completed, loop.after))

@@ -1,4 +1,4 @@
-"""How the three predictions of a diagnosis look in each of its figures: colour, dash and name."""
+"""Style of a diagnosis' three predictions in all its figures: colour, dash and name."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -30,7 +30,7 @@ BEFORE = Stage("before", "as given", ORANGE, (0, (1.2, 1.2)), 1.4)
 RETUNED = Stage("retuned", "re-tuned", PURPLE, (0, (4, 1.6)), 1.4)
 AFTER = Stage("after", "with what was found", BLUE, "-", 1.4)
 _STEPS = ((1.5, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)), (3.0, (1.0, 2.0, 5.0)), (4.0, (1.0, 3.0)), (np.inf, (1.0,)))
-"""Decades up to which an axis is divided so finely, and how."""
+"""Tick multiples by the number of decades of an axis."""
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

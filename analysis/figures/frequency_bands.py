@@ -1,4 +1,4 @@
-"""Where the axes couple, where directions are felt, and how each band is driven (the published figure 1)."""
+"""Figure of coupling, direction perception and control method over frequency (the published figure 1)."""
 
 from collections.abc import Sequence
 from textwrap import fill
@@ -20,7 +20,7 @@ _COLOURS = {"low": GREEN, "middle": BLUE, "high": PURPLE}
 _HALF, _TALLER = 0.4, 0.35
 """Half the height of a row; how much more the row of the methods has to either side."""
 _LETTERS = 110
-"""That fit into the width of the figure."""
+"""Letters that fit into the width of the figure."""
 _Shade = tuple[str, float]
 """Colour and opacity."""
 

@@ -1,4 +1,4 @@
-"""Pictures of a recording before any model: courses, spectra, coherence, levels, derivatives."""
+"""Figures of a recording before any model: time series, spectra, coherence, levels, derivatives."""
 
 from collections.abc import Sequence
 
@@ -12,16 +12,16 @@ from matplotlib.ticker import MaxNLocator
 from analysis.diagnosis.types import Mask
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, COLOURS, GREY, MARKERS, ORANGE, SKY, new_figure, plain_axes
-from analysis.figures.untimed import in_samples
+from analysis.figures.untimed import count_in_samples
 from analysis.look.channels import Channel
 from analysis.look.kinematics import KinematicPair, derivative
 from analysis.look.overview import Overview
 from equalizer.signals.signal import FloatArray
 
 COLUMNS = 1200
-"""Of a course, each drawn from its lowest to its highest sample."""
+"""Columns of a time series, each drawn from its lowest to its highest sample."""
 SHOWN_SAMPLES = 600
-"""Of two courses that are laid over each other."""
+"""Samples shown where two time series are compared."""
 _FIT, _TEST, _BAND = "#EEF3E6", "#FBEFD9", "#EEF3E6"
 _DECADES = 8
 _COLOUR_OF = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "position": SKY, "condition": GREY}
@@ -29,29 +29,29 @@ _COLOUR_OF = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "positi
 
 def look_pictures(found: Overview, place: int) -> tuple[Picture, ...]:
     """place: of the recording among those of the page, from 1; part of the pictures' names."""
-    pictures = [_signals(found, f"signals-{place}")]
+    pictures = [_signals_picture(found, f"signals-{place}")]
     if found.spectra is not None:
-        pictures.append(_spectra(found, f"spectra-{place}"))
+        pictures.append(_spectra_picture(found, f"spectra-{place}"))
     if found.coherences:
-        pictures.append(_coherence(found, f"coherence-{place}"))
+        pictures.append(_coherence_picture(found, f"coherence-{place}"))
     if len(found.levels) > 2:
-        pictures.append(_levels(found, f"levels-{place}"))
+        pictures.append(_levels_picture(found, f"levels-{place}"))
     if found.pairs:
-        pictures.append(_derivatives(found, f"derivatives-{place}"))
-    return tuple(pictures if found.recording.is_timed else map(in_samples, pictures))
+        pictures.append(_derivatives_picture(found, f"derivatives-{place}"))
+    return tuple(pictures if found.recording.is_timed else map(count_in_samples, pictures))
 
 
-def _rows(found: Overview, height_in: float) -> tuple[Figure, list[Axes]]:
+def _channel_panels(found: Overview, height_in: float) -> tuple[Figure, list[Axes]]:
     figure = new_figure(8.6, 0.8 + height_in * len(found.channels))
     axes = figure.subplots(len(found.channels), 1, sharex=True, squeeze=False)[:, 0]
     for channel, panel in zip(found.channels, axes, strict=True):
         plain_axes(panel)
-        panel.set_title(f"{channel.role} {channel.name} ({_pretty(channel.unit)})", fontsize=9, loc="left", pad=3)
+        panel.set_title(f"{channel.role} {channel.name} ({_unit_text(channel.unit)})", fontsize=9, loc="left", pad=3)
     return figure, list(axes)
 
 
-def _signals(found: Overview, name: str) -> Picture:
-    figure, axes = _rows(found, 1.15)
+def _signals_picture(found: Overview, name: str) -> Picture:
+    figure, axes = _channel_panels(found, 1.15)
     rate_hz = found.recording.sample_rate_hz
     for channel, panel in zip(found.channels, axes, strict=True):
         times_s, low, high = envelope(channel.samples, rate_hz)
@@ -85,9 +85,9 @@ def envelope(samples: FloatArray, rate_hz: float, columns: int = COLUMNS) -> tup
     return starts / rate_hz, low, high
 
 
-def _spectra(found: Overview, name: str) -> Picture:
+def _spectra_picture(found: Overview, name: str) -> Picture:
     assert found.spectra is not None
-    figure, axes = _rows(found, 1.25)
+    figure, axes = _channel_panels(found, 1.25)
     frequency_hz = found.spectra.frequency_hz
     for k, (channel, panel) in enumerate(zip(found.channels, axes, strict=True)):
         amplitude = np.sqrt(found.spectra.power(k))
@@ -120,13 +120,13 @@ def _shade_bands(panel: Axes, found: Overview) -> None:
         panel.axvspan(low, high, color=_BAND, zorder=0)
 
 
-def _in_band(found: Overview) -> Mask:
+def _band_lines(found: Overview) -> Mask:
     assert found.spectra is not None
     low, high = min(band.low_hz for band in found.bands), max(band.high_hz for band in found.bands)
     return np.asarray((found.spectra.frequency_hz >= low) & (found.spectra.frequency_hz <= high))
 
 
-def _coherence(found: Overview, name: str) -> Picture:
+def _coherence_picture(found: Overview, name: str) -> Picture:
     assert found.spectra is not None
     figure = new_figure(8.6, 3.0)
     panel = figure.subplots()
@@ -135,7 +135,7 @@ def _coherence(found: Overview, name: str) -> Picture:
     for k, coherence in enumerate(found.coherences):
         colour = COLOURS[k % len(COLOURS)]
         panel.plot(found.spectra.frequency_hz, coherence.multiple, color=colour, lw=0.7, alpha=0.3)
-        inside = _in_band(found)
+        inside = _band_lines(found)
         panel.plot(
             found.spectra.frequency_hz[inside],
             coherence.multiple[inside],
@@ -158,7 +158,7 @@ def _coherence(found: Overview, name: str) -> Picture:
     )
 
 
-def _levels(found: Overview, name: str) -> Picture:
+def _levels_picture(found: Overview, name: str) -> Picture:
     figure = new_figure(8.6, 3.2)
     panel = figure.subplots()
     plain_axes(panel)
@@ -175,7 +175,7 @@ def _levels(found: Overview, name: str) -> Picture:
             markersize=5,
             linewidth=0.8,
             linestyle=":" if found.channels[k].role == "command" else "-",
-            label=f"{found.channels[k].label} ({_pretty(found.channels[k].of(strongest[k]))})",
+            label=f"{found.channels[k].label} ({_unit_text(found.channels[k].format(strongest[k]))})",
         )
     panel.set_ylim(0, 1.05)
     panel.set_xlabel("Segment", fontsize=10)
@@ -192,12 +192,12 @@ def _levels(found: Overview, name: str) -> Picture:
     )
 
 
-def _derivatives(found: Overview, name: str) -> Picture:
+def _derivatives_picture(found: Overview, name: str) -> Picture:
     pairs = found.pairs
     figure = new_figure(8.6, 0.8 + 1.9 * len(pairs))
     axes = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
     for pair, panel in zip(pairs, axes, strict=True):
-        _pair_panel(panel, pair, found)
+        _draw_pair(panel, pair, found)
     handles = [
         Line2D([], [], color=BLACK, linewidth=2.2, alpha=0.35, label="recorded"),
         Line2D([], [], color=BLUE, linewidth=1.0, label="differentiated position or speed"),
@@ -213,23 +213,23 @@ def _derivatives(found: Overview, name: str) -> Picture:
     )
 
 
-def _pair_panel(panel: Axes, pair: KinematicPair, found: Overview) -> None:
+def _draw_pair(panel: Axes, pair: KinematicPair, found: Overview) -> None:
     rate_hz = found.recording.sample_rate_hz
     by_label = {channel.label: channel for channel in found.channels}
     later = by_label[pair.derivative]
-    start, stop = _liveliest(later, found.stretches)
+    start, stop = _most_varying_part(later, found.stretches)
     times_s = np.arange(start, stop) / rate_hz
     # Of this stretch alone: where two parts meet, the place jumps.
     differences = derivative(by_label[pair.place].samples[start:stop], pair.order, rate_hz)
     plain_axes(panel)
     panel.plot(times_s, later.samples[start:stop], color=BLACK, linewidth=2.2, alpha=0.35)
     panel.plot(times_s, differences, color=BLUE, linewidth=1.0)
-    panel.set_title(f"{pair.derivative} ({_pretty(later.unit)}) and {pair.place}", fontsize=9, loc="left", pad=3)
+    panel.set_title(f"{pair.derivative} ({_unit_text(later.unit)}) and {pair.place}", fontsize=9, loc="left", pad=3)
     panel.set_xlim(float(times_s[0]), float(times_s[-1]))
 
 
-def _liveliest(channel: Channel, stretches: Sequence[tuple[int, int]]) -> tuple[int, int]:
-    """Where the channel varies the most, within one stretch."""
+def _most_varying_part(channel: Channel, stretches: Sequence[tuple[int, int]]) -> tuple[int, int]:
+    """The part of a single stretch in which the channel varies most."""
     best, place = -1.0, stretches[0]
     for start, stop in stretches:
         piece = np.nan_to_num(channel.samples[start:stop] - np.nanmean(channel.samples))
@@ -243,5 +243,5 @@ def _liveliest(channel: Channel, stretches: Sequence[tuple[int, int]]) -> tuple[
     return place
 
 
-def _pretty(unit: str) -> str:
+def _unit_text(unit: str) -> str:
     return "no unit" if unit == "1" else unit.replace("^2", "²")

@@ -1,4 +1,4 @@
-"""What an order buys and costs: singular values, error on held-out lines, work per tick."""
+"""Figure of model orders: singular values, error on held-out lines, multiplications per tick."""
 
 import numpy as np
 from matplotlib.axes import Axes

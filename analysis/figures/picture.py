@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 
 
 def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> str:
-    """The <svg> element alone, with a title and a description for those who cannot see it. The same figure gives the
-    same text.
+    """The <svg> element alone, with a title and a description for screen readers. The same figure gives the same text.
 
     name: letters, digits, hyphens; put before every id, so that two figures in a page do not share any.
     """
@@ -26,14 +25,14 @@ def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> 
     svg = svg.replace("url(#", f"url(#{name}-").replace('href="#', f'href="#{name}-')
     opening, rest = svg.split(">", 1)
     named = f"{name}-title {name}-description" if description else f"{name}-title"
-    described = f'<desc id="{name}-description">{_escaped(description)}</desc>' if description else ""
+    described = f'<desc id="{name}-description">{_escape_markup(description)}</desc>' if description else ""
     return (
-        f'{opening} role="img" aria-labelledby="{named}"><title id="{name}-title">{_escaped(title)}</title>'
+        f'{opening} role="img" aria-labelledby="{named}"><title id="{name}-title">{_escape_markup(title)}</title>'
         f"{described}{rest}"
     )
 
 
-def _escaped(text: str) -> str:
+def _escape_markup(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
@@ -47,9 +46,9 @@ class Picture:
     folded: bool = False
     """Shown in a report only when asked for."""
     alternative: str = ""
-    """What is to be seen, for those who cannot see it; the title alone where empty."""
+    """Description for screen readers; the title alone where empty."""
     drawn: list[str] = field(default_factory=list)
-    """As `inline_svg`, once it was drawn: the page and the file beside it want the same."""
+    """Cached result of `inline_svg`, because the page and the file beside it use the same."""
 
 
 def picture_svg(picture: Picture) -> str:

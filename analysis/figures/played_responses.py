@@ -1,4 +1,4 @@
-"""What was played of what was wanted, without and with an equalizer, centre and edge (the published figure 5)."""
+"""Figure of delivered over wanted acceleration, with and without equalizer, centre and edge (published figure 5)."""
 
 from collections.abc import Sequence
 from textwrap import fill

@@ -1,4 +1,4 @@
-"""What a bank of concealed physics shows: which effect was taken for which, from which strength on, and how sure."""
+"""Figures of a bank of concealed effects: confusion, detection thresholds, and calibration of probabilities."""
 
 from collections.abc import Sequence
 
@@ -21,13 +21,13 @@ def proof_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tup
     singles = [outcome for outcome in outcomes if outcome.kind == "single"]
     pictures = []
     if singles:
-        pictures += [_strips(detection_strips(singles)), _by_size(singles), _confusion(singles)]
+        pictures += [_strips_picture(detection_strips(singles)), _size_picture(singles), _confusion_picture(singles)]
     if calibration.bins:
-        pictures.append(_reliability(calibration))
+        pictures.append(_reliability_picture(calibration))
     return tuple(pictures)
 
 
-def _strips(strips: Sequence[Strip]) -> Picture:
+def _strips_picture(strips: Sequence[Strip]) -> Picture:
     figure = new_figure(8.8, 1.3 + 0.21 * len(strips))
     axes = figure.add_subplot()
     plain_axes(axes)
@@ -55,7 +55,7 @@ def _strips(strips: Sequence[Strip]) -> Picture:
     )  # fmt: skip
 
 
-def _by_size(singles: Sequence[Outcome]) -> Picture:
+def _size_picture(singles: Sequence[Outcome]) -> Picture:
     """All effects together, against what an oracle that knows the truth sees."""
     figure = new_figure(7.4, 3.6)
     axes = figure.add_subplot()
@@ -79,7 +79,7 @@ def _by_size(singles: Sequence[Outcome]) -> Picture:
     )  # fmt: skip
 
 
-def _confusion(singles: Sequence[Outcome]) -> Picture:
+def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
     seen = [single for single in singles if single.detectable]
     said = [item.named_names[0] if item.named else NOTHING_SAID for item in seen]
     wrong = {name for item, name in zip(seen, said, strict=True) if name not in (NOTHING_SAID, item.names[0])}
@@ -120,7 +120,7 @@ def _draw_counts(axes: Axes, counts: np.ndarray[tuple[int, ...], np.dtype[np.flo
         axes.spines[side].set_visible(False)
 
 
-def _reliability(calibration: Calibration) -> Picture:
+def _reliability_picture(calibration: Calibration) -> Picture:
     figure = new_figure(5.2, 4.4)
     axes = figure.add_subplot()
     plain_axes(axes)

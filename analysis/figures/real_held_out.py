@@ -1,4 +1,4 @@
-"""One figure per real recording: a held-out stretch, measured and predicted, and the errors of all that was tried."""
+"""Figure of a real recording: a held-out excerpt, measured and predicted, and the errors of all models."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,11 +18,11 @@ def real_picture(answer: RealAnswer) -> Picture:
     rows = error_rows(answer)
     said = "; ".join(f"{name} {100 * value:.3g} %" for name, value, _ in rows)
     return Picture(
-        name=f"held-out-{_plain(answer.folder)}-{_plain(answer.recording)}",
+        name=f"held-out-{_plain_name(answer.folder)}-{_plain_name(answer.recording)}",
         title=f"Held-out data of {answer.recording}",
         caption="Left: where what was found changes the prediction most. Right: errors on all held-out data as a share "
         "of the signal, logarithmic; shorter is better.",
-        figure=_drawn(answer.excerpt, rows),
+        figure=_draw_answer(answer.excerpt, rows),
         alternative=said or "Nothing was held out.",
     )
 
@@ -42,7 +42,7 @@ def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
     return [(name, value, colour) for name, value, colour in every if value is not None and value > 0]
 
 
-def _drawn(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]]) -> Figure:
+def _draw_answer(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]]) -> Figure:
     if excerpt is None or not rows:
         return say_nothing_to_draw(new_figure(8.6, 1.6), "There are no held-out data to draw.")
     figure = new_figure(8.8, 3.4)
@@ -89,5 +89,5 @@ def _draw_errors(axes: Axes, rows: list[tuple[str, float, str]]) -> None:
     axes.set_xticks([], minor=True)
 
 
-def _plain(name: str) -> str:
+def _plain_name(name: str) -> str:
     return "".join(sign if sign.isalnum() else "-" for sign in name)

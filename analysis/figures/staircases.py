@@ -1,4 +1,4 @@
-"""The tracks of one participant: level by trial, with every answer, every reversal and the threshold."""
+"""Figure of a participant's staircases: level by trial, with every answer, every reversal and the threshold."""
 
 from collections.abc import Sequence
 

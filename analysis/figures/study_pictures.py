@@ -16,10 +16,10 @@ def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult
     """Only what there is data for."""
     pictures = []
     if any(row.complete for row in analysis.thresholds):
-        pictures.append(_thresholds(analysis))
+        pictures.append(_thresholds_picture(analysis))
     if any(trial.counts and trial.delivered_mps2 for trial in analysis.trials):
-        pictures.append(_delivered(analysis))
-    pictures += _staircases(analysis)
+        pictures.append(_delivered_picture(analysis))
+    pictures += _staircase_pictures(analysis)
     if ellipsoids:
         pictures.append(ellipsoid_picture(ellipsoids))
     return tuple(pictures)
@@ -38,7 +38,7 @@ def ellipsoid_picture(ellipsoids: Sequence[EllipsoidResult]) -> Picture:
     )
 
 
-def _thresholds(analysis: StudyAnalysis) -> Picture:
+def _thresholds_picture(analysis: StudyAnalysis) -> Picture:
     return Picture(
         name="thresholds",
         title="Thresholds by frequency",
@@ -50,7 +50,7 @@ def _thresholds(analysis: StudyAnalysis) -> Picture:
     )
 
 
-def _delivered(analysis: StudyAnalysis) -> Picture:
+def _delivered_picture(analysis: StudyAnalysis) -> Picture:
     return Picture(
         name="delivered",
         title="Delivered acceleration against commanded level",
@@ -61,7 +61,7 @@ def _delivered(analysis: StudyAnalysis) -> Picture:
     )
 
 
-def _staircases(analysis: StudyAnalysis) -> list[Picture]:
+def _staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
     subjects = dict.fromkeys(run.subject for run in analysis.runs)
     return [
         Picture(

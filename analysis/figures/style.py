@@ -1,4 +1,4 @@
-"""What all figures share: colours that a colour-blind reader can tell apart, markers that tell them apart again.
+"""Common style of all figures: colours that colour-blind readers can distinguish, and redundant markers.
 
 Palette: M. Okabe, K. Ito, Color Universal Design (2008).
 """

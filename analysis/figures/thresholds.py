@@ -22,7 +22,7 @@ _SPREAD = 0.5
 """Width taken by the participants of one frequency, in steps between frequencies."""
 _LEGEND_LIMIT = 24
 _STOPPED_AT = 1.07
-"""Height of the row of stopped runs, in caps."""
+"""Height of the row of stopped runs, as a multiple of the cap."""
 
 
 def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: float) -> Figure:
@@ -66,7 +66,7 @@ def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
 
 
 def _draw_threshold(axes: Axes, x: float, value_n: float, participant: int, cut: bool) -> None:
-    """Hollow where the cap cut, with an arrow above: marker and colour still tell whose it is."""
+    """Hollow with an arrow above where the cap cut; marker and colour identify the participant."""
     colour = _colour(participant)
     axes.plot(x, value_n, _marker(participant), color=colour, markersize=6, alpha=0.85,
               markerfacecolor="white" if cut else colour, markeredgecolor=colour if cut else "white",
@@ -78,7 +78,7 @@ def _draw_threshold(axes: Axes, x: float, value_n: float, participant: int, cut:
 
 
 def _draw_stopped(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
-    """Hollow and above the cap: where the threshold is, the run does not say."""
+    """Hollow and above the cap: a stopped run has no threshold."""
     places = np.linspace(-_SPREAD / 2, _SPREAD / 2, max(2, len(table.subjects)))
     for index, row in enumerate(table.stopped):
         for at, stopped in enumerate(row):

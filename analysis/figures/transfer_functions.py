@@ -64,8 +64,10 @@ def draw_transfer_functions(
             if model is not None:
                 axes.plot(model.frequency_hz, np.abs(model.response[:, row, column]), "--", color=VERMILLION, lw=1.2)
             axes.set_title(f"{entry} → {output}", fontsize=9, loc="left", pad=3)
-    _scale(grid[0][0], bins)
-    figure.supylabel(f"Magnitude ({_pretty(response.output_unit)} per {_pretty(response.input_unit)})", fontsize=10)
+    _scale_axes(grid[0][0], bins)
+    figure.supylabel(
+        f"Magnitude ({_unit_text(response.output_unit)} per {_unit_text(response.input_unit)})", fontsize=10
+    )
     figure.supxlabel("Frequency (Hz)", fontsize=10)
     handles = _legend(bins, model, band_hz)
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=8.5, frameon=False)
@@ -77,21 +79,21 @@ def _draw_entry(axes: Axes, bins: OctaveBins, row: int, column: int) -> None:
     mean = np.abs(bins.response[:, row, column])
     low, high = bins.lowest[:, row, column], bins.highest[:, row, column]
     for where, line, shade in ((~bins.reliable, _DIM, "#E6E6E6"), (bins.reliable, BLUE, SKY)):
-        wide = _widened(where)
+        wide = _extend_mask(where)
         axes.fill_between(bins.frequency_hz, low, high, where=wide.tolist(), color=shade, alpha=0.45, linewidth=0)
         axes.plot(bins.frequency_hz, np.where(wide, mean, np.nan), color=line, linewidth=1.2)
     floor = np.sqrt(bins.noise_variance[:, row, column])
     axes.plot(bins.frequency_hz, floor, ":", color=ORANGE, linewidth=1.1)
 
 
-def _widened(where: BoolArray) -> BoolArray:
-    """With the next bin, so that a curve that changes its colour has no gap."""
+def _extend_mask(where: BoolArray) -> BoolArray:
+    """The mask with each next bin included, so that a curve that changes its colour has no gap."""
     wide = where.copy()
     wide[1:] |= where[:-1]
     return wide
 
 
-def _scale(axes: Axes, bins: OctaveBins) -> None:
+def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
     """The axes are shared: one is set for all."""
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -124,5 +126,5 @@ def _legend(
     return handles
 
 
-def _pretty(unit: str) -> str:
+def _unit_text(unit: str) -> str:
     return unit.replace("^2", "²")

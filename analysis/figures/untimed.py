@@ -1,4 +1,4 @@
-"""Figures of recordings of which no time is known: axes count samples, where they would say seconds and hertz."""
+"""Figures of recordings without known time: labels in samples instead of seconds and hertz."""
 
 from dataclasses import replace
 
@@ -8,8 +8,8 @@ from analysis.figures.picture import Picture
 from analysis.wording import untimed_text
 
 
-def in_samples(picture: Picture) -> Picture:
-    """Before it is drawn."""
+def count_in_samples(picture: Picture) -> Picture:
+    """The picture with all its texts in samples; to be called before it is drawn."""
     for text in picture.figure.findobj(Text):
         if isinstance(text, Text):
             text.set_text(untimed_text(text.get_text()))

@@ -1,5 +1,5 @@
-"""Recordings looked at before any model.
+"""Checks and summaries of a recording before any model.
 
-`channels` (one by one, by stretches) and `cross_spectra` -> `completeness`, `clock`, `clipping`, `plausibility`,
-`levels`, `repeats`, `driven_band`, `kinematics` (each a `check`) -> `overview`. Begin at `overview.py`.
+`channels` (one by one, by stretches) and `cross_spectra` -> `completeness`, `clock`, `check_clipping`, `plausibility`,
+`levels`, `find_repeats`, `driven_band`, `kinematics` (each a `check`) -> `overview`. Begin at `overview.py`.
 """

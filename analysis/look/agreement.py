@@ -1,4 +1,4 @@
-"""By which factor and how late one channel shows another: magnitudes and phase slope of coherent lines."""
+"""Gain and lag between two channels, from magnitudes and phase slope of their coherent lines."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,9 @@ COHERENT = 0.9
 LONGEST_LAG = 20.0
 """Samples, either way."""
 _HIGHEST = 0.25
-"""Of the sample rate: above, differences and sensors bend what is compared."""
+"""Share of the sample rate up to which channels are compared: above, differences and sensors distort the result."""
 _NEARER = 0.01
-"""Of two lags that explain the phases alike, the nearer one is meant: share of the score for the longest."""
+"""Penalty of the longest lag, as a share of the score, so that the shorter of two equally good lags is chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,8 @@ class Agreement:
 
 
 def agreement(spectra: CrossSpectra, first: int, second: int, gain: FloatArray | None = None) -> Agreement | None:
-    """None where no line is coherent. gain: (lines,), by how much the first was made smaller, as by a difference."""
+    """Agreement of two channels; None where no line is coherent. gain: (lines,), known attenuation of the first
+    channel, as by a difference."""
     power_first, power = spectra.power(first), spectra.power(second)
     nyquist_hz = float(spectra.frequency_hz[-1])
     usable = spectra.frequency_hz <= 2 * _HIGHEST * nyquist_hz
@@ -49,7 +50,7 @@ def agreement(spectra: CrossSpectra, first: int, second: int, gain: FloatArray |
 
 
 def _sign_and_lag(phases: np.ndarray, turns: FloatArray, weight: FloatArray) -> tuple[float, float]:
-    """turns: (lines,), of a line's phase in a sample."""
+    """Sign and lag in samples of the weighted phases (lines,). turns: (lines,), cycles per sample of each line."""
     lags = np.arange(-LONGEST_LAG, LONGEST_LAG + 0.05, 0.1)
     together = np.exp(2j * np.pi * np.outer(lags, turns)) @ (weight * phases)
     score = np.abs(together.real) - _NEARER * np.abs(lags) / LONGEST_LAG

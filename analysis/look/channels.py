@@ -1,4 +1,4 @@
-"""The channels of a recording, one by one, and the stretches in which time runs on."""
+"""The channels of a recording, and its stretches, within which time is continuous."""
 
 from dataclasses import dataclass
 
@@ -33,9 +33,9 @@ class Channel:
         """Without missing samples."""
         return self.samples[np.isfinite(self.samples)]
 
-    def of(self, value: float) -> str:
+    def format(self, value: float) -> str:
         """A value of this channel, as text with its unit."""
-        return in_unit(value, self.unit)
+        return format_value(value, self.unit)
 
 
 def channels_of(recording: Recording) -> tuple[Channel, ...]:
@@ -53,10 +53,10 @@ def stretches_of(recording: Recording) -> tuple[Stretch, ...]:
     return parts_of(recording)
 
 
-def in_unit(value: float, unit: str, digits: int = 3) -> str:
+def format_value(value: float, unit: str, digits: int = 3) -> str:
     return f"{typeset(f'{value:.{digits}g}')}{'' if unit == '1' else f' {unit}'}"
 
 
 def rms(samples: FloatArray) -> float:
-    """About the mean; 0 of nothing."""
+    """Root mean square about the mean; 0 for no samples."""
     return float(np.std(samples)) if samples.size else 0.0

@@ -1,4 +1,4 @@
-"""One thing that was checked in a recording, and what came of it."""
+"""Result of a single check of a recording."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,8 +1,8 @@
-"""Flat extremes: where a sensor, a converter or an amplifier came to its end.
+"""Detection of clipping: flat extremes at the limit of a sensor, a converter or an amplifier.
 
-A signal that turns by itself is slow where it turns, so it stays near its extreme no longer than its slope before and
-after allows. A clipped one comes in fast, stays at the last value, and leaves fast: by its slopes and the time that it
-stays, it would have gone on by slope x time / 4 (a parabola through both).
+A signal that reverses by itself is slow there, so it stays near its extreme no longer than its slope before and after
+allows. A clipped one arrives fast, stays at the last value, and leaves fast: by its slopes and the time at the extreme,
+it would have risen further by slope x time / 4 (a parabola through both).
 """
 
 from collections.abc import Sequence
@@ -16,31 +16,31 @@ from equalizer.signals.signal import FloatArray
 
 CLIPPING = "clipping"
 LEAST_SAMPLES = 5
-"""At an extreme: fewer are chance."""
+"""Samples at an extreme below which they are chance."""
 LEAST_RUNS = 2
 _STEPS = 3.0
-"""By how many steps of rounding a channel would have gone on, at least."""
+"""Least extrapolated rise beyond the extreme, in steps of rounding."""
 SETTLES = 0.4
-"""Of its speed before, that a signal must keep until it is flat: with less it comes to rest there by itself."""
+"""Share of its earlier speed that a signal must keep until it is flat: with less it comes to rest by itself."""
 _FEW_VALUES = 24
-"""A channel of so few values was made so: a binary command, a series of steps, a coarse encoder."""
+"""Channels with no more distinct values are not checked: a binary command, a series of steps, a coarse encoder."""
 _CROWDED = 4.0
 """Samples at the extreme over those in the next equally wide bin below it."""
 
 
-def clipping(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    found = tuple(check for channel in channels if channel.role != "excitation" for check in _of_channel(channel))
+def check_clipping(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    found = tuple(check for channel in channels if channel.role != "excitation" for check in _channel_checks(channel))
     return fine_if_none(CLIPPING, found, "No channel is flat at its extremes.")
 
 
-def _of_channel(channel: Channel) -> tuple[Check, ...]:
+def _channel_checks(channel: Channel) -> tuple[Check, ...]:
     if len(np.unique(channel.known)) <= _FEW_VALUES:
         return ()
-    sides = [(sign, clipped_samples(sign * channel.samples)) for sign in (1.0, -1.0)]
+    sides = [(sign, count_clipped_samples(sign * channel.samples)) for sign in (1.0, -1.0)]
     hit = [(sign, count) for sign, count in sides if count]
     if not hit:
         return ()
-    ends = " and ".join(channel.of(sign * float(np.max(sign * channel.known))) for sign, _ in hit)
+    ends = " and ".join(channel.format(sign * float(np.max(sign * channel.known))) for sign, _ in hit)
     count = sum(count for _, count in hit)
     seen = f"{channel.label} is cut off at {ends}: {count} samples ({count / len(channel.samples):.2%}) lie there."
     if channel.role == "command":
@@ -50,8 +50,8 @@ def _of_channel(channel: Channel) -> tuple[Check, ...]:
     )
 
 
-def clipped_samples(samples: FloatArray) -> int:
-    """At the upper end; 0 where the signal turns there by itself. samples: (n,), NaN = missing."""
+def count_clipped_samples(samples: FloatArray) -> int:
+    """Clipped samples at the upper end; 0 where the signal reverses there by itself. samples: (n,), NaN = missing."""
     filled = np.where(np.isfinite(samples), samples, -np.inf)
     top = float(filled.max())
     known = samples[np.isfinite(samples)]
@@ -64,23 +64,23 @@ def clipped_samples(samples: FloatArray) -> int:
     if at_top.sum() < LEAST_SAMPLES or at_top.sum() < _CROWDED * next_below / max(1.0, width / max(step, width)):
         return 0
     runs = _runs(at_top)
-    beyond = [_would_go_on(filled, start, stop) for start, stop in runs]
+    beyond = [_extrapolated_rise(filled, start, stop) for start, stop in runs]
     needed = max(_STEPS * step, 1e-6 * float(np.ptp(known)))
     counted = [stop - start for (start, stop), over in zip(runs, beyond, strict=True) if over > needed]
     # A periodic signal comes back to its peak again and again, by the same way: that is one run.
-    ways = {_way(filled, run, needed) for run, over in zip(runs, beyond, strict=True) if over > needed}
+    ways = {_run_signature(filled, run, needed) for run, over in zip(runs, beyond, strict=True) if over > needed}
     return int(at_top.sum()) if len(ways) >= LEAST_RUNS or max(counted, default=0) >= LEAST_SAMPLES else 0
 
 
-def _way(samples: FloatArray, run: tuple[int, int], step: float) -> tuple[float, ...]:
-    """Length, and the samples on either side in steps; the same to and fro."""
+def _run_signature(samples: FloatArray, run: tuple[int, int], step: float) -> tuple[float, ...]:
+    """Length of a flat run, and the samples on either side in steps, sorted: equal for runs of a periodic signal."""
     start, stop = run
     beside = sorted((round(float(samples[start - 1]) / step), round(float(samples[stop]) / step)))
     return (stop - start, *beside)
 
 
-def _would_go_on(samples: FloatArray, start: int, stop: int) -> float:
-    """How far above a flat run the signal would have risen; 0 at the ends of a recording."""
+def _extrapolated_rise(samples: FloatArray, start: int, stop: int) -> float:
+    """Extrapolated rise of the signal above a flat run; 0 at the ends of a recording."""
     back = max(1, (stop - start) // 8)  # a rounded signal stands still between its steps, so not by two samples alone
     if start - 1 < 2 * back or stop + back >= len(samples):
         return 0.0

@@ -12,14 +12,14 @@ CLOCK = "clock"
 GAP = 1.5
 """Steps between two stamps that are a gap."""
 JITTER, WILD = 0.02, 0.2
-"""Rms of a stamp off its place, in steps, that is noticed, and that spoils phases."""
+"""Rms deviation of stamps from their places, in steps: from the first it is reported, from the second phases fail."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1e5
-"""Of the devices and sensors that are known here: outside, stamps in s were called ms, or the other way."""
+"""Sample rates of known devices and sensors: outside, stamps in s were probably called ms, or the reverse."""
 DRIFT_PPM, RATE_PPM = 100.0, 5000.0
-"""Off the stated rate: a cheap oscillator, and a rate that is another."""
+"""Deviation from the stated rate: of a cheap oscillator, and from which the rate is wrong."""
 
 
-def clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Check, ...]:
+def check_clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Check, ...]:
     if recording.meta.get("time") == "unknown":
         return (
             Check(
@@ -30,33 +30,33 @@ def clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Check, ..
             ),
         )
     if recording.time_s is None:
-        said = (*_resampled(recording), *_rate(recording.sample_rate_hz))
-        return said or (Check(CLOCK, "fine", _whence(recording)),)
-    found = tuple(check for start, stop in stretches for check in _of_stamps(recording, start, stop))
+        said = (*_resampling_checks(recording), *_rate_checks(recording.sample_rate_hz))
+        return said or (Check(CLOCK, "fine", _clock_source(recording)),)
+    found = tuple(check for start, stop in stretches for check in _stamp_checks(recording, start, stop))
     return found or (Check(CLOCK, "fine", "All stamps are in their places."),)
 
 
-def odd_rate(rate_hz: float) -> str:
-    """What speaks against a rate, from stamps in another unit than was said; empty where nothing does."""
+def rate_objection(rate_hz: float) -> str:
+    """Objection to an implausible rate, as from stamps in another unit; empty where there is none."""
     if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
         return ""
     other = "s, called ms" if rate_hz > FASTEST_HZ else "ms, called s"
     return f"{rate_hz:g} Hz is an unlikely rate of a haptic device: the time may be in another unit ({other})."
 
 
-def _rate(rate_hz: float) -> tuple[Check, ...]:
-    odd = odd_rate(rate_hz)
+def _rate_checks(rate_hz: float) -> tuple[Check, ...]:
+    odd = rate_objection(rate_hz)
     return (Check(CLOCK, "notice", odd, "Check the unit of the time, and import again."),) if odd else ()
 
 
-def _whence(recording: Recording) -> str:
+def _clock_source(recording: Recording) -> str:
     if recording.meta.get("time") == "stamps":
         return f"The time stamps of the file were even at its import; they give {recording.sample_rate_hz:g} Hz."
     return f"There are no time stamps; {recording.sample_rate_hz:g} Hz is taken as stated."
 
 
-def _resampled(recording: Recording) -> tuple[Check, ...]:
-    """What an import has said about uneven stamps."""
+def _resampling_checks(recording: Recording) -> tuple[Check, ...]:
+    """Checks from an import's notes about uneven stamps."""
     said = recording.meta.get("import")
     notes = said.get("notes", ()) if isinstance(said, dict) else ()
     uneven = [str(note) for note in notes if "uneven stamps" in str(note)] if isinstance(notes, list) else []
@@ -66,7 +66,7 @@ def _resampled(recording: Recording) -> tuple[Check, ...]:
     )
 
 
-def _of_stamps(recording: Recording, start: int, stop: int) -> tuple[Check, ...]:
+def _stamp_checks(recording: Recording, start: int, stop: int) -> tuple[Check, ...]:
     assert recording.time_s is not None
     stamps, rate_hz = recording.time_s[start:stop], recording.sample_rate_hz
     if len(stamps) < 3:

@@ -1,4 +1,4 @@
-"""What is not there, or there twice: missing samples, channels that never change, copies of others."""
+"""Checks of completeness: missing samples, constant channels, copies of other channels."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -15,15 +15,15 @@ _MANY = 0.2
 _SAME_STORED = 1e-6
 """Share of a channel's rms that a copy may differ by: rounding in single precision."""
 _FIRST_FEW = 1000
-"""Samples that a copy is looked for in first: most channels are none."""
+"""Samples in which a copy is searched for first, because most channels are none."""
 
 
-def missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[Check, ...]:
-    found = tuple(_missing(channel, rate_hz) for channel in channels if not np.isfinite(channel.samples).all())
+def check_missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[Check, ...]:
+    found = tuple(_missing_check(channel, rate_hz) for channel in channels if not np.isfinite(channel.samples).all())
     return fine_if_none(MISSING, found, "No sample is missing in any channel.")
 
 
-def _missing(channel: Channel, rate_hz: float) -> Check:
+def _missing_check(channel: Channel, rate_hz: float) -> Check:
     lost = ~np.isfinite(channel.samples)
     count, first = int(lost.sum()), int(np.argmax(lost))
     longest = _longest_run(np.asarray(lost, dtype=np.float64))
@@ -41,32 +41,32 @@ def _longest_run(marked: FloatArray) -> int:
     return int(np.max(edges[1::2] - edges[::2])) if len(edges) else 0
 
 
-def constant_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """A setting is expected to stay, and so may what was decided beforehand."""
+def check_constant_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    """Check commands and sensors for constant channels; a condition or an excitation may be constant."""
     measured = [channel for channel in channels if channel.role not in ("condition", "excitation")]
-    found = tuple(_constant(channel) for channel in measured if channel.known.size and np.ptp(channel.known) == 0)
+    found = tuple(_constant_check(channel) for channel in measured if channel.known.size and np.ptp(channel.known) == 0)
     return fine_if_none(CONSTANT, found, "Every command and every sensor changes.")
 
 
-def _constant(channel: Channel) -> Check:
-    seen = f"{channel.label} is {channel.of(float(channel.known[0]))} throughout."
+def _constant_check(channel: Channel) -> Check:
+    seen = f"{channel.label} is {channel.format(float(channel.known[0]))} throughout."
     if channel.role == "command":
         return Check(CONSTANT, "notice", seen, "Nothing can be said of what it drives; leave it out, or drive it.")
     return Check(CONSTANT, "wrong", seen, "Check the cable and the map: a sensor that works is never so still.")
 
 
-def copied_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Of the same, or of a scaled or shifted channel. An excitation that is its command tells that nothing fed back."""
-    found = tuple(_copies(channels))
+def check_copied_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    """Check for copies, also scaled or shifted ones. An excitation equal to its command is none: nothing fed back."""
+    found = tuple(_copy_checks(channels))
     return fine_if_none(COPIES, found, "No channel is a copy of another.")
 
 
-def _copies(channels: Sequence[Channel]) -> Iterator[Check]:
+def _copy_checks(channels: Sequence[Channel]) -> Iterator[Check]:
     moving = [channel for channel in channels if channel.known.size and np.ptp(channel.known) > 0]
     for each, other in combinations(moving, 2):
         if {each.role, other.role} == {"command", "excitation"}:
             continue
-        factor = _factor(each.samples, other.samples)
+        factor = _find_copy_factor(each.samples, other.samples)
         if factor is None:
             continue
         scaled = "" if abs(factor - 1) < _SAME_STORED else f" times {factor:.6g}, up to an offset"
@@ -79,19 +79,19 @@ def _copies(channels: Sequence[Channel]) -> Iterator[Check]:
         )
 
 
-def _factor(one: FloatArray, other: FloatArray) -> float | None:
-    """Of the second to the first; None where it is no copy."""
-    few = slice(None, None, max(1, len(one) // _FIRST_FEW))
-    if len(one) > _FIRST_FEW and _copied(one[few], other[few]) is None:
+def _find_copy_factor(first: FloatArray, second: FloatArray) -> float | None:
+    """Factor of the second channel to the first; None where it is not a copy."""
+    few = slice(None, None, max(1, len(first) // _FIRST_FEW))
+    if len(first) > _FIRST_FEW and _copy_factor(first[few], second[few]) is None:
         return None
-    return _copied(one, other)
+    return _copy_factor(first, second)
 
 
-def _copied(one: FloatArray, other: FloatArray) -> float | None:
-    known = np.isfinite(one) & np.isfinite(other)
+def _copy_factor(values: FloatArray, copy: FloatArray) -> float | None:
+    known = np.isfinite(values) & np.isfinite(copy)
     if known.sum() < 3:
         return None
-    first, second = one[known] - one[known].mean(), other[known] - other[known].mean()
+    first, second = values[known] - values[known].mean(), copy[known] - copy[known].mean()
     size, energy = rms(second), float(first @ first)
     if energy == 0 or size == 0:
         return None

@@ -11,10 +11,10 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _WINDOWS = 12
-"""Wished for, of half overlap; as many as that leave half of a coherence of 0.1 to chance."""
+"""Number of half-overlapping windows to aim for; with so many, half of a coherence of 0.1 is chance."""
 _SHORTEST, _LONGEST = 32, 8192
 MOST_WINDOWS = 400
-"""More of them say nothing new, and take time."""
+"""Largest number of windows that are averaged: more take time without benefit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,15 +31,15 @@ class CrossSpectra:
         density: FloatArray = self.matrix[:, channel, channel].real
         return density
 
-    def coherence(self, one: int, other: int) -> FloatArray:
-        both = np.sqrt(self.power(one)) * np.sqrt(self.power(other))
-        return np.asarray((np.abs(self.matrix[:, one, other]) / np.where(both > 0, both, np.inf)) ** 2)
+    def coherence(self, first: int, second: int) -> FloatArray:
+        both = np.sqrt(self.power(first)) * np.sqrt(self.power(second))
+        return np.asarray((np.abs(self.matrix[:, first, second]) / np.where(both > 0, both, np.inf)) ** 2)
 
 
 def cross_spectra(
     channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float, samples_per_window: int = 0
 ) -> CrossSpectra | None:
-    """Windows with missing samples are left out. None where no window is whole."""
+    """Cross-spectral densities, without windows with missing samples. None where no window is whole."""
     columns = np.column_stack([channel.samples for channel in channels])
     total = sum(stop - start for start, stop in stretches)
     usual = 2 ** int(np.log2(max(2 * total / _WINDOWS, _SHORTEST)))
@@ -69,6 +69,6 @@ def cross_spectra(
 
 
 def _straight_lines(length: int) -> npt.NDArray[np.float64]:
-    """(length, 2), orthonormal: what is taken off each window."""
+    """(length, 2): orthonormal basis of the straight lines that are subtracted from each window."""
     ramp = np.arange(length) - (length - 1) / 2
     return np.column_stack([np.full(length, length**-0.5), ramp / np.sqrt(ramp @ ramp)])

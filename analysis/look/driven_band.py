@@ -1,4 +1,4 @@
-"""Which commands were driven, where in frequency, and how much of each response they explain linearly."""
+"""Driven frequency band of each command, and multiple coherence of each response with all commands."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from equalizer.signals.signal import FloatArray
 
 DRIVEN, COHERENCE = "driven axes", "coherence"
 BELOW_PEAK = 1e-2
-"""Of the highest density: lines with less are not driven."""
+"""Share of the highest density below which a line is not driven."""
 LEAST_DRIVE = 1e-4
-"""Of the strongest command of the same unit, in power: less is no drive."""
+"""Power relative to the strongest command of the same unit, below which a command is not driven."""
 LOW, POOR = 0.8, 0.1
-"""Share of a response's power that is noticed; and so little that the channel may be another."""
+"""Coherent share of a response's power below which it is reported, and below which the channel may be a wrong one."""
 _BROAD = frozenset({"multisine", "noise", "binary", "sweep", "rest"})
 _HEARD = 0.01
 """Share of a response's power in an octave that is worth naming."""
@@ -43,9 +43,9 @@ class ResponseCoherence:
     """Share of the power of that octave."""
 
 
-def driven_bands(spectra: CrossSpectra, channels: Sequence[Channel]) -> tuple[DrivenBand, ...]:
-    """Of what was decided beforehand where it was recorded, else of the command."""
-    role = "excitation" if any(_moves(c) and c.role == "excitation" for c in channels) else "command"
+def find_driven_bands(spectra: CrossSpectra, channels: Sequence[Channel]) -> tuple[DrivenBand, ...]:
+    """Driven band of each excitation where it was recorded, else of each command."""
+    role = "excitation" if any(_is_moving(c) and c.role == "excitation" for c in channels) else "command"
     found = []
     powers = {k: spectra.power(k) for k, channel in enumerate(channels) if channel.role == role}
     for k, power in powers.items():
@@ -57,7 +57,7 @@ def driven_bands(spectra: CrossSpectra, channels: Sequence[Channel]) -> tuple[Dr
     return tuple(found)
 
 
-def _moves(channel: Channel) -> bool:
+def _is_moving(channel: Channel) -> bool:
     return bool(channel.known.size and np.ptp(channel.known) > 0)
 
 
@@ -72,8 +72,8 @@ def response_coherences(
     inside = (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high)
     found = []
     for k, channel in enumerate(channels):
-        if channel.role == "response" and _moves(channel):
-            multiple = _multiple(spectra, inputs, k)
+        if channel.role == "response" and _is_moving(channel):
+            multiple = _multiple_coherence(spectra, inputs, k)
             power = spectra.power(k)[inside]
             worst_hz, worst = _worst_octave(spectra.frequency_hz[inside], multiple[inside], power)
             share = float(np.sum(multiple[inside] * power) / np.sum(power))
@@ -81,8 +81,8 @@ def response_coherences(
     return tuple(found)
 
 
-def _multiple(spectra: CrossSpectra, inputs: list[int], response: int) -> FloatArray:
-    """(lines,), without what as many windows give to commands by chance."""
+def _multiple_coherence(spectra: CrossSpectra, inputs: list[int], response: int) -> FloatArray:
+    """Multiple coherence (lines,), corrected for its chance value with as many windows."""
     power_in = spectra.matrix[:, inputs][:, :, inputs]
     # A hint of independent noise in every command keeps collinear ones from being divided by nothing.
     floor = 1e-9 * np.trace(power_in, axis1=1, axis2=2).real.clip(min=np.finfo(np.float64).tiny)
@@ -106,7 +106,7 @@ def _worst_octave(frequency_hz: FloatArray, coherence: FloatArray, power: FloatA
     return float(2.0 ** (worst + 0.5)), shares[worst]
 
 
-def driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tuple[Check, ...]:
+def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tuple[Check, ...]:
     """Commands that never move, and segments that name an excitation that is not there."""
     driven = {band.command for band in bands}
     idle = [name for name in recording.command.channels if name not in driven]
@@ -139,7 +139,8 @@ def silent_segments(recording: Recording) -> tuple[str, ...]:
 
 
 def coherence_checks(coherences: Sequence[ResponseCoherence], recording: Recording) -> tuple[Check, ...]:
-    """Of single steps, slow courses and controllers, windows say little: no more than a notice."""
+    """Checks of the coherences. For single steps, slow signals and controllers, windows tell little: a notice at
+    most."""
     kinds = {segment.kind for segment in recording.segments}
     broad = bool(kinds) and kinds <= _BROAD and recording.excitation is None
     return tuple(_coherence_check(coherence, broad) for coherence in coherences)

@@ -1,4 +1,4 @@
-"""Positions, speeds and accelerations of one motion against each other, and channels that show the same thing twice."""
+"""Consistency of positions, speeds and accelerations of a motion, and lags between channels of the same quantity."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -17,11 +17,11 @@ KINEMATICS, LAGS = "derivatives", "lag between channels"
 _ORDER = {"m": 0, "m/s": 1, "m/s^2": 2, "rad": 0, "rad/s": 1, "rad/s^2": 2}
 _WORDS = {1: "the derivative", 2: "the second derivative"}
 LEAST_SHARE = 0.3
-"""Of a channel's power, in coherent lines: less, and it shows another motion."""
+"""Share of a channel's power in coherent lines below which it shows another motion."""
 SAME_SHARE, SAME_SPREAD = 0.8, 0.2
-"""What two channels of one unit must share, and how even their ratio must be, to be two views of one thing."""
+"""Least coherent share, and largest spread of the ratio, of two channels that measure the same quantity."""
 CLOSE, FAR = 0.05, 0.2
-"""Error of a factor that is noticed, and that is wrong."""
+"""Relative error of a factor from which it is reported, and from which it is wrong."""
 LATE = 0.6
 """Samples: a force that is held moves an acceleration by half of one, and so does a difference to the sample before."""
 _FILTERED = (
@@ -46,10 +46,10 @@ class KinematicPair:
     agreement: Agreement
 
 
-def kinematic_pairs(
+def find_kinematic_pairs(
     channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
 ) -> tuple[KinematicPair, ...]:
-    """For each speed and acceleration, the channel whose derivative shows it best; none where no derivative does."""
+    """For each speed and acceleration, the channel whose derivative agrees best with it, if any does."""
     moving = [
         channel for channel in channels if channel.unit in _ORDER and channel.known.size and np.ptp(channel.known) > 0
     ]
@@ -63,20 +63,20 @@ def _best_pair(
     for earlier in moving:
         order = _ORDER[later.unit] - _ORDER[earlier.unit]
         if order > 0 and later.unit.startswith(earlier.unit.split("/")[0]) and later.role != "excitation":
-            agreed = _compared(earlier, later, order, (stretches, rate_hz))
+            agreed = _compare_derivative(earlier, later, order, (stretches, rate_hz))
             if agreed is not None and agreed.share >= LEAST_SHARE:
                 found.append(KinematicPair(earlier.label, later.label, order, agreed))
     return max(found, key=lambda pair: pair.agreement.share, default=None)
 
 
-def _compared(
+def _compare_derivative(
     earlier: Channel, later: Channel, order: int, timing: tuple[Sequence[Stretch], float]
 ) -> Agreement | None:
     stretches, rate_hz = timing
     differentiated = replace(earlier, samples=derivative(earlier.samples, order, rate_hz))
     inner = [(start + 1, stop - 1) for start, stop in stretches if stop - start > 4]
     spectra = cross_spectra((differentiated, later), inner, rate_hz) if inner else None
-    return agreement(spectra, 0, 1, _shrunk(spectra, order, rate_hz)) if spectra else None
+    return agreement(spectra, 0, 1, _difference_gain(spectra, order, rate_hz)) if spectra else None
 
 
 def derivative(samples: FloatArray, order: int, rate_hz: float) -> FloatArray:
@@ -89,8 +89,8 @@ def derivative(samples: FloatArray, order: int, rate_hz: float) -> FloatArray:
     return found
 
 
-def _shrunk(spectra: CrossSpectra, order: int, rate_hz: float) -> FloatArray:
-    """(lines,): what central differences leave of a derivative."""
+def _difference_gain(spectra: CrossSpectra, order: int, rate_hz: float) -> FloatArray:
+    """(lines,): gain of central differences relative to the exact derivative."""
     angle = 2 * np.pi * spectra.frequency_hz / rate_hz
     shrunk = np.sin(angle) / angle if order == 1 else (np.sin(angle / 2) / (angle / 2)) ** 2
     return np.maximum(shrunk, 1e-6)
@@ -102,19 +102,19 @@ def kinematic_checks(pairs: Sequence[KinematicPair], rate_hz: float) -> tuple[Ch
 
 def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
     agreed = pair.agreement
-    late = _lag_words(agreed.lag_samples, rate_hz)
+    late = _lag_text(agreed.lag_samples, rate_hz)
     seen = (
         f"{pair.derivative} is {typeset(f'{agreed.factor:.4g}')} times {_WORDS[pair.order]} of {pair.place}{late} "
         f"(lines with {agreed.share:.0%} of its power)."
     )
     off = abs(abs(agreed.factor) - 1)
     if agreed.factor < 0:
-        return Check(KINEMATICS, "wrong", seen, f"Turn the sign of one of them{_cause(agreed.factor)}.")
-    if off > FAR and agreed.factor < 1 and agreed.lag_samples > LATE and not _cause(agreed.factor):
+        return Check(KINEMATICS, "wrong", seen, f"Turn the sign of one of them{_cause_text(agreed.factor)}.")
+    if off > FAR and agreed.factor < 1 and agreed.lag_samples > LATE and not _cause_text(agreed.factor):
         # A wrong unit or factor delays nothing; what is weaker and later went through a filter or a flexible part.
         return Check(KINEMATICS, "notice", seen, _FILTERED)
     if off > FAR:
-        return Check(KINEMATICS, "wrong", seen, f"Check the units and factors of both{_cause(agreed.factor)}.")
+        return Check(KINEMATICS, "wrong", seen, f"Check the units and factors of both{_cause_text(agreed.factor)}.")
     if off > CLOSE:
         return Check(KINEMATICS, "notice", seen, "Check the calibration of both, and filters between them.")
     if abs(agreed.lag_samples) > LATE:
@@ -122,14 +122,14 @@ def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
     return Check(KINEMATICS, "fine", seen)
 
 
-def _lag_words(lag: float, rate_hz: float) -> str:
+def _lag_text(lag: float, rate_hz: float) -> str:
     if abs(lag) <= LATE:
         return ""
     return f", {abs(lag) / rate_hz * 1e3:.3g} ms ({abs(lag):.2g} samples) {'later' if lag > 0 else 'earlier'}"
 
 
-def _cause(factor: float) -> str:
-    """What is known to make such a factor."""
+def _cause_text(factor: float) -> str:
+    """Known cause of such a factor, as text; empty where there is none."""
     size = abs(factor)
     for known, words in _CAUSES:
         if min(abs(size / known - 1), abs(size * known - 1)) < CLOSE:
@@ -138,7 +138,7 @@ def _cause(factor: float) -> str:
 
 
 def lag_checks(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> tuple[Check, ...]:
-    """Of channels of one unit that show the same thing: a command and its measurement, two sensors of one motion."""
+    """Lags of channels that measure the same quantity: a command and its measurement, two sensors of a motion."""
     found = tuple(_lag_pairs(channels, spectra, rate_hz))
     return found or (Check(LAGS, "fine", "No two channels show the same thing, so no lag between them can be told."),)
 
@@ -151,7 +151,7 @@ def _lag_pairs(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: floa
         agreed = agreement(spectra, each, other)
         if agreed is None or agreed.share < SAME_SHARE or agreed.spread > SAME_SPREAD:
             continue
-        late = _lag_words(agreed.lag_samples, rate_hz)
+        late = _lag_text(agreed.lag_samples, rate_hz)
         seen = f"{second.label} is {typeset(f'{agreed.factor:.4g}')} times {first.label}{late or ', at the same time'}."
         do = "Shift the later one, or model what delays it." if late else ""
         yield Check(LAGS, "notice" if late else "fine", seen, do)

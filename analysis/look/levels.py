@@ -1,4 +1,4 @@
-"""How strongly each segment was driven and answered, and whether the answer grows in proportion."""
+"""Level of commands and responses in each segment, and whether responses grow in proportion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ LEVELS = "levels"
 _APART = 1.5
 """Strongest over weakest command from which levels can be compared."""
 EVEN, UNEVEN = 0.05, 0.3
-"""Relative change of response over command that is noticed in words, and said to be large."""
+"""Relative change of response over command from which it is reported, and from which it is called large."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,44 +41,44 @@ def segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[S
             segment.start / rate_hz,
             (segment.stop - segment.start) / rate_hz,
             segment.period,
-            tuple(rms(_known(channel, segment)) for channel in channels),
+            tuple(rms(_known_samples(channel, segment)) for channel in channels),
         )
         for number, segment in enumerate(recording.segments or whole, start=1)
     )
 
 
-def _known(channel: Channel, segment: Segment) -> np.ndarray:
+def _known_samples(channel: Channel, segment: Segment) -> np.ndarray:
     piece = channel.samples[segment.start : segment.stop]
     return np.asarray(piece[np.isfinite(piece)])
 
 
 def level_checks(levels: Sequence[SegmentLevel], channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Per response, over segments of the most usual kind in which the same commands move."""
+    """Proportionality of each response, over segments of the most frequent kind with the same active commands."""
     commands = [k for k, channel in enumerate(channels) if channel.role == "command"]
     kinds = [level.kind for level in levels if level.kind not in ("rest", "free")]
     if not kinds or len({channels[k].unit for k in commands}) > 1:
         return ()
     usual = max(set(kinds), key=kinds.count)
-    rows = [(_strength(level, commands), level) for level in levels if level.kind == usual]
-    groups = {_mask(level, commands) for _, level in rows}
+    rows = [(_command_level(level, commands), level) for level in levels if level.kind == usual]
+    groups = {_active_commands(level, commands) for _, level in rows}
     found = []
     for group in groups:
-        alike = [(size, level) for size, level in rows if _mask(level, commands) == group and size > 0]
+        alike = [(size, level) for size, level in rows if _active_commands(level, commands) == group and size > 0]
         if len(alike) > 1 and max(s for s, _ in alike) > _APART * min(s for s, _ in alike):
-            found += [_proportion(alike, k, c) for k, c in enumerate(channels) if c.role == "response"]
+            found += [_proportion_check(alike, k, c) for k, c in enumerate(channels) if c.role == "response"]
     return tuple(check for check in found if check is not None)
 
 
-def _strength(level: SegmentLevel, commands: Sequence[int]) -> float:
+def _command_level(level: SegmentLevel, commands: Sequence[int]) -> float:
     return float(np.hypot.reduce([level.rms[k] for k in commands]))
 
 
-def _mask(level: SegmentLevel, commands: Sequence[int]) -> tuple[bool, ...]:
+def _active_commands(level: SegmentLevel, commands: Sequence[int]) -> tuple[bool, ...]:
     strongest = max(level.rms[k] for k in commands)
     return tuple(level.rms[k] > 0.1 * strongest for k in commands)
 
 
-def _proportion(alike: Sequence[tuple[float, SegmentLevel]], response: int, channel: Channel) -> Check | None:
+def _proportion_check(alike: Sequence[tuple[float, SegmentLevel]], response: int, channel: Channel) -> Check | None:
     ordered = sorted(alike, key=lambda row: row[0])
     weakest, strongest = ordered[0], ordered[-1]
     if weakest[1].rms[response] == 0 or strongest[1].rms[response] == 0:

@@ -1,4 +1,4 @@
-"""Everything that can be said of a recording before any model."""
+"""Overview of a recording before any model: its channels, spectra, levels and all checks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,46 +8,46 @@ import numpy as np
 from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.look.channels import Channel, Stretch, channels_of, rms, stretches_of
 from analysis.look.check import Check
-from analysis.look.clipping import clipping
-from analysis.look.clock import CLOCK, clock
-from analysis.look.completeness import constant_channels, copied_channels, missing_samples
+from analysis.look.clipping import check_clipping
+from analysis.look.clock import CLOCK, check_clock
+from analysis.look.completeness import check_constant_channels, check_copied_channels, check_missing_samples
 from analysis.look.cross_spectra import CrossSpectra, cross_spectra
 from analysis.look.driven_band import (
     DrivenBand,
     ResponseCoherence,
+    check_driven_axes,
     coherence_checks,
-    driven_axes,
-    driven_bands,
+    find_driven_bands,
     response_coherences,
 )
-from analysis.look.kinematics import KinematicPair, kinematic_checks, kinematic_pairs, lag_checks
+from analysis.look.kinematics import KinematicPair, find_kinematic_pairs, kinematic_checks, lag_checks
 from analysis.look.levels import SegmentLevel, level_checks, segment_levels
-from analysis.look.plausibility import offsets, units
-from analysis.look.repeats import Repeats, repeat_checks, repeats
+from analysis.look.plausibility import check_offsets, check_units
+from analysis.look.repeats import Repeats, find_repeats, repeat_checks
 from analysis.wording import untimed_text
 from equalizer.signals.recording import Recording
 from equalizer.signals.summary import Summarised, Summary
 
 RESOLUTION = "resolution"
 COARSE, ROUGH, UNSEEN = 3.0, 30.0, 1000.0
-"""Steps in a channel's rms: below the first, rounding hides the motion, below the second it shows beside it, above the
-last it is not worth a word."""
+"""A channel's rms in steps of rounding: below the first, rounding hides the motion; below the second it is visible;
+above the last it is not reported."""
 _SENSORS = ("response", "position")
 
 
-def resolution(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Of sensors; a command may have as few values as it was given."""
-    found = [_of_channel(channel) for channel in channels if channel.role in _SENSORS]
+def check_resolution(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    """Check the resolution of sensors; a command may have few values."""
+    found = [_resolution_check(channel) for channel in channels if channel.role in _SENSORS]
     known = tuple(check for check in found if check is not None)
     return known or (Check(RESOLUTION, "fine", "No step of a converter matters in any sensor."),)
 
 
-def _of_channel(channel: Channel) -> Check | None:
+def _resolution_check(channel: Channel) -> Check | None:
     step = rounding_step(channel.samples)
     steps = rms(channel.known) / step if step else UNSEEN
     if steps >= UNSEEN:
         return None
-    seen = f"{channel.label} moves in steps of {channel.of(step)}; its rms is {steps:.3g} of them."
+    seen = f"{channel.label} moves in steps of {channel.format(step)}; its rms is {steps:.3g} of them."
     if steps < COARSE:
         return Check(RESOLUTION, "wrong", seen, "Use a finer sensor or range, or move more: rounding hides the motion.")
     if steps < ROUGH:
@@ -109,23 +109,23 @@ def overview(name: str, recording: Recording) -> Overview:
     """name: of the file, for tables and figures."""
     channels, stretches, rate_hz = channels_of(recording), stretches_of(recording), recording.sample_rate_hz
     spectra = cross_spectra(channels, stretches, rate_hz)
-    bands = driven_bands(spectra, channels) if spectra else ()
+    bands = find_driven_bands(spectra, channels) if spectra else ()
     coherences = response_coherences(spectra, channels, bands) if spectra else ()
-    pairs = kinematic_pairs(channels, stretches, rate_hz)
+    pairs = find_kinematic_pairs(channels, stretches, rate_hz)
     levels = segment_levels(recording, channels)
-    repeated = repeats(recording, stretches)
+    repeated = find_repeats(recording, stretches)
     checks = (
-        *missing_samples(channels, rate_hz),
-        *constant_channels(channels),
-        *copied_channels(channels),
-        *clock(recording, stretches),
-        *units(channels),
+        *check_missing_samples(channels, rate_hz),
+        *check_constant_channels(channels),
+        *check_copied_channels(channels),
+        *check_clock(recording, stretches),
+        *check_units(channels),
         *kinematic_checks(pairs, rate_hz),
         *(lag_checks(channels, spectra, rate_hz) if spectra else ()),
-        *clipping(channels),
-        *resolution(channels),
-        *offsets(channels),
-        *driven_axes(recording, bands),
+        *check_clipping(channels),
+        *check_resolution(channels),
+        *check_offsets(channels),
+        *check_driven_axes(recording, bands),
         *coherence_checks(coherences, recording),
         *level_checks(levels, channels),
         *repeat_checks(recording, repeated),
@@ -135,14 +135,14 @@ def overview(name: str, recording: Recording) -> Overview:
         recording=recording,
         channels=channels,
         stretches=stretches,
-        summaries=tuple(_summary(channel) for channel in channels),
+        summaries=tuple(_summarise_channel(channel) for channel in channels),
         levels=levels,
         spectra=spectra,
         bands=bands,
         coherences=coherences,
         pairs=pairs,
         repeats=repeated,
-        checks=_worst_first(checks if recording.is_timed else tuple(map(_in_samples, checks))),
+        checks=_worst_first(checks if recording.is_timed else tuple(map(_count_in_samples, checks))),
     )
 
 
@@ -151,14 +151,14 @@ def _worst_first(checks: tuple[Check, ...]) -> tuple[Check, ...]:
     return tuple(sorted(checks, key=lambda check: severity.index(check.level)))
 
 
-def _in_samples(check: Check) -> Check:
-    """Of a recording of which no time is known; the check of the clock says just that."""
+def _count_in_samples(check: Check) -> Check:
+    """A check of a recording without known time, in samples; the check of the clock stays as it is."""
     if check.name == CLOCK:
         return check
     return replace(check, seen=untimed_text(check.seen), do=untimed_text(check.do))
 
 
-def _summary(channel: Channel) -> ChannelSummary:
+def _summarise_channel(channel: Channel) -> ChannelSummary:
     known = channel.known if channel.known.size else np.array([np.nan])
     return ChannelSummary(
         channel.role,

@@ -1,4 +1,4 @@
-"""Whether the numbers can be in their units: sizes that no device has, an accelerometer in g, offsets."""
+"""Plausibility of values in their units: impossible sizes, an accelerometer in g, static offsets."""
 
 from collections.abc import Sequence
 
@@ -17,18 +17,18 @@ _LARGEST = {
 _SMALLEST = {
     "N": 1e-7, "N m": 1e-9, "m": 1e-9, "m/s": 1e-8, "m/s^2": 1e-5, "rad": 1e-8, "rad/s": 1e-7, "V": 1e-8, "A": 1e-8,
 }  # fmt: skip
-"""Rms below which it is."""
+"""Rms below which a unit is doubted."""
 G, IN_G = 9.80665, (0.97, 1.03)
 STRONG = 0.5
-"""Mean over rms from which an offset is said."""
+"""Mean over rms from which an offset is reported."""
 
 
-def units(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    found = tuple(check for channel in channels if (check := _unit(channel)))
+def check_units(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    found = tuple(check for channel in channels if (check := _unit_check(channel)))
     return fine_if_none(UNITS, found, "All sizes are possible in their units.")
 
 
-def _unit(channel: Channel) -> Check | None:
+def _unit_check(channel: Channel) -> Check | None:
     known = channel.known
     if not known.size:
         return None
@@ -41,38 +41,38 @@ def _unit(channel: Channel) -> Check | None:
         )
     peak, moves = float(np.max(np.abs(known))), rms(known)
     if peak > _LARGEST.get(channel.unit, np.inf):
-        return _doubted(channel, f"{channel.label} reaches {channel.of(peak)}.")
+        return _doubt_unit(channel, f"{channel.label} reaches {channel.format(peak)}.")
     if 0 < moves < _SMALLEST.get(channel.unit, 0.0):
-        return _doubted(channel, f"{channel.label} moves by {channel.of(moves)} rms.")
+        return _doubt_unit(channel, f"{channel.label} moves by {channel.format(moves)} rms.")
     mean = abs(float(known.mean()))
     if channel.unit == "m/s^2" and IN_G[0] < mean < IN_G[1] and moves < mean:
-        seen = f"{channel.label} rests at {channel.of(float(known.mean()))}, where an accelerometer shows {G:.2f}."
+        seen = f"{channel.label} rests at {channel.format(float(known.mean()))}, where an accelerometer shows {G:.2f}."
         return Check(UNITS, "wrong", seen, "State the unit g in the map: the numbers look like multiples of gravity.")
     return None
 
 
-def _doubted(channel: Channel, seen: str) -> Check:
+def _doubt_unit(channel: Channel, seen: str) -> Check:
     return Check(UNITS, "wrong", seen, f"Check the unit of {channel.label} in the map.")
 
 
-def offsets(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Positions begin wherever they do, and conditions stay: both are left out."""
+def check_offsets(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    """Check static offsets, except of positions and conditions, which may have any."""
     found = tuple(
         check
         for channel in channels
         if channel.role in ("command", "response") and channel.unit not in ("m", "rad", "m/s", "rad/s")
-        if (check := _offset(channel))
+        if (check := _offset_check(channel))
     )
     return fine_if_none(OFFSETS, found, "No command and no force, acceleration or voltage stands beside zero.")
 
 
-def _offset(channel: Channel) -> Check | None:
+def _offset_check(channel: Channel) -> Check | None:
     known = channel.known
     moves = rms(known)
     if not known.size or moves == 0 or abs(float(known.mean())) < STRONG * moves:
         return None
     mean = float(known.mean())
-    seen = f"{channel.label} stands {channel.of(mean)} beside zero ({abs(mean) / moves:.3g} times its rms)."
+    seen = f"{channel.label} stands {channel.format(mean)} beside zero ({abs(mean) / moves:.3g} times its rms)."
     if channel.unit == "m/s^2" and abs(abs(mean) / G - 1) < 0.03:
         return Check(OFFSETS, "fine", f"{seen} That is gravity.")
     if channel.role == "command":

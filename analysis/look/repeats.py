@@ -1,4 +1,4 @@
-"""What repeats: the declared periods checked, a period found where none is declared, and the noise between repeats."""
+"""Periodicity: checks of declared periods, detection of an undeclared one, and the noise between repeats."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +9,7 @@ from analysis.diagnosis.data.found_segments import decided_command, find_period
 from analysis.diagnosis.noise.periods import period_samples, settled_periods
 from analysis.look.channels import Stretch, rms
 from analysis.look.check import Check
-from analysis.wording import listed, typeset
+from analysis.wording import conjoin, typeset
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
@@ -40,19 +40,19 @@ class Repeats:
     noise: tuple[RepeatNoise, ...]
 
 
-def repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
+def find_repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
     if any(segment.period for segment in recording.segments):
-        return Repeats(0, (0, 0), _noise(recording, declared=True))
+        return Repeats(0, (0, 0), _noise_between_repeats(recording, declared=True))
     marked = [(segment.start, segment.stop) for segment in recording.segments]
     for places in (marked, list(stretches)):  # a segment that was split for a test may hold less than two periods
         start, stop = max(places, key=lambda place: place[1] - place[0], default=(0, 0))
         if period := find_period(decided_command(recording).samples[start:stop]):
             as_said = replace(recording, segments=(Segment(start, stop, "multisine", 0.0, period),))
-            return Repeats(period, (start, stop), _noise(as_said, declared=False))
+            return Repeats(period, (start, stop), _noise_between_repeats(as_said, declared=False))
     return Repeats(0, (0, 0), ())
 
 
-def _noise(recording: Recording, *, declared: bool) -> tuple[RepeatNoise, ...]:
+def _noise_between_repeats(recording: Recording, *, declared: bool) -> tuple[RepeatNoise, ...]:
     found = []
     for periods in settled_periods(recording):
         if periods.count < 2:
@@ -68,7 +68,7 @@ def _noise(recording: Recording, *, declared: bool) -> tuple[RepeatNoise, ...]:
 
 
 def repeat_checks(recording: Recording, seen: Repeats) -> tuple[Check, ...]:
-    wrong = [check for check in _declared(recording) if check is not None]
+    wrong = [check for check in _period_checks(recording) if check is not None]
     if seen.found:
         times = (seen.found_in[1] - seen.found_in[0]) / seen.found
         wrong.append(
@@ -90,23 +90,23 @@ def repeat_checks(recording: Recording, seen: Repeats) -> tuple[Check, ...]:
 def _noise_checks(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[Check, ...]:
     channels = recording.response.channels
     shares = np.array([each.share for each in noise])
-    said = listed([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
+    said = conjoin([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
     loud = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
     text = f"Between repeats (up to {max(each.looks for each in noise)}) remain at least {said}, rms."
-    do = f"{listed(loud)} hardly repeat: average more periods, or drive more." if loud else ""
+    do = f"{conjoin(loud)} hardly repeat: average more periods, or drive more." if loud else ""
     return (Check(REPEATS, "notice" if loud else "fine", text, do),)
 
 
-def _declared(recording: Recording) -> list[Check | None]:
-    """Segments whose command is another one declared period later."""
+def _period_checks(recording: Recording) -> list[Check | None]:
+    """Checks of the segments' declared periods, by the command's difference from period to period."""
     return [
-        _kept(decided_command(recording).samples[segment.start : segment.stop], segment, number)
+        _check_period(decided_command(recording).samples[segment.start : segment.stop], segment, number)
         for number, segment in enumerate(recording.segments, start=1)
         if segment.period and segment.stop - segment.start >= 2 * segment.period
     ]
 
 
-def _kept(command: FloatArray, segment: Segment, number: int) -> Check | None:
+def _check_period(command: FloatArray, segment: Segment, number: int) -> Check | None:
     size = rms(command[np.isfinite(command).all(axis=1)])
     later = command[segment.period :] - command[: -segment.period]
     off = float(np.sqrt(np.nanmean(later**2) / 2)) / size if size > 0 else 0.0

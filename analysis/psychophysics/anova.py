@@ -42,33 +42,33 @@ class OneWayAnova:
     notes: tuple[str, ...]
 
 
-def one_way(groups: Mapping[str, Sequence[float | None]]) -> OneWayAnova:
+def one_way_anova(groups: Mapping[str, Sequence[float | None]]) -> OneWayAnova:
     """One-way ANOVA over named groups. None and NaN are gaps; groups may differ in size."""
-    samples = {name: _present(values) for name, values in groups.items()}
-    summaries = tuple(_summary(name, sample) for name, sample in samples.items())
+    samples = {name: _finite_values(values) for name, values in groups.items()}
+    summaries = tuple(_summarise_group(name, sample) for name, sample in samples.items())
     gaps = sum(len(values) for values in groups.values()) - sum(len(sample) for sample in samples.values())
     notes = [f"{gaps} missing value{'s' if gaps != 1 else ''} left out."] if gaps else []
     notes += [f"There is no value at {group.name}." for group in summaries if group.n == 0]
     filled = [sample for sample in samples.values() if len(sample)]
     if len(filled) < 2:
         notes.append(f"A comparison needs values in at least two groups; there are {len(filled)}.")
-        return _empty(summaries, notes)
+        return _empty_anova(summaries, notes)
     df_between, df_within = len(filled) - 1, sum(map(len, filled)) - len(filled)
     if df_within < 1:
         notes.append("Every group holds a single value, so there is no spread within groups to compare with.")
-        return _empty(summaries, notes, df_between, df_within)
-    return _computed(filled, summaries, notes)
+        return _empty_anova(summaries, notes, df_between, df_within)
+    return _compute_anova(filled, summaries, notes)
 
 
-def _computed(filled: list[FloatArray], summaries: tuple[GroupSummary, ...], notes: list[str]) -> OneWayAnova:
+def _compute_anova(filled: list[FloatArray], summaries: tuple[GroupSummary, ...], notes: list[str]) -> OneWayAnova:
     everything = np.concatenate(filled)
     grand = everything.mean()
     ss_between = float(sum(len(sample) * (sample.mean() - grand) ** 2 for sample in filled))
     ss_within = float(sum(((sample - sample.mean()) ** 2).sum() for sample in filled))
     df_between, df_within = len(filled) - 1, len(everything) - len(filled)
-    if no_spread(ss_within, everything):
+    if is_rounding(ss_within, everything):
         notes.append("All values within each group are equal, so there is no spread to compare with: no F, no p.")
-        return _empty(summaries, notes, df_between, df_within)
+        return _empty_anova(summaries, notes, df_between, df_within)
     mean_square = ss_within / df_within
     ss_total = ss_between + ss_within
     f = ss_between / df_between / mean_square
@@ -87,17 +87,17 @@ def _computed(filled: list[FloatArray], summaries: tuple[GroupSummary, ...], not
     )
 
 
-def no_spread(sum_of_squares: float, values: FloatArray) -> bool:
+def is_rounding(sum_of_squares: float, values: FloatArray) -> bool:
     """Whether a sum of squares is nothing but rounding of the values it came from."""
     scale = float(np.abs(values).max())
     return bool(sum_of_squares <= values.size * (64 * np.finfo(float).eps * scale) ** 2)
 
 
-def _present(values: Sequence[float | None]) -> FloatArray:
+def _finite_values(values: Sequence[float | None]) -> FloatArray:
     return np.array([value for value in values if value is not None and math.isfinite(value)], dtype=np.float64)
 
 
-def _summary(name: str, sample: FloatArray) -> GroupSummary:
+def _summarise_group(name: str, sample: FloatArray) -> GroupSummary:
     return GroupSummary(
         name=name,
         n=len(sample),
@@ -106,7 +106,7 @@ def _summary(name: str, sample: FloatArray) -> GroupSummary:
     )
 
 
-def _empty(
+def _empty_anova(
     groups: tuple[GroupSummary, ...], notes: list[str], df_between: int | None = None, df_within: int | None = None
 ) -> OneWayAnova:
     return OneWayAnova(groups, df_between, df_within, None, None, None, None, None, None, None, tuple(notes))

@@ -1,4 +1,4 @@
-"""Which groups differ: Tukey-Kramer pairs, and the intervals that MATLAB's multcompare draws.
+"""Multiple comparisons: Tukey-Kramer pairs, and the comparison intervals that MATLAB's multcompare draws.
 
 Two groups differ when their comparison intervals are disjoint: exactly for equal sizes (Tukey), approximately for
 unequal ones. The intervals are NOT confidence intervals of the means.

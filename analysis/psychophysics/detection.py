@@ -1,4 +1,4 @@
-"""Is the vibration felt at all? Thresholds of detection runs: two intervals, one holds a stimulus.
+"""Detection thresholds: two-interval runs, one interval of which holds a stimulus.
 
 Chance is 50 %, as for directions, so the same staircase converges at the same proportion of right answers.
 
@@ -19,7 +19,7 @@ from protocols.trial import Phase, Trial
 
 
 @dataclass(frozen=True, slots=True)
-class Below:
+class BelowDetection:
     """A direction threshold below the detection threshold of the same participant and frequency."""
 
     subject: str
@@ -39,7 +39,7 @@ def detection_thresholds(trials: Iterable[Trial], protocol: StudyProtocol) -> tu
     return tuple(row if row.d_prime is None else replace(row, d_prime=row.d_prime / math.sqrt(2)) for row in rows)
 
 
-def directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[Below, ...]:
+def directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[BelowDetection, ...]:
     """Both tables in newtons. Thresholds of direction that the cap cut are left out."""
     felt = {
         (subject, frequency_hz): value
@@ -48,7 +48,7 @@ def directions_below_detection(direction: ThresholdTable, detection: ThresholdTa
         if value is not None
     }
     return tuple(
-        Below(subject, frequency_hz, value, felt[subject, frequency_hz])
+        BelowDetection(subject, frequency_hz, value, felt[subject, frequency_hz])
         for subject, row, bounds in zip(direction.subjects, direction.values, direction.censored, strict=True)
         for frequency_hz, value, bound in zip(direction.frequencies_hz, row, bounds, strict=True)
         if value is not None and not bound and value < felt.get((subject, frequency_hz), 0.0)

@@ -1,4 +1,4 @@
-"""Each frequency against the lowest, within participants: difference, equivalence, spread.
+"""Contrasts within participants, each frequency against the lowest: difference, equivalence, equality of spread.
 
 Sources: S. Holm, Scand. J. Stat. 6 (1979), 65-70; D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987), 657-680 (two
 one-sided tests); E. J. G. Pitman, Biometrika 31 (1939), 9-12 and W. A. Morgan, Biometrika 31 (1939), 13-19 (equal
@@ -54,15 +54,15 @@ def contrasts(frequencies_hz: Sequence[float], values_db: FloatArray, confidence
         if len(both) >= 2 and np.ptp(both[:, 1] - both[:, 0]) > ROUNDING_DB:
             found.append((frequencies_hz[place], both))
     p_values = [_t_test(both[:, 1] - both[:, 0]) for _, both in found]
-    corrected = holm(p_values)
+    corrected = holm_correction(p_values)
     return tuple(
-        _contrast(frequency, frequencies_hz[0], both, p, p_holm, confidence)
+        _compute_contrast(frequency, frequencies_hz[0], both, p, p_holm, confidence)
         for (frequency, both), p, p_holm in zip(found, p_values, corrected, strict=True)
     )
 
 
-def holm(p_values: Sequence[float]) -> tuple[float, ...]:
-    """Step-down correction: in order of size, each at least as large as those before it."""
+def holm_correction(p_values: Sequence[float]) -> tuple[float, ...]:
+    """Holm's step-down correction for multiple tests, in the order given."""
     corrected, worst = [0.0] * len(p_values), 0.0
     for rank, index in enumerate(sorted(range(len(p_values)), key=lambda i: p_values[i])):
         worst = max(worst, min(1.0, (len(p_values) - rank) * p_values[index]))
@@ -70,7 +70,7 @@ def holm(p_values: Sequence[float]) -> tuple[float, ...]:
     return tuple(corrected)
 
 
-def _contrast(
+def _compute_contrast(
     frequency_hz: float, against_hz: float, both: FloatArray, p: float, p_holm: float, confidence: float
 ) -> Contrast:
     differences, n = both[:, 1] - both[:, 0], len(both)

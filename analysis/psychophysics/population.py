@@ -1,4 +1,4 @@
-"""Whose answers these are. The three kinds never meet in one analysis."""
+"""Population that answered: people, simulated participants, or people who felt nothing; never mixed in an analysis."""
 
 from collections.abc import Iterable
 from enum import Enum

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import chi2, friedmanchisquare
 from scipy.stats import f as f_distribution
 
-from analysis.psychophysics.anova import no_spread
+from analysis.psychophysics.anova import is_rounding
 from equalizer.signals.signal import FloatArray
 
 
@@ -98,15 +98,15 @@ def repeated_measures(subjects: Sequence[str], values: Sequence[Sequence[float |
     notes = [f"Left out because a value is missing: {', '.join(left_out)}."] if left_out else []
     if len(rows) < 2:
         notes.append(f"The analysis within participants needs two who have every condition; there are {len(rows)}.")
-        return _empty(len(rows), left_out, conditions, notes)
+        return _empty_analysis(len(rows), left_out, conditions, notes)
     if conditions < 2:
         notes.append(f"The analysis within participants needs two conditions; there are {conditions}.")
-        return _empty(len(rows), left_out, conditions, notes)
+        return _empty_analysis(len(rows), left_out, conditions, notes)
     ss_conditions, ss_participants, ss_error = _sums_of_squares(rows)
-    if no_spread(ss_error, rows):
+    if is_rounding(ss_error, rows):
         notes.append("All participants change alike over the conditions, so there is no error to compare with.")
-        return _empty(len(rows), left_out, conditions, notes)
-    return _computed(rows, left_out, (ss_conditions, ss_participants, ss_error), notes)
+        return _empty_analysis(len(rows), left_out, conditions, notes)
+    return _compute_analysis(rows, left_out, (ss_conditions, ss_participants, ss_error), notes)
 
 
 def greenhouse_geisser(rows: FloatArray) -> float:
@@ -151,7 +151,7 @@ def _sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:
     return float(n * np.sum(by_condition**2)), float(k * np.sum(by_participant**2)), float(np.sum(residual**2))
 
 
-def _computed(
+def _compute_analysis(
     rows: FloatArray, left_out: tuple[str, ...], sums: tuple[float, float, float], notes: list[str]
 ) -> RepeatedMeasures:
     (n, k), (ss_conditions, ss_participants, ss_error) = rows.shape, sums
@@ -184,7 +184,9 @@ def _computed(
     )
 
 
-def _empty(participants: int, left_out: tuple[str, ...], conditions: int, notes: list[str]) -> RepeatedMeasures:
+def _empty_analysis(
+    participants: int, left_out: tuple[str, ...], conditions: int, notes: list[str]
+) -> RepeatedMeasures:
     return RepeatedMeasures(
         participants=participants,
         left_out=left_out,

@@ -1,4 +1,4 @@
-"""Who made presentations void often: by asking for them again, by pauses, by leaving, by answers outside the time.
+"""Participants who often made presentations void: by repeats, pauses, leaving, or answers outside the time.
 
 A second look helps a participant who looks again when unsure. Under the first rules of a session, which drew a new
 stimulus, it moved thresholds by up to -2 dB. Now the same stimulus comes again and the repeat key is limited; pauses
@@ -8,7 +8,7 @@ that a threshold may be too low, not only that trials took longer.
 
 from collections.abc import Callable, Sequence
 
-from analysis.wording import listed
+from analysis.wording import conjoin
 from protocols.trial import AT_WILL, Phase, Trial
 
 OFTEN_COUNT = 3
@@ -24,18 +24,18 @@ def is_often(repeats: int, presentations: int) -> bool:
 def repeat_warning(trials: Sequence[Trial]) -> str:
     """Runs, and participants over all their runs, that are beyond the limit; training is left out. Empty for none."""
     tested = [trial for trial in trials if trial.phase is not Phase.TRAINING]
-    people = _often(tested, lambda trial: trial.subject)
-    runs = _often(tested, lambda trial: f"{trial.subject} at {trial.frequency_hz:g} Hz ({trial.session})")
+    people = _frequent_repeats(tested, lambda trial: trial.subject)
+    runs = _frequent_repeats(tested, lambda trial: f"{trial.subject} at {trial.frequency_hz:g} Hz ({trial.session})")
     if not people and not runs:
         return ""
     return (
         f"Trials were often made void at will ({OFTEN_WORDS}: asked for again, paused, left, answered outside the "
         f"time). Each gives another look at what was unsure, so that thresholds may be too low by some dB: "
-        f"{listed([*people, *runs])}."
+        f"{conjoin([*people, *runs])}."
     )
 
 
-def _often(trials: Sequence[Trial], name_of: Callable[[Trial], str]) -> list[str]:
+def _frequent_repeats(trials: Sequence[Trial], name_of: Callable[[Trial], str]) -> list[str]:
     void: dict[str, list[bool]] = {}
     for trial in trials:
         void.setdefault(name_of(trial), []).append(trial.void_cause in AT_WILL)

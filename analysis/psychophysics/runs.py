@@ -1,4 +1,4 @@
-"""Runs recomputed from the raw answers: the levels in the rows are checked, never trusted."""
+"""Staircase runs recomputed from the raw answers, which checks the levels in the rows."""
 
 import itertools
 import math
@@ -59,7 +59,7 @@ def _recompute(rows: list[Trial], rule: StaircaseRule) -> Run:
     first = rows[0]
     counted = tuple(sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial))
     _refuse_strange_rows(rows, counted)
-    state = _fold(counted, rule)
+    state = _replay_answers(counted, rule)
     steering = [trial for trial in rows if trial.phase is not Phase.CATCH]
     return Run(
         subject=first.subject,
@@ -75,23 +75,23 @@ def _recompute(rows: list[Trial], rule: StaircaseRule) -> Run:
     )
 
 
-def _fold(counted: tuple[Trial, ...], rule: StaircaseRule) -> StaircaseState:
+def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule) -> StaircaseState:
     state = begin(rule)
     for trial in counted:
         if is_finished(rule, state):
             raise InconsistentTrialsError(
-                f"{_place(trial)}: an answer follows although the run was over after {state.trials} trials "
+                f"{_trial_text(trial)}: an answer follows although the run was over after {state.trials} trials "
                 f"with {state.reversals} reversals"
             )
         if trial.correct is None:
-            raise InconsistentTrialsError(f"{_place(trial)}: there is an answer, but correct is empty")
+            raise InconsistentTrialsError(f"{_trial_text(trial)}: there is an answer, but correct is empty")
         if trial.phase is Phase.CATCH:
             _refuse_weak_catch_trial(trial, rule)
             continue
         expected_n = level_n(rule, state)
         if not math.isclose(trial.level_n, expected_n, rel_tol=LEVEL_TOLERANCE):
             raise InconsistentTrialsError(
-                f"{_place(trial)}: level_n is {trial.level_n:.6g} N, but the answers before it lead to "
+                f"{_trial_text(trial)}: level_n is {trial.level_n:.6g} N, but the answers before it lead to "
                 f"{expected_n:.6g} N under the protocol's staircase; the rows belong to another rule or were changed"
             )
         state = step(rule, state, trial.correct)
@@ -102,8 +102,8 @@ def _refuse_weak_catch_trial(trial: Trial, rule: StaircaseRule) -> None:
     """A test trial that was renamed shows below the cap."""
     if not math.isclose(trial.level_n, rule.cap_n, rel_tol=LEVEL_TOLERANCE):
         raise InconsistentTrialsError(
-            f"{_place(trial)}: level_n of a catch trial is {trial.level_n:.6g} N; catch trials are played at the cap "
-            f"of {rule.cap_n:g} N"
+            f"{_trial_text(trial)}: level_n of a catch trial is {trial.level_n:.6g} N; catch trials are played at the "
+            f"cap of {rule.cap_n:g} N"
         )
 
 
@@ -112,16 +112,18 @@ def _refuse_strange_rows(rows: list[Trial], counted: tuple[Trial, ...]) -> None:
     for trial in rows:
         if trial.frequency_hz != first.frequency_hz:
             raise InconsistentTrialsError(
-                f"{_place(trial)}: {trial.frequency_hz:g} Hz in a run that began at {first.frequency_hz:g} Hz"
+                f"{_trial_text(trial)}: {trial.frequency_hz:g} Hz in a run that began at {first.frequency_hz:g} Hz"
             )
     for before, after in itertools.pairwise(counted):
         if after.trial == before.trial:
-            raise InconsistentTrialsError(f"{_place(after)}: two attempts of this trial have an answer that counts")
+            raise InconsistentTrialsError(
+                f"{_trial_text(after)}: two attempts of this trial have an answer that counts"
+            )
         if after.trial != before.trial + 1:
             raise InconsistentTrialsError(
-                f"{_place(after)}: the trial before it with an answer is {before.trial}; those between are missing"
+                f"{_trial_text(after)}: the trial before it with an answer is {before.trial}; those between are missing"
             )
 
 
-def _place(trial: Trial) -> str:
+def _trial_text(trial: Trial) -> str:
     return f"subject {trial.subject}, session {trial.session}, run {trial.run}, trial {trial.trial}"

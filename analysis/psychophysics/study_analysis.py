@@ -1,4 +1,4 @@
-"""Everything that the trials of one study say, in one call."""
+"""Complete analysis of a study's trials: thresholds, statistics and warnings."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.psychophysics.anova import OneWayAnova, one_way
+from analysis.psychophysics.anova import OneWayAnova, one_way_anova
 from analysis.psychophysics.catch_trials import CatchTally, catch_tallies
 from analysis.psychophysics.comparisons import Comparisons, compare_all
 from analysis.psychophysics.detection import detection_thresholds
@@ -21,7 +21,7 @@ from analysis.psychophysics.runs import Run, recompute_runs
 from analysis.psychophysics.study_warnings import side_warnings, study_warnings
 from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
 from analysis.psychophysics.thresholds import Threshold, threshold_of
-from analysis.psychophysics.two_analyses import analyses_compared, declared_words
+from analysis.psychophysics.two_analyses import comparison_text, declaration_text
 from analysis.wording import f_text, p_text
 from equalizer.signals.summary import Summarised, Summary
 from protocols.definition.study_protocol import StudyProtocol
@@ -131,7 +131,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
     Raises ValueError when the trials mix people, simulated participants and people who felt nothing (split them
     with `split_by_population` first), and InconsistentTrialsError when rows contradict the protocol's staircase.
     """
-    population, rule = _one_population(trials), protocol.staircase
+    population, rule = _single_population(trials), protocol.staircase
     runs = recompute_runs(trials, rule)
     rows = tuple(threshold_of(run, rule) for run in runs)
     tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
@@ -139,7 +139,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
     detection = detection_thresholds(trials, protocol)
     detection_table = threshold_table(detection, protocol.detection.frequencies_hz)
     catches = catch_tallies(trials)
-    anova = one_way(table.groups())
+    anova = one_way_anova(table.groups())
     within = repeated_measures(table.subjects, table.values)
     comparisons = compare_all(anova, CONFIDENCE)
     primary = primary_analysis(count_answers(tested, table.frequencies_hz), rule.cap_n)
@@ -158,8 +158,8 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
         difference=design_difference(anova, within),
         primary=primary,
         mean_contrasts=means,
-        declared=declared_words(protocol.analysis),
-        compared=analyses_compared(primary, means, comparisons, table, rule),
+        declared=declaration_text(protocol.analysis),
+        compared=comparison_text(primary, means, comparisons, table, rule),
         warnings=(
             *study_warnings(tested, rows, table, protocol),
             *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested))]),
@@ -172,7 +172,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
     )
 
 
-def _one_population(trials: Sequence[Trial]) -> Population | None:
+def _single_population(trials: Sequence[Trial]) -> Population | None:
     parts = split_by_population(trials)
     if len(parts) > 1:
         raise ValueError(

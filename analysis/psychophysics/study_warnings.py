@@ -1,4 +1,4 @@
-"""What a reader must know before believing the numbers, in sentences."""
+"""Warnings that a reader of a study's results must know, as sentences."""
 
 from collections.abc import Iterable, Sequence
 
@@ -8,7 +8,7 @@ from analysis.psychophysics.catch_trials import CatchTally, wilson_interval
 from analysis.psychophysics.detection import directions_below_detection
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import RunEnd, Threshold
-from analysis.wording import listed, signed
+from analysis.wording import conjoin, signed_number
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
@@ -35,17 +35,17 @@ def study_warnings(
     if not rows:
         return ("No test trial is there, so there is no threshold of direction.",)
     candidates = (
-        _stopped(rows, protocol.staircase),
-        _incomplete(rows, protocol.staircase.reversals),
-        _missing(table),
-        _censored(table, protocol.staircase.cap_n),
-        _few(table),
-        _unequal(table),
-        _at_chance(rows),
-        _biased(rows),
-        _spoiled(trials),
-        _flagged(trials),
-        _unmeasured(trials),
+        _stopped_warning(rows, protocol.staircase),
+        _incomplete_warning(rows, protocol.staircase.reversals),
+        _missing_warning(table),
+        _censored_warning(table, protocol.staircase.cap_n),
+        _few_participants_warning(table),
+        _unequal_sizes_warning(table),
+        _chance_warning(rows),
+        _bias_warning(rows),
+        _spoiled_warning(trials),
+        _flagged_warning(trials),
+        _unmeasured_warning(trials),
         *table.notes,
     )
     return tuple(sentence for sentence in candidates if sentence)
@@ -55,49 +55,51 @@ def side_warnings(
     catches: Sequence[CatchTally], detection: Sequence[Threshold], table: ThresholdTable, felt: ThresholdTable
 ) -> tuple[str, ...]:
     """Of catch trials and detection runs. table: thresholds of direction, felt: of detection, both in newtons."""
-    broken = [_run(row) for row in detection if not row.complete]
-    cut = [_run(row) for row in detection if row.complete and row.censored]
+    broken = [_run_text(row) for row in detection if not row.complete]
+    cut = [_run_text(row) for row in detection if row.complete and row.censored]
     candidates = (
-        _lapsing(catches),
-        f"{_count(broken, 'detection run')} not complete and without a threshold: {listed(broken)}." if broken else "",
-        f"{_count(cut, 'detection threshold')} cut by the cap: {listed(cut)}." if cut else "",
-        _undetected(detection),
-        _below_detection(table, felt),
+        _lapse_warning(catches),
+        f"{_count_text(broken, 'detection run')} not complete and without a threshold: {conjoin(broken)}."
+        if broken
+        else "",
+        f"{_count_text(cut, 'detection threshold')} cut by the cap: {conjoin(cut)}." if cut else "",
+        _undetected_warning(detection),
+        _below_detection_warning(table, felt),
         *felt.notes,
     )
     return tuple(sentence for sentence in candidates if sentence)
 
 
-def _incomplete(rows: Sequence[Threshold], reversals: int) -> str:
+def _incomplete_warning(rows: Sequence[Threshold], reversals: int) -> str:
     cut = [
-        f"{_run(row)} ({row.reversals} of {reversals} reversals)"
+        f"{_run_text(row)} ({row.reversals} of {reversals} reversals)"
         for row in rows
         if not row.complete and row.ended is not RunEnd.TRIAL_LIMIT
     ]
-    return f"{_count(cut, 'run')} not complete and without a threshold: {listed(cut)}." if cut else ""
+    return f"{_count_text(cut, 'run')} not complete and without a threshold: {conjoin(cut)}." if cut else ""
 
 
-def _stopped(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
+def _stopped_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     stopped = [
-        f"{_run(row)} ({row.reversals} of {rule.reversals} reversals, {row.trials_at_cap} trials at the cap)"
+        f"{_run_text(row)} ({row.reversals} of {rule.reversals} reversals, {row.trials_at_cap} trials at the cap)"
         for row in rows
         if row.ended is RunEnd.TRIAL_LIMIT
     ]
     if not stopped:
         return ""
     return (
-        f"{_count(stopped, 'run')} stopped by the limit of {rule.trial_limit} trials, without a threshold: "
-        f"{listed(stopped)}. The limit stops those who cannot tell the directions far more often than those who can, "
+        f"{_count_text(stopped, 'run')} stopped by the limit of {rule.trial_limit} trials, without a threshold: "
+        f"{conjoin(stopped)}. The limit stops those who cannot tell the directions far more often than those who can, "
         "so the means that are left are too low."
     )
 
 
-def _missing(table: ThresholdTable) -> str:
-    gaps = [f"{subject} at {frequency:g} Hz" for subject, frequency in table.missing()]
-    return f"No threshold for {listed(gaps)}." if gaps else ""
+def _missing_warning(table: ThresholdTable) -> str:
+    gaps = [f"{subject} at {frequency:g} Hz" for subject, frequency in table.gaps()]
+    return f"No threshold for {conjoin(gaps)}." if gaps else ""
 
 
-def _censored(table: ThresholdTable, cap_n: float) -> str:
+def _censored_warning(table: ThresholdTable, cap_n: float) -> str:
     cut = [
         f"{subject} at {frequency:g} Hz"
         for subject, row in zip(table.subjects, table.censored, strict=True)
@@ -107,13 +109,13 @@ def _censored(table: ThresholdTable, cap_n: float) -> str:
     if not cut:
         return ""
     return (
-        f"{_count(cut, 'threshold')} cut by the cap of {cap_n:g} N, which cut off peaks of the staircase: "
-        f"{listed(cut)}. As in the published analysis they enter means and tests as plain numbers, so means near the "
+        f"{_count_text(cut, 'threshold')} cut by the cap of {cap_n:g} N, which cut off peaks of the staircase: "
+        f"{conjoin(cut)}. As in the published analysis they enter means and tests as plain numbers, so means near the "
         "cap are too low, differences towards it too small, and intervals and effect sizes without coverage."
     )
 
 
-def _few(table: ThresholdTable) -> str:
+def _few_participants_warning(table: ThresholdTable) -> str:
     count = len(table.subjects)
     if count >= FEW_PARTICIPANTS:
         return ""
@@ -122,60 +124,60 @@ def _few(table: ThresholdTable) -> str:
     return f"There are only {count} participants: means and tests say little about people in general."
 
 
-def _unequal(table: ThresholdTable) -> str:
+def _unequal_sizes_warning(table: ThresholdTable) -> str:
     sizes = {sum(value is not None for value in column) for column in table.groups().values()}
     if len(sizes) < 2:
         return ""
     return "The frequencies have unequally many thresholds, so the comparison intervals are approximate."
 
 
-def _at_chance(rows: Sequence[Threshold]) -> str:
-    guessed = _guessed(rows)
+def _chance_warning(rows: Sequence[Threshold]) -> str:
+    guessed = _runs_at_chance(rows)
     return (
         "Answers not shown to be better than chance (one-sided binomial test, 5 %; a threshold far above the cap looks "
-        f"the same): {listed(guessed)}."
+        f"the same): {conjoin(guessed)}."
         if guessed
         else ""
     )
 
 
-def _guessed(rows: Sequence[Threshold]) -> list[str]:
+def _runs_at_chance(rows: Sequence[Threshold]) -> list[str]:
     return [
-        f"{_run(row)} ({row.percent_correct:.0f} % right of {row.trials})"
+        f"{_run_text(row)} ({row.percent_correct:.0f} % right of {row.trials})"
         for row in rows
-        if row.percent_correct is not None and not _better_than_chance(row.percent_correct, row.trials)
+        if row.percent_correct is not None and not _is_above_chance(row.percent_correct, row.trials)
     ]
 
 
-def _better_than_chance(percent_correct: float, trials: int) -> bool:
+def _is_above_chance(percent_correct: float, trials: int) -> bool:
     right = round(percent_correct / 100.0 * trials)
     return bool(binom.sf(right - 1, trials, 0.5) < 0.05)
 
 
-def _biased(rows: Sequence[Threshold]) -> str:
+def _bias_warning(rows: Sequence[Threshold]) -> str:
     leaning = [
-        f"{_run(row)} (criterion {signed(row.criterion)})"
+        f"{_run_text(row)} (criterion {signed_number(row.criterion)})"
         for row in rows
         if row.criterion is not None and abs(row.criterion) > STRONG_BIAS
     ]
     if not leaning:
         return ""
-    return f"A liking for one of the two answers, which raises a threshold, shows in {listed(leaning)}."
+    return f"A liking for one of the two answers, which raises a threshold, shows in {conjoin(leaning)}."
 
 
-def _spoiled(trials: Iterable[Trial]) -> str:
+def _spoiled_warning(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.SPOILED for trial in trials)
     return f"{count} spoiled presentation{'s' if count != 1 else ''}, played again; the answers do not count." * bool(
         count
     )
 
 
-def _flagged(trials: Iterable[Trial]) -> str:
+def _flagged_warning(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.FLAGGED for trial in trials)
     return f"{count} trial{'s' if count != 1 else ''} flagged: counted, but the stimulus is worth a look." * bool(count)
 
 
-def _unmeasured(trials: Iterable[Trial]) -> str:
+def _unmeasured_warning(trials: Iterable[Trial]) -> str:
     count = sum(trial.counts and trial.delivered_mps2 is None for trial in trials)
     if not count:
         return ""
@@ -185,7 +187,7 @@ def _unmeasured(trials: Iterable[Trial]) -> str:
     )
 
 
-def _lapsing(catches: Sequence[CatchTally]) -> str:
+def _lapse_warning(catches: Sequence[CatchTally]) -> str:
     lapsing = []
     slow = [tally for tally in catches if tally.frequency_hz <= FELT_BY_ALL_HZ]
     for subject in dict.fromkeys(tally.subject for tally in slow):
@@ -198,32 +200,32 @@ def _lapsing(catches: Sequence[CatchTally]) -> str:
         return ""
     return (
         f"More than {100 * MANY_LAPSES:.0f} % wrong in catch trials at full level, up to {FELT_BY_ALL_HZ:g} Hz, where "
-        f"inattention raises a threshold: {listed(lapsing)}."
+        f"inattention raises a threshold: {conjoin(lapsing)}."
     )
 
 
-def _undetected(detection: Sequence[Threshold]) -> str:
-    guessed = _guessed(detection)
-    return f"Detection not shown to be better than chance: {listed(guessed)}." if guessed else ""
+def _undetected_warning(detection: Sequence[Threshold]) -> str:
+    guessed = _runs_at_chance(detection)
+    return f"Detection not shown to be better than chance: {conjoin(guessed)}." if guessed else ""
 
 
-def _below_detection(table: ThresholdTable, felt: ThresholdTable) -> str:
+def _below_detection_warning(table: ThresholdTable, felt: ThresholdTable) -> str:
     found = [
-        f"{one.subject} at {one.frequency_hz:g} Hz ({one.direction_n:.2f} N, detected from {one.detection_n:.2f} N)"
-        for one in directions_below_detection(table, felt)
+        f"{each.subject} at {each.frequency_hz:g} Hz ({each.direction_n:.2f} N, detected from {each.detection_n:.2f} N)"
+        for each in directions_below_detection(table, felt)
     ]
     if not found:
         return ""
     return (
-        f"The direction was told at a level below that at which the vibration was felt: {listed(found)}. Two runs of "
+        f"The direction was told at a level below that at which the vibration was felt: {conjoin(found)}. Two runs of "
         f"one threshold differ by {REPEAT_SD_DB:g} dB (standard deviation); more than twice that asks for another cue "
         "than touch, or a lapse of attention in the detection run."
     )
 
 
-def _run(row: Threshold) -> str:
+def _run_text(row: Threshold) -> str:
     return f"{row.subject} at {row.frequency_hz:g} Hz"
 
 
-def _count(things: Sequence[str], noun: str) -> str:
+def _count_text(things: Sequence[str], noun: str) -> str:
     return f"1 {noun} is" if len(things) == 1 else f"{len(things)} {noun}s are"

@@ -1,4 +1,4 @@
-"""One threshold per participant and frequency, with the gaps left as gaps."""
+"""Table of thresholds by participant and frequency; missing ones stay gaps."""
 
 import math
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ class ThresholdTable:
             "of intervals and effect sizes does not hold."
         )
 
-    def missing(self) -> tuple[tuple[str, float], ...]:
+    def gaps(self) -> tuple[tuple[str, float], ...]:
         """Participant and frequency of every gap."""
         return tuple(
             (subject, frequency)

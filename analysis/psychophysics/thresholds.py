@@ -1,4 +1,4 @@
-"""From runs to thresholds: the mean of the last peaks and valleys, and whether the cap cut into it."""
+"""Threshold of a run: the mean of its last reversals, and whether the cap cut into it."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -105,10 +105,10 @@ def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
         d_prime=bias.d_prime if bias else None,
         criterion=bias.criterion if bias else None,
         spoiled_trials=run.spoiled_trials,
-        threshold_mps2=_mean([trial.delivered_mps2 for trial in turned]) if run.complete else None,
-        threshold_mm=_mean([trial.displacement_mm for trial in turned]) if run.complete else None,
+        threshold_mps2=_mean_of_measured([trial.delivered_mps2 for trial in turned]) if run.complete else None,
+        threshold_mm=_mean_of_measured([trial.displacement_mm for trial in turned]) if run.complete else None,
         measured_reversals=sum(trial.delivered_mps2 is not None for trial in turned),
-        ended=_end_of(run, rule),
+        ended=_run_end(run, rule),
         repeats_at_will=run.repeats_at_will,
         repeat_rate=run.repeats_at_will / run.presentations if run.presentations else 0.0,
         asked_often=is_often(run.repeats_at_will, run.presentations),
@@ -131,13 +131,13 @@ def is_censored(cap_reversals: int) -> bool:
     return cap_reversals > 0
 
 
-def _end_of(run: Run, rule: StaircaseRule) -> RunEnd:
+def _run_end(run: Run, rule: StaircaseRule) -> RunEnd:
     if run.complete:
         return RunEnd.REVERSALS
     return RunEnd.TRIAL_LIMIT if is_finished(rule, run.state) else RunEnd.UNFINISHED
 
 
-def _mean(values: Sequence[float | None]) -> float | None:
+def _mean_of_measured(values: Sequence[float | None]) -> float | None:
     measured = [value for value in values if value is not None]
     return fmean(measured) if measured else None
 

@@ -1,4 +1,4 @@
-"""The published analysis beside the primary one, in words: where they differ, why, and which was declared."""
+"""Comparison of the published and the primary analysis, as text: differences, reasons, and which was declared."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.group_contrasts import Contrast
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
-from analysis.wording import listed, p_text, signed
+from analysis.wording import conjoin, p_text, signed_number
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 
@@ -24,8 +24,8 @@ NEAR_PUBLISHED_CAP = (
 )
 
 
-def declared_words(declared: AnalysisSettings) -> str:
-    """What was fixed before the data, and what was not."""
+def declaration_text(declared: AnalysisSettings) -> str:
+    """What the protocol fixed before the data, and what it did not, as text."""
     named = {"hierarchical": "the hierarchical model of all answers", "published": "the published one-way analysis"}
     if declared.primary == "undeclared":
         primary = (
@@ -42,10 +42,10 @@ def declared_words(declared: AnalysisSettings) -> str:
     ]
     names = ("primary contrast", "sample size", "exclusions")
     missing = [name for name, part in zip(names, parts, strict=True) if not part]
-    return " ".join(filter(None, [primary, *parts, f"Not declared: {listed(missing)}." if missing else ""]))
+    return " ".join(filter(None, [primary, *parts, f"Not declared: {conjoin(missing)}." if missing else ""]))
 
 
-def analyses_compared(
+def comparison_text(
     primary: PrimaryAnalysis | None,
     means: Sequence[Contrast],
     comparisons: Comparisons,
@@ -65,21 +65,21 @@ def analyses_compared(
         mean = by_frequency.get(contrast.frequency_hz)
         if mean is not None and abs(contrast.difference_db - mean.difference_db) >= NOTABLE_DB:
             apart.append(
-                f"at {contrast.frequency_hz:g} Hz {signed(contrast.difference_db, 1)} dB against "
-                f"{signed(mean.difference_db, 1)} dB"
+                f"at {contrast.frequency_hz:g} Hz {signed_number(contrast.difference_db, 1)} dB against "
+                f"{signed_number(mean.difference_db, 1)} dB"
             )
     against = f"{primary.frequencies_hz[0]:g} Hz"
     size = (
-        f"Differences to {against} by the model and by reversal means are apart: {listed(apart)}."
+        f"Differences to {against} by the model and by reversal means are apart: {conjoin(apart)}."
         if apart
         else f"Differences to {against} by the model and by reversal means agree within {NOTABLE_DB:g} dB."
     )
     cut = [NEAR_CAP, NEAR_PUBLISHED_CAP if rule == SIMULATED_RULE else ""] if table.cut else []
-    return " ".join(filter(None, [size, _verdicts(primary, comparisons), *cut]))
+    return " ".join(filter(None, [size, _verdict_text(primary, comparisons), *cut]))
 
 
-def _verdicts(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
-    """Where one calls a difference significant at the 5 % level and the other does not."""
+def _verdict_text(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
+    """Frequencies at which only a single analysis finds a significant difference at the 5 % level, as text."""
     lowest = frequency_name(primary.frequencies_hz[0])
     pairs = {pair.second: pair.p for pair in comparisons.pairs if pair.first == lowest}
     split = [
@@ -92,4 +92,4 @@ def _verdicts(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
         return ""
     if not split:
         return f"Both agree which frequencies differ from {lowest} at the 5 % level."
-    return f"At the 5 % level they disagree whether these differ from {lowest}: {listed(split)}."
+    return f"At the 5 % level they disagree whether these differ from {lowest}: {conjoin(split)}."

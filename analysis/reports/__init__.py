@@ -1,1 +1,1 @@
-"""Values and figures to one page of HTML that stands alone."""
+"""Reports: values and figures as a self-contained page of HTML."""

@@ -1,4 +1,4 @@
-"""What kind of distortion the device shows, per channel, input and level, without any model."""
+"""Report sections on nonlinear distortion by channel, input and level, found without a model."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,7 +8,7 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.settings import DISTORTION_P
 from analysis.diagnosis.unit_wording import share_text
 from analysis.reports.page import Section, Table
-from analysis.wording import NONE, listed
+from analysis.wording import NONE, conjoin
 
 _KINDS: tuple[Kind, ...] = ("odd", "even", "either", "varying")
 _WORDS: Mapping[Kind, str] = {
@@ -25,7 +25,7 @@ _COURSES = {
     "": "is there, at too few levels to say how it grows",
 }
 _HEARD = 0.1
-"""Of the loudest response of its quantity to an input at that level: what hears less has no row."""
+"""Response relative to the largest of its quantity, input and level, below which a channel has no row."""
 
 
 def distortion_sections(found: Findings) -> list[Section]:
@@ -33,17 +33,17 @@ def distortion_sections(found: Findings) -> list[Section]:
     seen = found.local.distortions
     if not seen.cells and not seen.remarks:
         return []
-    table = _table(found)
+    table = _distortion_table(found)
     return [
         Section(
             "What kind of distortion the device shows",
-            paragraphs=(*_said(seen.cells), *seen.remarks),
+            paragraphs=(*_trend_paragraphs(seen.cells), *seen.remarks),
             tables=(table,) if table is not None else (),
         )
     ]
 
 
-def _said(cells: Sequence[Distortion]) -> tuple[str, ...]:
+def _trend_paragraphs(cells: Sequence[Distortion]) -> tuple[str, ...]:
     if not cells:
         return ()
     heard = [cell for cell in cells if cell.whole_band and _is_heard(cell, cells)]
@@ -55,12 +55,12 @@ def _said(cells: Sequence[Distortion]) -> tuple[str, ...]:
         return ("No distortion stands out of the noise: from repeats and silent lines the device looks linear.",)
     return tuple(
         f"{_WORDS[kind]}{' distortion' if kind != 'varying' else ''} {_COURSES[course]}: "
-        f"{listed([f'{each.output} driven by {each.input}' for each in trends])}."
+        f"{conjoin([f'{each.output} driven by {each.input}' for each in trends])}."
         for (kind, course), trends in groups.items()
     )
 
 
-def _table(found: Findings) -> Table | None:
+def _distortion_table(found: Findings) -> Table | None:
     cells = [cell for cell in found.local.distortions.cells if cell.whole_band]
     heard = [cell for cell in cells if _is_heard(cell, cells)]
     kinds = [kind for kind in _KINDS if any(item.kind == kind for item in heard)]
@@ -69,7 +69,7 @@ def _table(found: Findings) -> Table | None:
         rows.setdefault((each.output, each.quantity, each.input, each.amplitude), {})[each.kind] = each
     if not rows:
         return None
-    noise = _noise(found)
+    noise = _noise_rms(found)
     return Table(
         "Noise and distortion, per cent of the response there",
         ("Channel", "Driven by", "Level", "Noise", *(_WORDS[kind] for kind in kinds)),
@@ -78,8 +78,8 @@ def _table(found: Findings) -> Table | None:
                 output,
                 input_,
                 f"{level:g}",
-                _share(noise.get((output, quantity)), next(iter(mine.values())).signal_rms),
-                *(_cell(mine.get(kind)) for kind in kinds),
+                _share_of_signal(noise.get((output, quantity)), next(iter(mine.values())).signal_rms),
+                *(_cell_text(mine.get(kind)) for kind in kinds),
             )
             for (output, quantity, input_, level), mine in rows.items()
         ),
@@ -101,7 +101,7 @@ def _is_heard(cell: Distortion, cells: Sequence[Distortion]) -> bool:
     return cell.signal_rms > _HEARD * max(beside)
 
 
-def _noise(found: Findings) -> dict[tuple[str, str], float]:
+def _noise_rms(found: Findings) -> dict[tuple[str, str], float]:
     """Rms by channel and quantity."""
     if found.floor is None or not found.courses:
         return {}
@@ -110,13 +110,13 @@ def _noise(found: Findings) -> dict[tuple[str, str], float]:
     return {key: float(value) for key, value in zip(keys, rms, strict=False)}
 
 
-def _share(rms: float | None, signal: float) -> str:
+def _share_of_signal(rms: float | None, signal: float) -> str:
     return NONE if rms is None or not signal > 0 else share_text(rms / signal)
 
 
-def _cell(cell: Distortion | None) -> str:
+def _cell_text(cell: Distortion | None) -> str:
     if cell is None:
         return NONE
     if cell.p_value < DISTORTION_P:
-        return _share(cell.rms, cell.signal_rms)
-    return f"< {_share(cell.limit_rms, cell.signal_rms)}"
+        return _share_of_signal(cell.rms, cell.signal_rms)
+    return f"< {_share_of_signal(cell.limit_rms, cell.signal_rms)}"

@@ -1,8 +1,8 @@
-"""How a diagnosis was made, in words, with its own numbers."""
+"""Description of the method of a diagnosis, as text with its own numbers."""
 
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
-from analysis.wording import listed
+from analysis.wording import conjoin
 
 _FREE = (
     "The model was played from rest by the recorded commands alone, and its answer compared with what was measured, "
@@ -26,10 +26,16 @@ _ROLES = (
 
 def method_paragraphs(found: Findings) -> tuple[str, ...]:
     """Error, split, noise, re-tuning and choice, map."""
-    return (_error(found), *_split(found), *_noise(found), *_choice(found), _map())
+    return (
+        _error_paragraph(found),
+        *_split_paragraphs(found),
+        *_noise_paragraphs(found),
+        *_choice_paragraphs(found),
+        _map_paragraph(),
+    )
 
 
-def _error(found: Findings) -> str:
+def _error_paragraph(found: Findings) -> str:
     measure = found.diagnosis.error
     if measure == "free simulation":
         how = _FREE
@@ -46,12 +52,12 @@ def _error(found: Findings) -> str:
     )
 
 
-def _split(found: Findings) -> tuple[str, ...]:
+def _split_paragraphs(found: Findings) -> tuple[str, ...]:
     parts = [f"{found.split_s[part]:.3g} s {did}" for part, did in _ROLES if found.split_s.get(part)]
-    return (f"Of the recorded time, {listed(parts)}.",) if parts else ()
+    return (f"Of the recorded time, {conjoin(parts)}.",) if parts else ()
 
 
-def _noise(found: Findings) -> tuple[str, ...]:
+def _noise_paragraphs(found: Findings) -> tuple[str, ...]:
     if found.floor is None:
         return ()
     how = _HOW.get(found.floor.how)
@@ -59,7 +65,7 @@ def _noise(found: Findings) -> tuple[str, ...]:
     return (" ".join([said, *found.floor.remarks]),)
 
 
-def _choice(found: Findings) -> tuple[str, ...]:
+def _choice_paragraphs(found: Findings) -> tuple[str, ...]:
     if not found.diagnosis.mismatch:
         return ()
     return (
@@ -72,7 +78,7 @@ def _choice(found: Findings) -> tuple[str, ...]:
     )
 
 
-def _map() -> str:
+def _map_paragraph() -> str:
     return (
         "In the map, what recordings in which nothing is missing have counts as no mismatch; what "
         "the most complete model errs by on held-out data of the same channel, in the same octave and those beside it, "

@@ -1,4 +1,4 @@
-"""The page about one diagnosis: what the model lacks, how one sees it, how much better it predicts with it."""
+"""Report of a diagnosis: what the model lacks, the evidence for it, and how much better it predicts with it."""
 
 from collections.abc import Mapping, Sequence
 
@@ -39,7 +39,7 @@ from analysis.reports.diagnosis_tables import (
     rival_table,
 )
 from analysis.reports.page import Page, Section, Table, render_page
-from analysis.wording import capital
+from analysis.wording import capitalise
 
 
 def render_diagnosis_report(
@@ -48,18 +48,18 @@ def render_diagnosis_report(
     """HTML. pictures: of `analysis.figures.diagnosis_pictures`, for the same findings."""
     diagnosis = found.diagnosis
     sections = [
-        *_answer(found),
-        _where(found, pictures),
+        *_answer_sections(found),
+        _localisation_section(found, pictures),
         *distortion_sections(found),
-        *(_effect(found, number, pictures) for number in range(len(diagnosis.effects))),
-        *_candidates(found),
-        *_tried(pictures),
-        _errors(found, pictures),
-        _remainder(found, pictures),
-        _own_numbers(found),
-        *_beside(found),
-        *_one_sentence("The next recording", next_experiment_sentence(diagnosis)),
-        *_remarks(found),
+        *(_effect_section(found, number, pictures) for number in range(len(diagnosis.effects))),
+        *_candidate_sections(found),
+        *_rival_sections(pictures),
+        _error_section(found, pictures),
+        _remainder_section(found, pictures),
+        _parameter_section(found),
+        *_black_box_sections(found),
+        *_sentence_sections("The next recording", next_experiment_sentence(diagnosis)),
+        *_remark_sections(found),
         Section("How this was done", paragraphs=method_paragraphs(found)),
     ]
     return render_page(
@@ -75,7 +75,7 @@ def render_diagnosis_report(
 
 
 def _banner(found: Findings) -> str:
-    """What speaks against the answer."""
+    """Doubts about the answer."""
     named = bool(found.diagnosis.effects)
     doubts = [confirmation_sentence(found.diagnosis.fit.fit, found.diagnosis.fit.test)] if named else []
     if named and found.black_box is not None and black_box_beats(found.black_box):
@@ -83,24 +83,25 @@ def _banner(found: Findings) -> str:
     return " ".join(doubt for doubt in doubts if doubt)
 
 
-def _answer(found: Findings) -> list[Section]:
+def _answer_sections(found: Findings) -> list[Section]:
     """Where physics was named: one sentence each, and what they leave open."""
     effects, signatures = found.diagnosis.effects, signature_texts(found)
     if not effects:
         return []
     points = [
-        " ".join(filter(None, (_said(found, effect, signatures), inseparable_sentence(effect)))) for effect in effects
-    ]  # fmt: skip
+        " ".join(filter(None, (_effect_text(found, effect, signatures), inseparable_sentence(effect))))
+        for effect in effects
+    ]
     after = [remainder_sentence(found.diagnosis, device_of(found)), next_experiment_sentence(found.diagnosis)]
     return [Section("What the model lacks", points=(*points, *filter(None, after)))]
 
 
-def _candidates(found: Findings) -> list[Section]:
+def _candidate_sections(found: Findings) -> list[Section]:
     table = candidate_table(found)
     return [] if table is None else [Section("What else may be missing", tables=(table,))]
 
 
-def _beside(found: Findings) -> list[Section]:
+def _black_box_sections(found: Findings) -> list[Section]:
     said = black_box_sentence(found.black_box, bool(found.diagnosis.effects))
     paragraphs = tuple(filter(None, (*ceiling_sentences(found.reached), said)))
     return [Section("A black box beside it", paragraphs=paragraphs)] if paragraphs else []
@@ -109,18 +110,18 @@ def _beside(found: Findings) -> list[Section]:
 _NO_MAP = "There is no map: the noise of this recording is not known."
 
 
-def _where(found: Findings, pictures: Sequence[Picture]) -> Section:
+def _localisation_section(found: Findings, pictures: Sequence[Picture]) -> Section:
     said = localisation_sentences(found.local) if found.maps else (_NO_MAP,)
     listed = mismatch_table("The places that differ most, as given", found.diagnosis.mismatch, found.is_timed)
     return Section(
         "Where model and device disagree",
         paragraphs=said,
-        pictures=(*_named(pictures, "state"), *_named(pictures, "mismatch-map")),
+        pictures=(*_select_pictures(pictures, "state"), *_select_pictures(pictures, "mismatch-map")),
         tables=(listed,),
     )
 
 
-def _effect(found: Findings, number: int, pictures: Sequence[Picture]) -> Section:
+def _effect_section(found: Findings, number: int, pictures: Sequence[Picture]) -> Section:
     effect = found.diagnosis.effects[number]
     placed = next((each.effect for each in found.named if each.effect.name == effect.effect), None)
     paragraphs = [share_sentence(effect)]
@@ -130,14 +131,14 @@ def _effect(found: Findings, number: int, pictures: Sequence[Picture]) -> Sectio
     if not rivals and not inseparable_sentence(effect):
         paragraphs.append("No rival came near.")
     return Section(
-        capital(effect_title(effect, _single(found))),
+        capitalise(effect_title(effect, _has_single_input(found))),
         paragraphs=tuple(paragraphs),
-        pictures=_signature(found, effect, pictures),
+        pictures=_signature_pictures(found, effect, pictures),
         tables=(parameter_table(effect), *((rival_table(effect),) if effect.rivals else ())),
     )
 
 
-def _signature(found: Findings, effect: NamedEffect, pictures: Sequence[Picture]) -> tuple[Picture, ...]:
+def _signature_pictures(found: Findings, effect: NamedEffect, pictures: Sequence[Picture]) -> tuple[Picture, ...]:
     """Of the effect at its own axis, where it stands at several."""
     mine = [number for number, signature in enumerate(found.signatures, start=1) if signature.effect == effect.effect]
     there = [number for number in mine if found.signatures[number - 1].axis == effect.axis]
@@ -145,24 +146,24 @@ def _signature(found: Findings, effect: NamedEffect, pictures: Sequence[Picture]
     return tuple(picture for picture in pictures if picture.name in names)
 
 
-def _tried(pictures: Sequence[Picture]) -> list[Section]:
-    shown = _named(pictures, "rivals")
+def _rival_sections(pictures: Sequence[Picture]) -> list[Section]:
+    shown = _select_pictures(pictures, "rivals")
     return [Section("What else was tried", pictures=shown)] if shown else []
 
 
-def _errors(found: Findings, pictures: Sequence[Picture]) -> Section:
+def _error_section(found: Findings, pictures: Sequence[Picture]) -> Section:
     tables: list[Table] = [error_table(found)]
     tables += [table for part in ("test", "fit") if (table := channel_table(found, part)) is not None]
-    return Section("How well it predicts", pictures=_named(pictures, "held-out"), tables=tuple(tables))
+    return Section("How well it predicts", pictures=_select_pictures(pictures, "held-out"), tables=tuple(tables))
 
 
-def _remainder(found: Findings, pictures: Sequence[Picture]) -> Section:
+def _remainder_section(found: Findings, pictures: Sequence[Picture]) -> Section:
     left = found.diagnosis.remainder
     tables = (mismatch_table("What is left", left, found.is_timed),) if left else ()
     return Section(
         "What is still unexplained",
         paragraphs=(remainder_sentence(found.diagnosis, device_of(found)),),
-        pictures=_named(pictures, "remainder"),
+        pictures=_select_pictures(pictures, "remainder"),
         tables=tables,
     )
 
@@ -186,22 +187,22 @@ def _own_numbers(found: Findings) -> Section:
     )
 
 
-def _remarks(found: Findings) -> list[Section]:
+def _remark_sections(found: Findings) -> list[Section]:
     points = (*implausible_sentences(found), *found.remarks)
     return [Section("Remarks", points=points)] if points else []
 
 
-def _one_sentence(heading: str, sentence: str) -> list[Section]:
+def _sentence_sections(heading: str, sentence: str) -> list[Section]:
     return [Section(heading, paragraphs=(sentence,))] if sentence else []
 
 
-def _said(found: Findings, effect: NamedEffect, signatures: Mapping[str, str]) -> str:
-    return effect_sentence(effect, signatures.get(effect.effect, ""), _single(found))
+def _effect_text(found: Findings, effect: NamedEffect, signatures: Mapping[str, str]) -> str:
+    return effect_sentence(effect, signatures.get(effect.effect, ""), _has_single_input(found))
 
 
-def _single(found: Findings) -> bool:
+def _has_single_input(found: Findings) -> bool:
     return found.given.inputs == 1
 
 
-def _named(pictures: Sequence[Picture], kind: str) -> tuple[Picture, ...]:
+def _select_pictures(pictures: Sequence[Picture], kind: str) -> tuple[Picture, ...]:
     return tuple(picture for picture in pictures if picture.name == kind or picture.name.startswith(f"{kind}-"))

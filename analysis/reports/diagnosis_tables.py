@@ -11,7 +11,7 @@ from analysis.diagnosis.result.retuned_numbers import all_numbers
 from analysis.diagnosis.result.wording import device_of
 from analysis.diagnosis.unit_wording import error_text, probability_text, share_text, value_text
 from analysis.reports.page import Table
-from analysis.wording import NONE, capital, ended, p_value, signed
+from analysis.wording import NONE, capitalise, end_sentence, p_value, signed_number
 
 _STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With what was found"))
 _MOST_PLACES = 12
@@ -24,20 +24,20 @@ _PARTS: Mapping[str, str] = {"fit": "the data that were fitted to", "test": "hel
 
 def parameter_table(effect: NamedEffect) -> Table:
     rows = tuple(
-        (name.replace("_", " "), estimate_text(parameter).partition(" [")[0], _interval(parameter))
+        (name.replace("_", " "), estimate_text(parameter).partition(" [")[0], _interval_text(parameter))
         for name, parameter in effect.parameters.items()
     )
     return Table("Its numbers", ("Number", "Value", "95 % interval"), rows)
 
 
 def rival_table(effect: NamedEffect) -> Table:
-    rows = [(capital(noun_of(effect.effect)), probability_text(effect.probability), "named", "")]
+    rows = [(capitalise(noun_of(effect.effect)), probability_text(effect.probability), "named", "")]
     rows += [
         (
-            capital(noun_of(rival.effect)),
+            capitalise(noun_of(rival.effect)),
             probability_text(rival.probability),
             "cannot be told apart" if rival.inseparable else "passed over",
-            ended(rival.why_not),
+            end_sentence(rival.why_not),
         )
         for rival in sorted(effect.rivals, key=lambda rival: (not rival.inseparable, -rival.probability))
     ]
@@ -49,11 +49,11 @@ def candidate_table(found: Findings) -> Table | None:
     device = device_of(found)
     rows = tuple(
         (
-            f"{capital(noun_of(candidate.effect))} {place_words(candidate.place, candidate.axis, device.single)}",
+            f"{capitalise(noun_of(candidate.effect))} {place_words(candidate.place, candidate.axis, device.single)}",
             candidate_numbers(candidate, device) or NONE,
             share_text(candidate.held_out_gain),
             share_text(candidate.share_of_black_box),
-            ended(capital(candidate.why_not)),
+            end_sentence(capitalise(candidate.why_not)),
         )
         for candidate in found.diagnosis.candidates
     )
@@ -71,7 +71,7 @@ def candidate_table(found: Findings) -> Table | None:
 def error_table(found: Findings) -> Table:
     """Of both records, over all channels."""
     rows = tuple(
-        (f"On {_PARTS[part]}", *(_error(errors, stage) for stage, _ in _STAGES), error_text(errors.noise))
+        (f"On {_PARTS[part]}", *(_stage_error_text(errors, stage) for stage, _ in _STAGES), error_text(errors.noise))
         for part, errors in (("fit", found.diagnosis.fit.fit), ("test", found.diagnosis.fit.test))
     )
     header = ("Error, share of the signal", *(words for _, words in _STAGES), "Noise alone")
@@ -96,9 +96,9 @@ def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None
             float(found.channel_errors.get(stage, {}).get(name, values[k]) if part == "test" else values[k])
             for stage, values in stands.items()
         ]
-        rows.append((name, *(f"{value_text(ratio * noise, unit)} ({_times(ratio)})" for ratio in ratios),
+        rows.append((name, *(f"{value_text(ratio * noise, unit)} ({_ratio_text(ratio)})" for ratio in ratios),
                      value_text(noise, unit)))  # fmt: skip
-    header = ("Channel", *(f"{words} (× {what})" for _, words in _STAGES), capital(what))
+    header = ("Channel", *(f"{words} (× {what})" for _, words in _STAGES), capitalise(what))
     return Table(f"By channel, on {_PARTS[part]}, rms", header, tuple(rows), folded=part == "fit")
 
 
@@ -131,23 +131,23 @@ def retuned_table(found: Findings) -> Table | None:
     alone = all_numbers(found.tuning, found.explanation.retuned.fitted.deviations)
     final = all_numbers(found.tuning, found.explanation.after.fitted.deviations)
     rows = tuple(
-        (before.name, before.size, signed(before.deviations), after.size, signed(after.deviations))
+        (before.name, before.size, signed_number(before.deviations), after.size, signed_number(after.deviations))
         for before, after in zip(alone, final, strict=True)
     )
     header = ("Number", "Re-tuned", "Standard deviations", "With what was found", "Standard deviations")
     return Table("Every number that was left open, by how much it moved", header, rows, folded=True)
 
 
-def _error(errors: Errors, stage: str) -> str:
+def _stage_error_text(errors: Errors, stage: str) -> str:
     value: float | None = getattr(errors, stage)
     return error_text(value)
 
 
-def _times(ratio: float) -> str:
+def _ratio_text(ratio: float) -> str:
     return f"{ratio:.2f}×" if ratio < 10 else f"{ratio:.3g}×"
 
 
-def _interval(estimate: Estimate) -> str:
+def _interval_text(estimate: Estimate) -> str:
     if estimate.ci95 is None:
         return NONE
     text = value_text(estimate.value, estimate.unit, estimate.ci95)

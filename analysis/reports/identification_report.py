@@ -1,4 +1,4 @@
-"""The page about one identified device: what was measured, what was fitted, what it is good for."""
+"""Report of an identified device: the measurement, the fitted model, and its quality."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

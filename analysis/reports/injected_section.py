@@ -1,4 +1,4 @@
-"""The part of a page about faults that were injected into real recordings."""
+"""Report section on faults that were injected into real recordings."""
 
 from collections.abc import Sequence
 
@@ -13,8 +13,10 @@ def injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
         ("what", "rate, 95 % interval"),
         tuple((injected_figure.name, figure_text(injected_figure)) for injected_figure in injected_figures(outcomes)),
     )
-    kinds = _table("Detectable faults by kind", "injected", tallies(outcomes, kind_of))
-    where = _table("Detectable faults by recording", "recording", tallies(outcomes, lambda outcome: outcome.recording))
+    kinds = _tally_table("Detectable faults by kind", "injected", tallies(outcomes, kind_of))
+    where = _tally_table(
+        "Detectable faults by recording", "recording", tallies(outcomes, lambda outcome: outcome.recording)
+    )
     missed = [
         outcome for outcome in outcomes if not outcome.right and (outcome.detectable or outcome.judged == "wrong")
     ]
@@ -22,7 +24,13 @@ def injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
         "Every miss, and every wrong story",
         ("recording", "injected", "error changes by", "judged", "named"),
         tuple(
-            (each.recording, each.injected or "nothing", _times(each.change), each.judged, ", ".join(each.named) or "-")
+            (
+                each.recording,
+                each.injected or "nothing",
+                _change_text(each.change),
+                each.judged,
+                ", ".join(each.named) or "-",
+            )
             for each in missed
         ),
     )
@@ -43,7 +51,7 @@ def kind_of(injected_outcome: InjectedOutcome) -> str:
     return "two at once" if len(injected_outcome.effects) > 1 else injected_outcome.injected
 
 
-def _table(title: str, what: str, rows: Sequence[Tally]) -> Table:
+def _tally_table(title: str, what: str, rows: Sequence[Tally]) -> Table:
     head = (what, "drawn", "detectable", *JUDGED[:-1], "named or in class", "nothing injected, nothing named")
     return Table(
         title,
@@ -62,7 +70,7 @@ def _table(title: str, what: str, rows: Sequence[Tally]) -> Table:
     )
 
 
-def _times(change: float | None) -> str:
+def _change_text(change: float | None) -> str:
     return "unknown" if change is None else f"{change:.2f}"
 
 

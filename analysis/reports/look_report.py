@@ -1,4 +1,4 @@
-"""The page about recordings before any model: what is wrong with them, what is in them."""
+"""Report of recordings before any model: failed checks, channels and figures."""
 
 from collections.abc import Mapping, Sequence
 

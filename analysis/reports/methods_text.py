@@ -1,6 +1,6 @@
 """The methods of a study in words, with the numbers of its protocol."""
 
-from analysis.wording import listed, typeset
+from analysis.wording import conjoin, typeset
 from protocols.definition.preparation import DemoSettings, PracticeSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepChange
 from protocols.definition.study_protocol import StudyProtocol
@@ -47,7 +47,7 @@ def methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
         _schedule(protocol),
         _staircase(rule),
         _threshold(rule),
-        *_beside(protocol),
+        *_side_procedures(protocol),
         _STATISTICS,
     )
 
@@ -91,8 +91,8 @@ def _stimulus(protocol: StudyProtocol) -> str:
 
 
 def _schedule(protocol: StudyProtocol) -> str:
-    frequencies = listed([f"{frequency:g}" for frequency in protocol.stimulus.frequencies_hz])
-    training = listed([f"{frequency:g} Hz" for frequency in protocol.training.frequencies_hz])
+    frequencies = conjoin([f"{frequency:g}" for frequency in protocol.stimulus.frequencies_hz])
+    training = conjoin([f"{frequency:g} Hz" for frequency in protocol.training.frequencies_hz])
     rest = f", at least {protocol.rests.after_run_s:g} s apart" if protocol.rests.after_run_s else ""
     return (
         f"The frequencies were {frequencies} Hz, one whole staircase each, {_ORDERS[protocol.schedule.order]}{rest}. "
@@ -101,7 +101,7 @@ def _schedule(protocol: StudyProtocol) -> str:
 
 
 def _staircase(rule: StaircaseRule) -> str:
-    phases = listed([f"{phase.step_db:g} dB for {phase.reversals} reversals" for phase in rule.steps])
+    phases = conjoin([f"{phase.step_db:g} dB for {phase.reversals} reversals" for phase in rule.steps])
     up = "every wrong answer" if rule.up_after_wrong == 1 else f"{rule.up_after_wrong} wrong answers in a row"
     down = "every right answer" if rule.down_after_right == 1 else f"{rule.down_after_right} right answers in a row"
     sentences = [
@@ -130,7 +130,7 @@ def _threshold(rule: StaircaseRule) -> str:
     )
 
 
-def _beside(protocol: StudyProtocol) -> tuple[str, ...]:
+def _side_procedures(protocol: StudyProtocol) -> tuple[str, ...]:
     demo, practice, catch, detection = protocol.demo, protocol.practice, protocol.catch, protocol.detection
     sentences = []
     if demo.level_n:
@@ -171,4 +171,4 @@ def levels_words(settings: DemoSettings | PracticeSettings) -> str:
 
 
 def _hz(frequencies_hz: tuple[float, ...]) -> str:
-    return f"{listed([f'{frequency:g}' for frequency in frequencies_hz])} Hz"
+    return f"{conjoin([f'{frequency:g}' for frequency in frequencies_hz])} Hz"

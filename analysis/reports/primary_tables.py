@@ -7,7 +7,7 @@ from analysis.psychophysics.hierarchy.inference import MedianThreshold
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, newton_or_none
 from analysis.reports.page import Section, Table
-from analysis.wording import NONE, number, p_text, p_value, signed
+from analysis.wording import NONE, number, p_text, p_value, signed_number
 
 MEANING = (
     "One psychometric model of all answers: thresholds differ by frequency, by person, and by person at each "
@@ -86,7 +86,7 @@ def _medians(primary: PrimaryAnalysis) -> Table:
 
 
 def interval_words(lower: float | None, upper: float | None, digits: int = 2) -> str:
-    """Of a median, whose upper end is missing above the cap."""
+    """Interval of a median as text; the upper end is missing above the cap."""
     if lower is None:
         return "no lower bound"
     return f"above {number(lower, digits)}" if upper is None else f"{number(lower, digits)} to {number(upper, digits)}"
@@ -101,8 +101,8 @@ def _contrasts(caption: str, rows: Sequence[Contrast], medians: Sequence[MedianT
             (
                 f"{c.frequency_hz:g} − {c.against_hz:g} Hz{' *' * (c.frequency_hz in above)}",
                 str(c.participants),
-                signed(c.difference_db, 1),
-                f"{signed(c.lower_db, 1)} to {signed(c.upper_db, 1)}",
+                signed_number(c.difference_db, 1),
+                f"{signed_number(c.lower_db, 1)} to {signed_number(c.upper_db, 1)}",
                 p_value(c.p),
                 p_value(c.p_holm),
                 number(c.effect_size),
@@ -162,7 +162,7 @@ def _persons(primary: PrimaryAnalysis) -> Table:
                     for value, above in zip(person.thresholds_n, person.above_cap, strict=True)
                 ),
                 number(person.slope),
-                signed(person.criterion),
+                signed_number(person.criterion),
             )
             for person in primary.persons
         ),
@@ -176,7 +176,7 @@ def _goodness(primary: PrimaryAnalysis) -> Table:
         caption="Predicted and observed shares of right answers",
         header=("Trials", "Predicted", "Observed", "z"),
         rows=tuple(
-            (str(b.trials), f"{100 * b.predicted:.1f} %", f"{100 * b.observed:.1f} %", signed(b.z, 1))
+            (str(b.trials), f"{100 * b.predicted:.1f} %", f"{100 * b.observed:.1f} %", signed_number(b.z, 1))
             for b in primary.goodness.bins
         ),
         notes=(

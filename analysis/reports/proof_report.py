@@ -1,9 +1,9 @@
-"""The page of a proof: misses first, then the figures with their intervals, then how it was done."""
+"""Report of a proof: misses first, then the figures with their intervals, then the method."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.evaluation.proof.controlled import Controlled
+from analysis.evaluation.proof.controlled import ControlOutcome
 from analysis.evaluation.proof.follow_up import FollowUp
 from analysis.evaluation.proof.outcome import Outcome
 from analysis.evaluation.proof.score import Score
@@ -31,7 +31,7 @@ class ProofFacts:
     commit: str
     engines: tuple[str, ...]
     remarks: tuple[str, ...]
-    controls: tuple[Controlled, ...] = ()
+    controls: tuple[ControlOutcome, ...] = ()
     followed: tuple[FollowUp, ...] = ()
 
 
@@ -45,12 +45,12 @@ def render_proof_report(
 ) -> str:
     """HTML."""
     sections = (
-        Section(f"Misses: {len(score.misses)}", tables=(_misses(score.misses),) if score.misses else ()),
-        Section("Figures", tables=(_figures(score),)),
-        *_followed(facts.followed),
-        *_controls(facts.controls),
+        Section(f"Misses: {len(score.misses)}", tables=(_miss_table(score.misses),) if score.misses else ()),
+        Section("Figures", tables=(_figure_table(score),)),
+        *_follow_up_sections(facts.followed),
+        *_control_sections(facts.controls),
         Section("Which, from where on, how sure", pictures=tuple(pictures)),
-        Section("How it was done", HOW, points=_points(facts)),
+        Section("How it was done", HOW, points=_fact_points(facts)),
     )
     return render_page(
         Page(
@@ -65,7 +65,7 @@ def render_proof_report(
     )
 
 
-def _controls(controls: Sequence[Controlled]) -> tuple[Section, ...]:
+def _control_sections(controls: Sequence[ControlOutcome]) -> tuple[Section, ...]:
     if not controls:
         return ()
     rows = tuple(
@@ -76,13 +76,14 @@ def _controls(controls: Sequence[Controlled]) -> tuple[Section, ...]:
     return (Section("Controls", tables=(table,)),)
 
 
-def _followed(found: Sequence[FollowUp]) -> tuple[Section, ...]:
+def _follow_up_sections(found: Sequence[FollowUp]) -> tuple[Section, ...]:
     if not found:
         return ()
     rows = tuple(
         (
             str(each.number), each.effect, ", ".join(each.returned), each.proposed or "nothing would tell",
-            _said(each.proposed, each.after_proposed), each.drawn or "-", _said(each.drawn, each.after_drawn),
+            _returned_text(each.proposed, each.after_proposed), each.drawn or "-",
+            _returned_text(each.drawn, each.after_drawn),
         )
         for each in found
     )  # fmt: skip
@@ -92,11 +93,11 @@ def _followed(found: Sequence[FollowUp]) -> tuple[Section, ...]:
     return (Section("The next experiment", tables=(table,)),)
 
 
-def _said(recorded: str, returned: Sequence[str]) -> str:
+def _returned_text(recorded: str, returned: Sequence[str]) -> str:
     return (", ".join(returned) or "no name") if recorded else "-"
 
 
-def _points(facts: ProofFacts) -> tuple[str, ...]:
+def _fact_points(facts: ProofFacts) -> tuple[str, ...]:
     return (
         f"Seeds {facts.seeds}.",
         f"SHA-256 of labels.sha256: {facts.seal}.",
@@ -105,7 +106,7 @@ def _points(facts: ProofFacts) -> tuple[str, ...]:
     )
 
 
-def _misses(misses: Sequence[Outcome]) -> Table:
+def _miss_table(misses: Sequence[Outcome]) -> Table:
     rows = tuple(
         (
             str(miss.number), f"{miss.kind}, {miss.bank}", concealed_text(miss), strength_text(miss) or "-",
@@ -117,7 +118,7 @@ def _misses(misses: Sequence[Outcome]) -> Table:
     return Table("Every answer that is not as it should be", header, rows)
 
 
-def _figures(score: Score) -> Table:
+def _figure_table(score: Score) -> Table:
     calibration = score.calibration
     whole = Figure(
         "expected calibration error, 10 bins of equal count", calibration.error, calibration.low, calibration.high,

@@ -1,4 +1,4 @@
-"""The page about a folder of real recordings: what was named, what is left, what an expert would object."""
+"""Report of a folder of real recordings: named effects, residuals, and an expert's objections."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -102,7 +102,7 @@ def _section(real_answer: RealAnswer, picture: Picture | None) -> Section:
         *(number_sentence(number) for number in real_answer.numbers),
         *_pair_points(real_answer.pair),
     )
-    further = tuple(_further_sentence(*test) for test in _further(real_answer))
+    further = tuple(_further_sentence(*test) for test in _further_tests(real_answer))
     objections = tuple(f"An expert would object: {said}" for said in real_answer.objections)
     paragraphs = (
         *((real_answer.title,) if real_answer.title else ()),
@@ -162,7 +162,7 @@ def _pair_points(pair: PairOutcome | None) -> tuple[str, ...]:
     )
 
 
-def _further(real_answer: RealAnswer) -> list[tuple[str, str, float | None, float | None, str]]:
+def _further_tests(real_answer: RealAnswer) -> list[tuple[str, str, float | None, float | None, str]]:
     return [(each.recording, each.error, each.retuned, each.after, each.problem) for each in real_answer.further]
 
 

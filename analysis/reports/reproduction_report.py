@@ -1,4 +1,4 @@
-"""The page of a reproduction: five figures, each beside what the paper reports and what came out here."""
+"""Report of a reproduction: five figures, each with the published and the reproduced findings."""
 
 from collections.abc import Mapping, Sequence
 
@@ -68,7 +68,7 @@ def render_reproduction_report(
 def overview_lines(reproduction: Reproduction) -> tuple[str, ...]:
     """One line per figure, for a terminal."""
     return tuple(
-        f"Figure {figure.figure}: {_count(figure)}  {figure.title}"
+        f"Figure {figure.figure}: {_agreement_text(figure)}  {figure.title}"
         for figure in sorted(reproduction.figures, key=lambda figure: figure.figure)
     )
 
@@ -91,7 +91,7 @@ def _percent(share: float | None) -> str:
 
 
 def _overview(reproduction: Reproduction) -> Section:
-    compared = [finding for figure in reproduction.figures for finding in figure.findings if _compared(finding)]
+    compared = [finding for figure in reproduction.figures for finding in figure.findings if _is_compared(finding)]
     agreeing = sum(finding.as_published is True for finding in compared)
     otherwise = tuple(
         f"Figure {figure.figure}, {finding.what}: published {finding.published}; here {finding.here}."
@@ -163,10 +163,10 @@ def _cost(row: PlayedRow) -> str:
     return "–" if row.multiply_adds is None else f"{row.multiply_adds}"
 
 
-def _compared(finding: Finding) -> bool:
+def _is_compared(finding: Finding) -> bool:
     return finding.as_published is not None
 
 
-def _count(figure: FigureFindings) -> str:
-    compared = [finding for finding in figure.findings if _compared(finding)]
+def _agreement_text(figure: FigureFindings) -> str:
+    compared = [finding for finding in figure.findings if _is_compared(finding)]
     return f"{sum(finding.as_published is True for finding in compared)} of {len(compared)} as published."

@@ -1,4 +1,4 @@
-"""The tables of what stands beside the thresholds of direction: detection, catch trials, practice."""
+"""Tables beside the direction thresholds: detection, catch trials, practice."""
 
 from collections.abc import Iterator
 
@@ -7,7 +7,7 @@ from analysis.psychophysics.equalized_delivery import deliveries
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.methods_text import levels_words
 from analysis.reports.page import Table
-from analysis.wording import CUT_NOTE, NONE, marked_if_cut, number, signed
+from analysis.wording import CUT_NOTE, NONE, mark_cut, number, signed_number
 from protocols.procedure.staircase import to_db
 
 
@@ -38,7 +38,7 @@ def detection_run_table(analysis: StudyAnalysis) -> Table:
         rows=tuple(
             (
                 row.subject, row.session, str(row.run), f"{row.frequency_hz:g}",
-                marked_if_cut(row.threshold_n, row.censored), str(row.reversals), str(row.trials),
+                mark_cut(row.threshold_n, row.censored), str(row.reversals), str(row.trials),
                 number(row.percent_correct, 0), number(row.d_prime), number(row.criterion),
             )
             for row in analysis.detection
@@ -126,12 +126,12 @@ def _beside_direction(
     analysis: StudyAnalysis, subject: str, frequency_hz: float, felt_n: float | None, felt_bound: bool
 ) -> Iterator[str]:
     told_n, told_bound = _direction(analysis, subject, frequency_hz)
-    yield marked_if_cut(felt_n, felt_bound)
-    yield marked_if_cut(told_n, told_bound)
+    yield mark_cut(felt_n, felt_bound)
+    yield mark_cut(told_n, told_bound)
     if felt_n is None or told_n is None or felt_bound or told_bound:
         yield NONE
     else:
-        yield signed(to_db(told_n) - to_db(felt_n), 1)
+        yield signed_number(to_db(told_n) - to_db(felt_n), 1)
 
 
 def _direction(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:

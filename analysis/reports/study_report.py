@@ -1,4 +1,4 @@
-"""The report of one study: one page that stands alone."""
+"""Report of a study as a self-contained page."""
 
 from collections.abc import Mapping, Sequence
 
@@ -52,7 +52,7 @@ def render_study_report(
         *_models(qualities),
         _warnings(analysis),
         *_results(analysis, by_name),
-        *_beside(analysis),
+        *_side_sections(analysis),
         *_delivery(analysis, by_name),
         *_ellipsoids(ellipsoids, by_name),
         *_runs(analysis, pictures),
@@ -72,7 +72,7 @@ def render_study_report(
 
 def _summary(analysis: StudyAnalysis) -> str:
     if not analysis.thresholds:
-        return _without_directions(analysis)
+        return _detection_summary(analysis)
     complete = sum(row.complete for row in analysis.thresholds)
     people, runs = len(analysis.table.subjects), len(analysis.thresholds)
     simulated = "simulated " if analysis.population is Population.SIMULATED else ""
@@ -82,7 +82,7 @@ def _summary(analysis: StudyAnalysis) -> str:
     )
 
 
-def _without_directions(analysis: StudyAnalysis) -> str:
+def _detection_summary(analysis: StudyAnalysis) -> str:
     if not analysis.detection:
         return "There is no run to analyse."
     runs = len(analysis.detection)
@@ -122,7 +122,7 @@ def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Se
     return [thresholds, primary_section(analysis.primary, words, analysis.mean_contrasts), comparison]
 
 
-def _beside(analysis: StudyAnalysis) -> list[Section]:
+def _side_sections(analysis: StudyAnalysis) -> list[Section]:
     """Detection, catch trials, practice: each only where it was taken."""
     sections = []
     if analysis.detection:

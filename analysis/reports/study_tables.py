@@ -1,4 +1,4 @@
-"""The tables of a study report: numbers become text here and nowhere else."""
+"""Tables of a study report, in which numbers become text."""
 
 from collections.abc import Callable, Sequence
 
@@ -8,13 +8,13 @@ from analysis.psychophysics.repeated_trials import OFTEN_WORDS
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.reports.page import Table
-from analysis.wording import CUT_NOTE, NONE, count, marked_if_cut, number, p_value, signed
+from analysis.wording import CUT_NOTE, NONE, count, mark_cut, number, p_value, signed_number
 
 
 def threshold_table_text(analysis: StudyAnalysis) -> Table:
     table = analysis.table
     rows = [
-        (subject, *("stopped" if stop else marked_if_cut(value, cut) for value, cut, stop in zip(*cells, strict=True)))
+        (subject, *("stopped" if stop else mark_cut(value, cut) for value, cut, stop in zip(*cells, strict=True)))
         for subject, *cells in zip(table.subjects, table.values, table.censored, table.stopped, strict=True)
     ]
     return Table(
@@ -35,12 +35,20 @@ def group_table(analysis: StudyAnalysis) -> Table:
     for group, cut, stopped in zip(analysis.anova.groups, cuts, stops, strict=True):
         interval = intervals.get(group.name)
         shown = f"{number(interval.lower)} to {number(interval.upper)}" if interval else NONE
-        mean = marked_if_cut(group.mean, bool(cut or stopped))
+        mean = mark_cut(group.mean, bool(cut or stopped))
         rows.append((group.name, str(group.n), mean, number(group.sd), shown, str(cut), str(stopped)))
     percent = f"{100 * analysis.comparisons.confidence:g} %"
     return Table(
         caption="Groups (N)",
-        header=("Frequency", "n", "Mean", "SD", f"{percent} comparison interval{_without(analysis)}", "Cut", "Stopped"),
+        header=(
+            "Frequency",
+            "n",
+            "Mean",
+            "SD",
+            f"{percent} comparison interval{_coverage_suffix(analysis)}",
+            "Cut",
+            "Stopped",
+        ),
         rows=tuple(rows),
         notes=(
             "Comparison intervals are for comparing means with each other; they are no confidence intervals.",
@@ -49,7 +57,7 @@ def group_table(analysis: StudyAnalysis) -> Table:
     )
 
 
-def _without(analysis: StudyAnalysis) -> str:
+def _coverage_suffix(analysis: StudyAnalysis) -> str:
     """Added to the name of an interval or effect size that includes cut runs."""
     return ", without coverage" if analysis.table.coverage else ""
 
@@ -68,7 +76,8 @@ def one_way_table(analysis: StudyAnalysis) -> Table:
         within = (number(anova.ss_within, 3), count(anova.df_within), number(anova.mean_square_within, 3))
         rows = (("Frequency", *between, number(anova.f), p_value(anova.p)), ("Within", *within, "", ""))
         effect = (
-            f"Effect size{_without(analysis)}: η² = {number(anova.eta_squared)}, ω² = {number(anova.omega_squared)}.",
+            f"Effect size{_coverage_suffix(analysis)}: η² = {number(anova.eta_squared)}, "
+            f"ω² = {number(anova.omega_squared)}.",
         )
     return Table(
         caption="One-way analysis of variance, as published",
@@ -83,12 +92,12 @@ def pair_table(analysis: StudyAnalysis) -> Table:
     percent = f"{100 * comparisons.confidence:g} %"
     return Table(
         caption="Pairs of frequencies (Tukey-Kramer)",
-        header=("Pair", "Difference (N)", f"{percent} interval{_without(analysis)}", "p"),
+        header=("Pair", "Difference (N)", f"{percent} interval{_coverage_suffix(analysis)}", "p"),
         rows=tuple(
             (
                 f"{pair.second} − {pair.first}",
-                signed(pair.difference),
-                f"{signed(pair.lower)} to {signed(pair.upper)}",
+                signed_number(pair.difference),
+                f"{signed_number(pair.lower)} to {signed_number(pair.upper)}",
                 p_value(pair.p),
             )
             for pair in comparisons.pairs
@@ -113,8 +122,8 @@ def within_table(analysis: StudyAnalysis) -> Table:
             ("Without correction", f"{within.df_conditions}, {within.df_error}", f, p_value(within.p_uncorrected))
         )
         effects.append(
-            f"Effect size{_without(analysis)}: partial η² = {number(within.partial_eta_squared)}, generalized η² = "
-            f"{number(within.generalized_eta_squared)}."
+            f"Effect size{_coverage_suffix(analysis)}: partial η² = {number(within.partial_eta_squared)}, "
+            f"generalized η² = {number(within.generalized_eta_squared)}."
         )
     if within.mauchly_w is not None:
         effects.append(f"Sphericity (Mauchly): W = {number(within.mauchly_w)}, p = {p_value(within.mauchly_p)}.")
@@ -166,7 +175,7 @@ def run_table(analysis: StudyAnalysis) -> Table:
 
 
 def _threshold(row: Threshold) -> str:
-    return "stopped" if row.ended is RunEnd.TRIAL_LIMIT else marked_if_cut(row.threshold_n, row.censored)
+    return "stopped" if row.ended is RunEnd.TRIAL_LIMIT else mark_cut(row.threshold_n, row.censored)
 
 
 def _repeats(row: Threshold) -> str:

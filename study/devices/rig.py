@@ -90,7 +90,7 @@ class CompiledRig:
     """Numbers of the buttons that are down."""
     prepare: Callable[[FloatArray, bool, int], None] = not_prepared
     """prepare(rows, repeats, wait): told before a stimulus begins, for a rig that only acts as if it were driven. rows
-    (n, 3), N: played once or, if it `repeats`, again and again; the first comes after `wait` ticks."""
+    (n, 3), N: played once or, if it `find_repeats`, again and again; the first comes after `wait` ticks."""
 
     def close(self) -> None:
         """Nothing to disconnect."""

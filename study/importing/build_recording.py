@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from analysis.diagnosis.data.found_segments import find_segments
-from analysis.look.clock import odd_rate
+from analysis.look.clock import rate_objection
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.recording_checks import recording_problems
 from equalizer.signals.signal import FloatArray, Signal
@@ -176,7 +176,7 @@ def _concatenate(wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _Ch
 
 
 def _odd_rate(recording: Recording) -> str:
-    return "" if recording.meta.get("time") == "unknown" else odd_rate(recording.sample_rate_hz)
+    return "" if recording.meta.get("time") == "unknown" else rate_objection(recording.sample_rate_hz)
 
 
 def _time_facts(wanted: ImportMap) -> dict[str, str]:

@@ -1,6 +1,6 @@
 import pytest
 
-from analysis.wording import count, f_text, listed, number, p_text, p_value
+from analysis.wording import conjoin, count, f_text, number, p_text, p_value
 
 
 def test_what_is_not_there_is_a_dash():
@@ -21,8 +21,8 @@ def test_f_has_both_its_degrees_of_freedom():
     ("things", "text"), [([], ""), (["a"], "a"), (["a", "b"], "a and b"), (["a", "b", "c"], "a, b and c")]
 )
 def test_lists_read_like_sentences(things, text):
-    assert listed(things) == text
+    assert conjoin(things) == text
 
 
 def test_a_long_list_says_how_much_it_leaves_out():
-    assert listed([str(i) for i in range(20)]).endswith("10, 11 and 8 more")
+    assert conjoin([str(i) for i in range(20)]).endswith("10, 11 and 8 more")

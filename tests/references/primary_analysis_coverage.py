@@ -13,7 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy.stats import t as student
 
-from analysis.psychophysics.anova import one_way
+from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.group_contrasts import contrasts
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import Prior, fit_hierarchy
@@ -55,7 +55,7 @@ def measure(crowd: Crowd, studies: int, bounds: bool) -> dict[str, list[float]]:
         covered = np.abs(error) <= half * pseudo.std(axis=0, ddof=1) / PEOPLE**0.5
         found = contrasts(HZ, pseudo, 0.95)
         within = repeated_measures(study.answers.subjects, pseudo.tolist())
-        paper = one_way({f"{f}": list(column) for f, column in zip(HZ, study.threshold_n.T, strict=True)})
+        paper = one_way_anova({f"{f}": list(column) for f, column in zip(HZ, study.threshold_n.T, strict=True)})
         rows.append({
             "bias": error,
             "cover": covered,

@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.diagnosis.data.observed_parts import MOST_PERIODS, parts_of
 from analysis.diagnosis.noise.rounding import rounding_step
-from analysis.wording import listed
+from analysis.wording import conjoin
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
@@ -130,8 +130,8 @@ def _peak(command: Signal, start: int, stop: int) -> float:
 
 def _segments_sentence(segments: Sequence[Segment]) -> str:
     periodic = [segment for segment in segments if segment.period]
-    periods = listed([str(period) for period in sorted({segment.period for segment in periodic})])
-    levels = listed([f"{level:.4g}" for level in sorted({segment.amplitude for segment in periodic})])
+    periods = conjoin([str(period) for period in sorted({segment.period for segment in periodic})])
+    levels = conjoin([f"{level:.4g}" for level in sorted({segment.amplitude for segment in periodic})])
     where = (
         "The command" if len(periodic) == len(segments) else f"In {len(periodic)} of {len(segments)} parts the command"
     )

@@ -19,7 +19,7 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.settings import LAW_BEATS, LAW_PLACEBO, LAW_SAME, LAW_STABLE
-from analysis.wording import listed
+from analysis.wording import conjoin
 from equalizer.effects.discovered_law import axis_names
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray
@@ -154,13 +154,13 @@ def proof_sentence(context: SearchContext, found: Explanation, rivals: Sequence[
     range of motion beyond which it is unknown."""
     whole, after = context.whole, found.after
     laws = [law for law in laws_of(after.fitted.hypothesis) if law is not None]
-    where = listed(held_out_kinds(whole.records))
+    where = conjoin(held_out_kinds(whole.records))
     said = f"The formula was tested on {where}, which nothing was fitted to: {_error_sentence(context, found, after)}"
     closest = min((_held_out_error_share(context, found, rival) for rival in rivals), default=None)
     if closest is not None:
         said += f", the best law of the catalogue {100 * closest:.3g} %"
     visited = _range_of_motion(context, found, {name for law in laws for name in law.variables})
-    return f"{said}. What it says beyond {listed(visited)} is not known." if visited else f"{said}."
+    return f"{said}. What it says beyond {conjoin(visited)} is not known." if visited else f"{said}."
 
 
 def _error_sentence(context: SearchContext, found: Explanation, law: FittedCandidate) -> str:

@@ -53,7 +53,7 @@ def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
     if not others or len(others) == len(command.channels):
         return recordings, ""
     kept = [k for k in range(len(command.channels)) if k not in others]
-    names = listed([command.channels[k] for k in others])
+    names = conjoin([command.channels[k] for k in others])
     return (
         tuple(
             replace(each, command=each.command.select_channels(kept),
@@ -74,7 +74,7 @@ def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
     if len(kept) == len(command.channels):
         return recordings, ""
     return tuple(replace(each, command=each.command.select_channels(kept), excitation=None) for each in recordings), (
-        f"The imposed motion was taken from {listed([command.channels[k] for k in kept])} alone."
+        f"The imposed motion was taken from {conjoin([command.channels[k] for k in kept])} alone."
     )
 
 
@@ -87,7 +87,7 @@ def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
     kept = _lowest_derivative_channels(response)
     left = [name for k, name in enumerate(response.channels) if k not in kept]
     return tuple(replace(each, response=each.response.select_channels(kept)) for each in recordings), (
-        f"Forces are balanced along {listed([response.channels[k] for k in kept])}; {listed(left)}, of another kind, "
+        f"Forces are balanced along {conjoin([response.channels[k] for k in kept])}; {conjoin(left)}, of another kind, "
         "was left out."
     )
 
@@ -107,8 +107,8 @@ def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
     kept = sorted(np.argsort(-sizes, kind="stable")[:count].tolist())
     left = [name for k, name in enumerate(response.channels) if k not in kept]
     return tuple(replace(each, response=each.response.select_channels(kept)) for each in recordings), (
-        f"Of the forces along one motion the strongest, {listed([response.channels[k] for k in kept])}, was balanced; "
-        f"for {listed(left)}, import the recording with that force as its only response."
+        f"Of the forces along one motion the strongest, {conjoin([response.channels[k] for k in kept])}, was balanced; "
+        f"for {conjoin(left)}, import the recording with that force as its only response."
     )
 
 
@@ -126,10 +126,10 @@ def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
     paired = len(command.channels) == len(response.channels)
     left = [name for k, name in enumerate(command.channels) if k not in kept]
     gone = [name for k, name in enumerate(response.channels) if k not in kept] if paired else []
-    also = f" with {listed(gone)}, which no command moves" if gone else ""
+    also = f" with {conjoin(gone)}, which no command moves" if gone else ""
     return (
         tuple(_with_axes(each, kept, paired) for each in recordings),
-        f"{listed(left)} among the commands never {_verb(left, 'changes')}, and {_verb(left, 'was')} left out{also}.",
+        f"{conjoin(left)} among the commands never {_verb(left, 'changes')}, and {_verb(left, 'was')} left out{also}.",
     )
 
 
@@ -167,8 +167,9 @@ def _merge_commands(recordings: Recordings) -> tuple[Recordings, str]:
                     excitation=None if each.excitation is None else _sum(each.excitation, gains, main))
             for each in recordings
         ),
-        f"{listed(others)} {_verb(others, 'drives')} the same motion as {command.channels[main]}: one command was made "
-        f"of them, {' + '.join(f'{gain:.3g} x {name}' for gain, name in zip(gains, command.channels, strict=True))}.",
+        f"{conjoin(others)} {_verb(others, 'drives')} the same motion as {command.channels[main]}: one command was "
+        "made of them, "
+        f"{' + '.join(f'{gain:.3g} x {name}' for gain, name in zip(gains, command.channels, strict=True))}.",
     )  # fmt: skip
 
 

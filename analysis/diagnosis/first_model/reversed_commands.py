@@ -19,7 +19,7 @@ from analysis.diagnosis.balance.regression import regression_of
 from analysis.diagnosis.balance.structures import Structure, is_better
 from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.wording import listed
+from analysis.wording import conjoin
 from equalizer.effects.turned_commands import with_turned_commands
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -52,9 +52,9 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
     told = {REVERSED: names}
     turned = tuple(_reverse(replace(each, meta={**each.meta, **told}), imposed, sign) for each in recordings)
     return turned, (
-        f"{listed(names)} {verb} counted against the motion: as recorded, the device would give work instead of taking "
-        f"it. The sign was turned round, and a model that is written has it in its input matrix; where the device is a "
-        f"source of work, say so by a model of your own."
+        f"{conjoin(names)} {verb} counted against the motion: as recorded, the device would give work instead of "
+        f"taking it. The sign was turned round, and a model that is written has it in its input matrix; where the "
+        f"device is a source of work, say so by a model of your own."
     )
 
 

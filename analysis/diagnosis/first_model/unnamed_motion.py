@@ -13,7 +13,7 @@ import numpy as np
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import regression_of
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.wording import listed
+from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 

@@ -69,7 +69,7 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
     if not floor.known:
         return Distortions((), ("The noise is not known, so no distortion can be told from it.",))
     found = settled_periods(recording)
-    excitation = instrument_of(recording)
+    excitation = instrument_signal(recording)
     held = hold_length(excitation)
     lines = [detection_lines(period_spectra(excitation, period).mean(axis=0), held) for period in found]
     periods = [(period, its) for period, its in zip(found, lines, strict=True) if its is not None]

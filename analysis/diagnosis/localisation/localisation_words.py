@@ -7,7 +7,7 @@ from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.settings import ENTRY_AS_GOOD_P, ENTRY_LEAST_LINES
 from analysis.diagnosis.unit_wording import share_text
-from analysis.wording import listed, p_text
+from analysis.wording import conjoin, p_text
 
 _FORCE = "the drive, the mechanism and a hand all push there, and these channels cannot tell which does"
 _FORCES = "drives, mechanism and a hand enter so, and so does timing, which shifts all channels alike"
@@ -50,7 +50,7 @@ def states_sentence(states: Sequence[StateMismatch]) -> str:
 
 def _rival_entry(entry: EntryPoint) -> str:
     best, others = entry.ranking[0], [score for score in entry.ranking[1:] if score.name not in entry.ranking[0].alike]
-    alike = f"; so does {listed(best.alike)}, which looks the same" if best.alike else ""
+    alike = f"; so does {conjoin(best.alike)}, which looks the same" if best.alike else ""
     # Forces along several axes hold each single one, and errors of several channels each channel's.
     rivals = [other for other in others if not (other.axis is None and other.place == best.place)]
     if not rivals:

@@ -86,8 +86,8 @@ def residual_lines(recording: Recording, seen: Observation, used: Mask) -> list[
 
 
 def _of_periods(recording: Recording, seen: Observation, left: FloatArray, periods: Periods) -> list[ResidualLines]:
-    excitation = mean_spectrum(instrument_of(recording), periods)
-    driven = detection_lines(excitation, hold_length(instrument_of(recording)))
+    excitation = mean_spectrum(instrument_signal(recording), periods)
+    driven = detection_lines(excitation, hold_length(instrument_signal(recording)))
     if driven is None:
         return []
     lines_hz = periods.frequency_hz(recording.sample_rate_hz)

@@ -60,9 +60,9 @@ def residual_spectra(
     if not looks or not floor.known:
         return None
     lines_hz = looks[0].frequency_hz(recording.sample_rate_hz)
-    excitation = np.stack([period_spectra(instrument_of(recording), look).mean(axis=0) for look in looks])
+    excitation = np.stack([period_spectra(instrument_signal(recording), look).mean(axis=0) for look in looks])
     together = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
-    driven = detection_lines(together, hold_length(instrument_of(recording)))
+    driven = detection_lines(together, hold_length(instrument_signal(recording)))
     if driven is None:
         return None
     first, last = np.flatnonzero(driven.driven)[[0, -1]]

@@ -9,8 +9,8 @@ from analysis.diagnosis.data.detection_lines import DetectionLines
 from analysis.diagnosis.data.frequency_cells import find_driven_inputs
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, period_spectra
-from equalizer.identification.frequency_response.experiments import instrument_of
-from equalizer.identification.frequency_response.noise_floor import over_neighbours, spread_over_looks
+from equalizer.identification.frequency_response.experiments import instrument_signal
+from equalizer.identification.frequency_response.noise_floor import period_variance, smooth_over_lines
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -74,7 +74,7 @@ def segment_spectra(
 
 def inputs_of(recording: Recording, periods: Periods) -> str:
     there = slice(periods.starts[0], periods.starts[0] + periods.length)
-    return "+".join(find_driven_inputs(instrument_of(recording)[there].var(axis=0), recording.command.channels))
+    return "+".join(find_driven_inputs(instrument_signal(recording)[there].var(axis=0), recording.command.channels))
 
 
 def _noise_on_lines(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatArray) -> FloatArray:

@@ -85,8 +85,8 @@ def equal_lines(density: FloatArray) -> FloatArray:
 def _spread(
     recording: Recording, samples: FloatArray, periods: Periods, lines_hz: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    density = spread_over_looks(period_spectra(samples, periods)) * periods.length
-    freedom = 2 * (periods.count - 1) * equal_lines(over_neighbours(density, _SMOOTHED_LINES))
+    density = period_variance(period_spectra(samples, periods)) * periods.length
+    freedom = 2 * (periods.count - 1) * equal_lines(smooth_over_lines(density, _SMOOTHED_LINES))
     own_hz = periods.frequency_hz(recording.sample_rate_hz)
     if len(own_hz) != len(lines_hz):
         density = np.stack([np.interp(lines_hz, own_hz, channel) for channel in density.T], axis=1)

@@ -17,7 +17,7 @@ from analysis.diagnosis.result.wording import (
     inseparable_sentence,
     remainder_sentence,
 )
-from analysis.wording import capital
+from analysis.wording import capitalise
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -72,7 +72,7 @@ def named_sentences(found: Findings) -> tuple[str, ...]:
             filter(
                 None,
                 (
-                    f"{capital(effect_title(effect, single))}, {numbers_text(effect.effect, effect.parameters)}.",
+                    f"{capitalise(effect_title(effect, single))}, {numbers_text(effect.effect, effect.parameters)}.",
                     inseparable_sentence(effect),
                 ),
             )
@@ -86,7 +86,7 @@ def model_sentence(found: Findings) -> str:
     bodies = "one body" if given.coordinates == 1 else f"{given.coordinates} bodies or modes"
     driven = "one command" if given.inputs == 1 else f"{given.inputs} commands"
     seen = "one response" if given.outputs == 1 else f"{given.outputs} responses"
-    return f"{capital(given.name)}: linear, {bodies}, {driven}, {seen} ({given.quantity})."
+    return f"{capitalise(given.name)}: linear, {bodies}, {driven}, {seen} ({given.quantity})."
 
 
 def held_out_stretches(courses: Sequence[Course]) -> tuple[HeldOutStretch, ...]:

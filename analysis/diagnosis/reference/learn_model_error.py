@@ -18,7 +18,7 @@ from analysis.diagnosis.search.reference_recordings import ReferenceRecordings, 
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.settings import LEARNED_TOO_MUCH
 from analysis.diagnosis.types import Mapper, Progress
-from analysis.wording import listed
+from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -167,7 +167,7 @@ def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
     """Empty where nothing was learned."""
     if not floor.channels:
         return ""
-    shares = listed([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])
+    shares = conjoin([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])
     count = f"{floor.recordings} clean recording{'s' if floor.recordings != 1 else ''}"
     said = (
         f"What a device in order differs by from its re-tuned model was learned from {count}: {shares} of the "

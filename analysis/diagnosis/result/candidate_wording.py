@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from analysis.diagnosis.document import Candidate, Diagnosis, Estimate, NamedEffect
 from analysis.diagnosis.effect_words import noun_of, numbers_text, place_words, unit_of
 from analysis.diagnosis.unit_wording import share_text
-from analysis.wording import capital, ended
+from analysis.wording import capitalise, end_sentence
 from equalizer.signals.unit_system import UnitSystem
 
 _FAMILIES = (
@@ -76,7 +76,7 @@ def class_sentence(effect: NamedEffect) -> str:
     family = _family(effect)
     title = family[1] if family is not None else "one of several laws that these data cannot tell apart"
     return (
-        f"{capital(title)}: {', '.join(map(noun_of, names[:-1]))} or {noun_of(names[-1])} would each explain it as "
+        f"{capitalise(title)}: {', '.join(map(noun_of, names[:-1]))} or {noun_of(names[-1])} would each explain it as "
         f"well on held-out data. The numbers are those of {noun_of(effect.effect)}."
     )
 
@@ -88,7 +88,7 @@ def refinement_sentence(effect: NamedEffect) -> str:
         return ""
     said = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
     hold = "refine it, and bring" if len(names) > 1 else "refines it, and brings"
-    return f"{capital(said)} {hold} nothing on held-out data."
+    return f"{capitalise(said)} {hold} nothing on held-out data."
 
 
 def _family(effect: NamedEffect) -> tuple[str, str] | None:
@@ -133,5 +133,5 @@ def _with_gain(candidate: Candidate, device: Device | None) -> str:
     return (
         f"{candidate_title(candidate, device)}. It would take {share_text(candidate.held_out_gain)} of the error's "
         f"power on held-out data, {share_text(candidate.share_of_black_box)} of what all laws together take. Why it "
-        f"is not named: {ended(candidate.why_not)}"
+        f"is not named: {end_sentence(candidate.why_not)}"
     )

@@ -139,11 +139,11 @@ def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...]) -> tu
         parts += [noun_of(name) for name in dict.fromkeys(laws)]
         if len(motion.channels) > len(balances):
             others = [name for k, name in enumerate(motion.channels) if k != beside.own]
-            parts.append(f"the motion of {listed(others)}")
+            parts.append(f"the motion of {conjoin(others)}")
         if parts:
             where = f" along {channel}" if len(channels) > 1 else ""
             said.append(
-                f"Beside mass, damping and stiffness the first model holds{where} {listed(parts)}; what is linear is "
+                f"Beside mass, damping and stiffness the first model holds{where} {conjoin(parts)}; what is linear is "
                 "no missing physics."
             )
     return tuple(said)

@@ -6,7 +6,7 @@ from analysis.diagnosis.document import Errors
 from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
 from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
 from analysis.diagnosis.unit_wording import error_text, share_text
-from analysis.wording import capital
+from analysis.wording import capitalise
 
 SAME = 1e-9
 """Share by which two errors of the same numbers may differ by rounding."""
@@ -21,7 +21,7 @@ def black_box_sentence(box: BlackBox | None, named: bool) -> str:
     if black_box_beats(box):
         return f"{fitted} {errors}. The black box predicts better: the data hold something that was not named."
     if box.physics * SAME_TO_READERS < box.test:
-        return f"{fitted} {errors}. {capital(physics)} predicts better."
+        return f"{fitted} {errors}. {capitalise(physics)} predicts better."
     return f"{fitted} {errors}: no better."
 
 

@@ -7,7 +7,7 @@ from analysis.diagnosis.document import Errors
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.settings import RETUNING_BOUND, RETUNING_DOUBTED, RETUNING_NAMED, SAME_TO_READERS
 from analysis.diagnosis.unit_wording import error_text, value_text
-from analysis.wording import listed, typeset
+from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
 _LISTED = 4
@@ -71,7 +71,7 @@ def doubtful_sentences(moved: Sequence[MovedNumber], fitted: bool = False) -> tu
     far = [number for number in moved if abs(number.deviations) >= RETUNING_DOUBTED]
     at_end = [number for number in far if abs(number.deviations) >= RETUNING_BOUND - 1e-6]
     if fitted:
-        names = listed([number.name for number in at_end])
+        names = conjoin([number.name for number in at_end])
         return (f"As far as they may, these numbers of the first model moved: {names}.{_OPEN}",) if at_end else ()
     if len(far) > _LISTED:
         return (

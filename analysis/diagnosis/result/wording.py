@@ -35,7 +35,7 @@ from analysis.diagnosis.result.retuned_numbers import (
 )
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 from analysis.diagnosis.unit_wording import probability_text, share_text
-from analysis.wording import capital, ended, listed, p_text
+from analysis.wording import capitalise, conjoin, end_sentence, p_text
 
 _PLACES_NAMED = 3
 _NOT_MORE = (
@@ -56,34 +56,34 @@ def effect_sentence(effect: NamedEffect, signature: str = "", single: bool = Fal
     if effect.law is not None:
         signature = "; ".join(filter(None, (law_text(effect.law), signature)))
     said = ", ".join(filter(None, (effect_title(effect, single), numbers_text(effect.effect, effect.parameters))))
-    return f"{capital(said)}: {signature}." if signature else f"{capital(said)}."
+    return f"{capitalise(said)}: {signature}." if signature else f"{capitalise(said)}."
 
 
 def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), device: Device | None = None) -> str:
     """The whole answer, first thing to be read; where nothing is named, with the best candidate."""
     single = device is not None and device.single
     errors = diagnosis.fit.test
-    named = listed([effect_title(effect, single) for effect in diagnosis.effects])
+    named = conjoin([effect_title(effect, single) for effect in diagnosis.effects])
     how = "" if device is None else device.noise
     if diagnosis.verdict == "no_mismatch":
         return f"The model answers as the device does: {one_error('as it was given', errors.before, errors, how)}."
     if diagnosis.verdict == "parameters":
         off = (
-            f": {listed([number.text for number in moved])}"
+            f": {conjoin([number.text for number in moved])}"
             if moved
             else ", each within its calibration's standard deviation"
         )
         fall = fall_text(errors, ("before", "as given"), ("retuned", "re-tuned"), how)
-        return f"No physics is missing; numbers of the model are off{off}. {capital(fall)}."
+        return f"No physics is missing; numbers of the model are off{off}. {capitalise(fall)}."
     if diagnosis.effects:
-        fall = capital(fall_text(errors, better_model(errors), ("after", "with it"), how))
+        fall = capitalise(fall_text(errors, better_model(errors), ("after", "with it"), how))
         if not significant(diagnosis.remainder):
             open_ = "" if diagnosis.verdict == "explained" else f" {_NOT_MORE}"
             return f"Missing in the model: {named}. {fall}.{open_}"
         return f"Missing in the model: {named}, but that is not all. {fall}, and a mismatch remains."
     said = (
         "Model and device disagree, and no effect of the catalogue explains it. "
-        f"{capital(one_error(*better_alone(errors), errors, how))}."
+        f"{capitalise(one_error(*better_alone(errors), errors, how))}."
     )
     return " ".join(filter(None, (said, best_candidate_sentence(diagnosis, device))))
 
@@ -103,7 +103,8 @@ def device_of(found: Findings) -> Device:
 def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
     """Why each rival was not chosen; those that the data cannot tell from it are in `inseparable_sentence`."""
     return tuple(
-        f"{capital(noun_of(rival.effect))} (probability {probability_text(rival.probability)}): {ended(rival.why_not)}"
+        f"{capitalise(noun_of(rival.effect))} (probability {probability_text(rival.probability)}): "
+        f"{end_sentence(rival.why_not)}"
         for rival in effect.rivals
         if not rival.inseparable and rival.why_not != REFINED
     )
@@ -128,7 +129,7 @@ def _inseparable(effect: NamedEffect) -> str:
         )
     )  # fmt: skip
     return (
-        f"These data cannot tell {noun_of(effect.effect)} from {listed([noun_of(other.effect) for other in others])}: "
+        f"These data cannot tell {noun_of(effect.effect)} from {conjoin([noun_of(other.effect) for other in others])}: "
         f"{both} named (probabilities: {odds})."
     )
 
@@ -164,8 +165,8 @@ def next_experiment_sentence(diagnosis: Diagnosis) -> str:
     if wanted is None:
         alike = any(rival.inseparable for effect in diagnosis.effects for rival in effect.rivals)
         return "No further recording is foreseen to tell apart what these data cannot." if alike else ""
-    splits = f"would tell {listed([noun_of(name) for name in wanted.splits])} apart" if wanted.splits else "would help"
-    return f"The recording that {splits}: {wanted.command}. {capital(ended(wanted.why))}"
+    splits = f"would tell {conjoin([noun_of(name) for name in wanted.splits])} apart" if wanted.splits else "would help"
+    return f"The recording that {splits}: {wanted.command}. {capitalise(end_sentence(wanted.why))}"
 
 
 def share_sentence(effect: NamedEffect) -> str:

@@ -12,7 +12,7 @@ from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.search.time_budget import OutOfTimeError
 from analysis.diagnosis.types import Mapper
-from analysis.wording import capital, listed
+from analysis.wording import capitalise, conjoin
 from equalizer.effects.effect import Effect
 
 Result = TypeVar("Result")
@@ -113,8 +113,8 @@ def _sentence(what: str, crashes: Iterable[Crash]) -> str:
     own = list(dict.fromkeys((crash.doing, crash.said) for crash in crashes if crash.what == what))
     noun = noun_of(what)
     name = noun if what in noun or noun == what.replace("_", " ") else f"{noun} ({what})"
-    at = listed([f"{doing} ({said})" for doing, said in own])
-    return f"{capital(name)} was left out where the program crashed at {at}: this answer was found without it."
+    at = conjoin([f"{doing} ({said})" for doing, said in own])
+    return f"{capitalise(name)} was left out where the program crashed at {at}: this answer was found without it."
 
 
 def _effect_of(item: object) -> str:

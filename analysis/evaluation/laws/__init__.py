@@ -1,1 +1,1 @@
-"""How found laws compare with concealed ones: `law_outcome` (one case), `law_score` (a bank)."""
+"""Comparison of discovered laws with concealed ones: `law_outcome` (a single case), `law_score` (a bank)."""

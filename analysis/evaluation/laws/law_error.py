@@ -1,4 +1,4 @@
-"""How far a found law is from the true one, along motion that no recording has."""
+"""Relative error of a discovered law against the true one, along motion that no recording contains."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,13 +23,13 @@ class FreshMotion:
 
 
 def law_error(laws: Sequence[Law], fresh: FreshMotion) -> float:
-    """rms of the difference over that of the true one, on the worst axis that has one, beside mass, damping, stiffness
-    and a constant of that axis (of a reading: a gain and a constant), which are the model's own to fit. inf where a law
-    is no number there."""
-    return max(_on_axis(laws, fresh, axis) for axis in fresh.added)
+    """Relative rms error on the worst axis that has a true law; inf where a law gives no finite number. Mass, damping,
+    stiffness and a constant of that axis (of a reading: a gain and a constant) are projected out, because the model
+    fits them itself."""
+    return max(_axis_error(laws, fresh, axis) for axis in fresh.added)
 
 
-def _on_axis(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
+def _axis_error(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
     true, found = fresh.added[axis], np.zeros(len(fresh.added[axis]))
     for law in laws:
         if law.axis[-1] != axis or (law.acts_on == "response") != fresh.response:
@@ -40,7 +40,7 @@ def _on_axis(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
     if not np.isfinite(found).all():
         return float("inf")
     own = [fresh.columns[name] for name in ((f"a{axis}",) if fresh.response else (f"a{axis}", f"v{axis}", axis))]
-    base = np.linalg.qr(np.column_stack([*(_unit(column) for column in own), np.ones(len(true))]))[0]
+    base = np.linalg.qr(np.column_stack([*(_normalise(column) for column in own), np.ones(len(true))]))[0]
 
     def beside(force: FloatArray) -> float:
         return float(np.linalg.norm(force - base @ (base.T @ force)))
@@ -48,5 +48,5 @@ def _on_axis(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
     return beside(true - found) / max(beside(true), 1e-300)
 
 
-def _unit(column: FloatArray) -> FloatArray:
+def _normalise(column: FloatArray) -> FloatArray:
     return np.asarray(column / max(float(np.linalg.norm(column)), 1e-300))

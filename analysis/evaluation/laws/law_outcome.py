@@ -1,4 +1,4 @@
-"""One case of a bank of laws, revealed: what was concealed, what was said, and how near it is."""
+"""Outcome of a single case of a bank of laws: the concealed law, the diagnosis, and its error."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from equalizer.laws.parse import MEMORY
 from equalizer.laws.tree import Apply, nodes
 
 CLOSE = 0.05
-"""Of a law's rms: so near is the same function (issue 16)."""
+"""Relative error up to which a law counts as the same function (issue 16)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class TrueLaw:
     formula: str
     axes: tuple[str, ...]
     acts_on: tuple[str, ...]
-    """In these ways it can be said."""
+    """Ways in which it can be expressed: as a force, a command or a response."""
     variables: tuple[tuple[str, ...], ...]
     """Per axis, all readings of it: variables, sorted, with spaces between."""
     memory: bool
@@ -47,11 +47,11 @@ class LawOutcome:
 
     @property
     def named(self) -> tuple[Law, ...]:
-        return _laws(() if self.said is None else self.said.effects)
+        return _collect_laws(() if self.said is None else self.said.effects)
 
     @property
     def candidates(self) -> tuple[Law, ...]:
-        return _laws(() if self.said is None else self.said.candidates)
+        return _collect_laws(() if self.said is None else self.said.candidates)
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -78,7 +78,7 @@ class LawOutcome:
     @property
     def structured(self) -> bool:
         """Place, axis, variables and memory are right."""
-        return self.truth is not None and bool(self.laws) and _alike(self.laws, self.truth)
+        return self.truth is not None and bool(self.laws) and _has_true_structure(self.laws, self.truth)
 
     @property
     def close(self) -> bool:
@@ -90,7 +90,7 @@ class LawOutcome:
 
     @property
     def wrongly_explained(self) -> bool:
-        """A law is said to explain what it does not: nothing of it is there, or another structure is."""
+        """A law is named as the explanation although nothing is there, or a law of another structure."""
         return bool(self.named) and self.verdict == "explained" and not self.structured
 
     @property
@@ -104,17 +104,17 @@ class LawOutcome:
         return self.truth is not None and self.shows and not (self.structured and self.close)
 
 
-def _laws(found: Sequence[NamedEffect] | Sequence[Candidate]) -> tuple[Law, ...]:
+def _collect_laws(found: Sequence[NamedEffect] | Sequence[Candidate]) -> tuple[Law, ...]:
     return tuple(law_of(each.law.expression, each.law.acts_on, each.law.axis) for each in found if each.law is not None)
 
 
-def _alike(laws: Sequence[Law], truth: TrueLaw) -> bool:
+def _has_true_structure(laws: Sequence[Law], truth: TrueLaw) -> bool:
     said = {axis: [law for law in laws if law.axis[-1] == axis] for axis in {law.axis[-1] for law in laws}}
     if set(said) != set(truth.axes):
         return False
     for axis, readings in zip(truth.axes, truth.variables, strict=True):
         variables = " ".join(sorted({name for law in said[axis] for name in law.variables}))
-        remembers = any(_remembers(law) for law in said[axis])
+        remembers = any(_has_memory(law) for law in said[axis])
         if variables not in readings or remembers != truth.memory:
             return False
         if any(law.acts_on not in truth.acts_on for law in said[axis]):
@@ -122,5 +122,5 @@ def _alike(laws: Sequence[Law], truth: TrueLaw) -> bool:
     return True
 
 
-def _remembers(law: Law) -> bool:
+def _has_memory(law: Law) -> bool:
     return any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree))

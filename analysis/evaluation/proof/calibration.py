@@ -1,4 +1,4 @@
-"""Whether stated probabilities mean what they say: reliability in bins of equal count."""
+"""Calibration of stated probabilities: reliability in bins of equal count."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from equalizer.signals.signal import FloatArray
 
 BINS = 10
 TIED = 3
-"""Decimals to which probabilities are told apart. Names that tie are right in equal parts, whatever bin they are in."""
+"""Decimals to which probabilities are compared. Names that tie share their right answers equally, in any bin."""
 ANSWERABLE = ("nothing", "single", "pair")
-"""Kinds of which the catalogue holds the answer; a probability is one among what it holds."""
+"""Kinds whose answer is in the catalogue, to which the stated probabilities refer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,37 +37,37 @@ class Calibration:
 
 
 def calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSWERABLE) -> Calibration:
-    """Of every effect that was named: it is right where the device has it, at whatever axis."""
+    """Calibration over all named effects: a name is right where the device has the effect, at any axis."""
     named = [(outcome, effect) for outcome in outcomes if outcome.kind in kinds for effect in outcome.named]
     if not named:
         return Calibration(None, None, None, ())
     stated = np.array([effect.probability for _, effect in named])
     right = np.array([float(effect.effect in each.names) for each, effect in named])
     drawn = np.random.default_rng(21).integers(len(named), size=(RESAMPLED, len(named)))
-    low, high = np.quantile([_error(stated[k], right[k]) for k in drawn], (0.025, 0.975))
-    return Calibration(_error(stated, right), float(low), float(high), tuple(_bins(stated, right)))
+    low, high = np.quantile([_calibration_error(stated[k], right[k]) for k in drawn], (0.025, 0.975))
+    return Calibration(_calibration_error(stated, right), float(low), float(high), tuple(_make_bins(stated, right)))
 
 
-def _parts(stated: FloatArray) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
+def _split_bins(stated: FloatArray) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
     order = np.argsort(stated, kind="stable")
     return [part for part in np.array_split(order, BINS) if len(part)]
 
 
-def _error(stated: FloatArray, right: FloatArray) -> float:
-    even = _evened(stated, right)
-    return float(sum(abs(stated[part].sum() - even[part].sum()) for part in _parts(stated)) / len(stated))
+def _calibration_error(stated: FloatArray, right: FloatArray) -> float:
+    even = _average_ties(stated, right)
+    return float(sum(abs(stated[part].sum() - even[part].sum()) for part in _split_bins(stated)) / len(stated))
 
 
-def _evened(stated: FloatArray, right: FloatArray) -> FloatArray:
+def _average_ties(stated: FloatArray, right: FloatArray) -> FloatArray:
     """Right answers of equal probabilities, spread evenly over them."""
     _, group = np.unique(np.round(stated, TIED), return_inverse=True)
     mean: FloatArray = np.bincount(group, weights=right) / np.bincount(group)
     return np.asarray(mean[group])
 
 
-def _bins(stated: FloatArray, right: FloatArray) -> list[Bin]:
-    found, even = [], _evened(stated, right)
-    for part in _parts(stated):
+def _make_bins(stated: FloatArray, right: FloatArray) -> list[Bin]:
+    found, even = [], _average_ties(stated, right)
+    for part in _split_bins(stated):
         hits, of = float(even[part].sum()), len(part)
         found.append(Bin(float(stated[part].mean()), hits / of, *wilson(hits, of), of))
     return found

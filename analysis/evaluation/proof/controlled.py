@@ -1,4 +1,4 @@
-"""Controls of a diagnosis: claims about its answers when what it is given is changed."""
+"""Controls of a diagnosis: claims about its answers when its input is changed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ SAME_NUMBER = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Controlled:
+class ControlOutcome:
     name: str
     claim: str
     held: bool
@@ -20,9 +20,9 @@ class Controlled:
     """Each answer in words."""
 
 
-def controlled(name: str, claim: str, answers: Sequence[Diagnosis | None]) -> Controlled:
-    """answers: None = refused or broken down, which names nothing. Raises KeyError for an unknown claim."""
-    return Controlled(name, claim, CLAIMS[claim](answers), tuple(map(_words, answers)))
+def judge_control(name: str, claim: str, answers: Sequence[Diagnosis | None]) -> ControlOutcome:
+    """Judge a claim on answers; None = refused or failed, which names nothing. Raises KeyError for an unknown claim."""
+    return ControlOutcome(name, claim, CLAIMS[claim](answers), tuple(map(_answer_text, answers)))
 
 
 def _no_name(answers: Sequence[Diagnosis | None]) -> bool:
@@ -35,18 +35,18 @@ def _not_explained(answers: Sequence[Diagnosis | None]) -> bool:
     return all(answer is None or answer.verdict != "explained" for answer in answers)
 
 
-def _nothing(answers: Sequence[Diagnosis | None]) -> bool:
+def _no_mismatch(answers: Sequence[Diagnosis | None]) -> bool:
     return all(answer is not None and answer.verdict in ("no_mismatch", "parameters") for answer in answers)
 
 
-def _same(answers: Sequence[Diagnosis | None]) -> bool:
+def _same_answers(answers: Sequence[Diagnosis | None]) -> bool:
     """The same verdict, effects and axes, and at least one effect."""
-    said = {_place(answer, with_axes=True) for answer in answers if answer is not None}
+    said = {_verdict_and_effects(answer, with_axes=True) for answer in answers if answer is not None}
     return len(said) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
 def _same_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
-    said = {_place(answer, with_axes=False) for answer in answers if answer is not None}
+    said = {_verdict_and_effects(answer, with_axes=False) for answer in answers if answer is not None}
     return len(said) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
@@ -54,23 +54,23 @@ def _axis_exchanged(answers: Sequence[Diagnosis | None]) -> bool:
     """The same effects, each at the other axis."""
     if not _same_but_axes(answers):
         return False
-    one, other = ([effect.axis for effect in answer.effects] for answer in answers if answer is not None)
-    return all(None not in pair and pair[0] != pair[1] for pair in zip(one, other, strict=True))
+    first, second = ([effect.axis for effect in answer.effects] for answer in answers if answer is not None)
+    return all(None not in pair and pair[0] != pair[1] for pair in zip(first, second, strict=True))
 
 
-def _opposite(answers: Sequence[Diagnosis | None]) -> bool:
+def _opposite_sign(answers: Sequence[Diagnosis | None]) -> bool:
     """One effect, its main number with the other sign."""
     mains = [next(iter(answer.effects[0].parameters.values())).value for answer in answers if answer and answer.effects]
-    if len(mains) != len(answers) or not _same(answers):
+    if len(mains) != len(answers) or not _same_answers(answers):
         return False
     return abs(mains[0] + mains[1]) <= SAME_NUMBER * abs(mains[0])
 
 
-def _place(diagnosis: Diagnosis, with_axes: bool) -> tuple[object, ...]:
+def _verdict_and_effects(diagnosis: Diagnosis, with_axes: bool) -> tuple[object, ...]:
     return diagnosis.verdict, *((effect.effect, effect.axis if with_axes else None) for effect in diagnosis.effects)
 
 
-def _words(diagnosis: Diagnosis | None) -> str:
+def _answer_text(diagnosis: Diagnosis | None) -> str:
     if diagnosis is None:
         return "no answer"
     named = ", ".join(f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in diagnosis.effects)
@@ -80,9 +80,9 @@ def _words(diagnosis: Diagnosis | None) -> str:
 CLAIMS: Mapping[str, Callable[[Sequence[Diagnosis | None]], bool]] = {
     "no name": _no_name,
     "not explained": _not_explained,
-    "nothing": _nothing,
-    "same": _same,
+    "nothing": _no_mismatch,
+    "same": _same_answers,
     "same but axes": _same_but_axes,
     "axis exchanged": _axis_exchanged,
-    "opposite": _opposite,
+    "opposite": _opposite_sign,
 }

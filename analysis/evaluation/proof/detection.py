@@ -1,4 +1,4 @@
-"""From which strength on single effects are named."""
+"""Detection thresholds of single effects: the strength from which they are named."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ from analysis.evaluation.proof.share import wilson
 
 PARTS = 10
 LEAST_DRAWS = 3
-"""Through so many a line is laid."""
+"""Fewest draws for a line fit."""
 
 
 @dataclass(frozen=True, slots=True)
 class Strip:
     effect: str
     draws: tuple[tuple[float, str], ...]
-    """Strength (0 to 1) and what became of it: right, in the set, missed or invisible; weakest first."""
+    """Strength (0 to 1) and outcome: right, in the set, missed or invisible; weakest first."""
     oracle: float | None
-    """From which strength on an oracle sees it; None where too little is drawn to say."""
+    """Strength from which an oracle detects it; None where too few cases were drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +37,14 @@ def detection_strips(singles: Sequence[Outcome]) -> tuple[Strip, ...]:
     found = []
     for name in names:
         own = [single for single in singles if single.names[0] == name]
-        draws = tuple(sorted((each.strengths[0], what_became_of(each)) for each in own))
-        found.append(Strip(name, draws, seen_from(own)))
+        draws = tuple(sorted((each.strengths[0], classify_outcome(each)) for each in own))
+        found.append(Strip(name, draws, oracle_threshold(own)))
     return tuple(found)
 
 
-def seen_from(draws: Sequence[Outcome]) -> float | None:
-    """The strength (0 to 1) from which on an oracle sees an effect: what it adds grows about as a power of its number,
-    whose logarithm the strength is."""
+def oracle_threshold(draws: Sequence[Outcome]) -> float | None:
+    """The strength (0 to 1) from which an oracle detects an effect, by a line fit: strength is the logarithm of the
+    effect's number, and what it adds grows about as a power of that. None where too few draws tell it."""
     known = [(draw.strengths[0], np.log(draw.adds)) for draw in draws if draw.adds > 0]
     strengths = [strength for strength, _ in known]
     if len(known) < LEAST_DRAWS or np.ptp(strengths) == 0:
@@ -55,7 +55,7 @@ def seen_from(draws: Sequence[Outcome]) -> float | None:
     return float(np.clip((np.log(np.sqrt(DETECTABLE**2 - 1)) - start) / slope, 0.0, 1.0))
 
 
-def what_became_of(outcome: Outcome) -> str:
+def classify_outcome(outcome: Outcome) -> str:
     if outcome.right:
         return "right"
     if outcome.names[0] in outcome.returned:

@@ -1,4 +1,4 @@
-"""What became of answers that held several effects alike, once one more recording was made."""
+"""Outcomes of ambiguous answers after one further recording, proposed or drawn at random."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from analysis.evaluation.proof.share import Figure, share
 
 @dataclass(frozen=True, slots=True)
 class FollowUp:
-    """Of one device with one effect, whose first recording left several names."""
+    """A device with a single effect, whose first recording left several names."""
 
     number: int
     effect: str
@@ -20,7 +20,7 @@ class FollowUp:
     after_proposed: tuple[str, ...]
     """The returned set with that recording beside the first; empty where none was proposed."""
     drawn: str
-    """Another of the menu, whichever it was; it may be the same."""
+    """A recording drawn at random from the menu; it may be the proposed one."""
     after_drawn: tuple[str, ...]
 
     @property

@@ -1,4 +1,4 @@
-"""Faults that were injected into real recordings: what was said of each, and how often that was right."""
+"""Outcomes of faults that were injected into real recordings, and how often the diagnosis was right."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -61,8 +61,8 @@ class InjectedOutcome:
         return self.judged in ("named", "in class", "nothing named")
 
 
-def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> InjectedOutcome:
-    """From a sealed label and what the diagnosis wrote."""
+def read_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> InjectedOutcome:
+    """Outcome from a sealed label and the document that the diagnosis wrote."""
     diagnosis = answer.get("diagnosis", {})
     effects = diagnosis.get("effects", [])
     named = [effect["effect"] for effect in effects]
@@ -84,21 +84,21 @@ def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> InjectedO
 
 
 def injected_figures(outcomes: Sequence[InjectedOutcome]) -> tuple[Figure, ...]:
-    """With Wilson's 95 % intervals."""
+    """Shares of right and wrong answers, with Wilson's 95 % intervals."""
     faults = [outcome for outcome in outcomes if outcome.detectable]
     weak = [outcome for outcome in outcomes if outcome.effects and not outcome.detectable]
     nothing = [outcome for outcome in outcomes if not outcome.effects]
     return (
         share("nothing injected, nothing named", nothing, lambda each: each.right),
         share("detectable faults named, or in the class", faults, lambda each: each.right),
-        share("detectable faults, another name at the right place", faults, _is("other name, right place")),
-        share("detectable faults, a wrong story", faults, _is("wrong")),
+        share("detectable faults, another name at the right place", faults, _is_judged("other name, right place")),
+        share("detectable faults, a wrong story", faults, _is_judged("wrong")),
         share("too weak to ask for, named all the same", weak, lambda each: each.right),
-        share("too weak to ask for, a wrong story", weak, _is("wrong")),
+        share("too weak to ask for, a wrong story", weak, _is_judged("wrong")),
     )
 
 
-def _is(judged: Judged) -> Callable[[InjectedOutcome], bool]:
+def _is_judged(judged: Judged) -> Callable[[InjectedOutcome], bool]:
     return lambda each: each.judged == judged
 
 

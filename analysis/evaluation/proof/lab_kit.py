@@ -1,4 +1,4 @@
-"""A blind test on a device that is changed on purpose: what is changed, what ought to be said, how it counts."""
+"""Blind test on a device that a lab changes on purpose: the changes, the expected answers, and the scoring."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -82,8 +82,9 @@ class Scored:
     """Whether the written number lies in the interval of what was named; None where it cannot be asked."""
 
 
-def scored(label: Label, diagnosis: Diagnosis) -> Scored:
-    """Right: one of the change's effects is in the returned set; of nothing, no effect is named."""
+def score_label(label: Label, diagnosis: Diagnosis) -> Scored:
+    """Score a diagnosis: right where one of the change's effects is in the returned set; for no change, where no effect
+    is named."""
     wanted = CHANGES_BY_NAME[label.change].effects
     named = tuple(effect.effect for effect in diagnosis.effects)
     right = any(each in diagnosis.returned_set for each in wanted) if wanted else not named
@@ -95,17 +96,17 @@ def scored(label: Label, diagnosis: Diagnosis) -> Scored:
         " ".join(named),
         " ".join(diagnosis.returned_set),
         right,
-        _inside(label, diagnosis, wanted),
+        _is_in_interval(label, diagnosis, wanted),
     )
 
 
-def not_answered(label: Label) -> Scored:
-    """Without a diagnosis nothing is right, and a number lies in no interval: leaving one out must raise no rate."""
+def score_unanswered(label: Label) -> Scored:
+    """Score a missing diagnosis as wrong, with its number in no interval, so that leaving one out raises no rate."""
     written = label.value is not None and bool(CHANGES_BY_NAME[label.change].unit)
     return Scored(label.recording, label.change, label.value, MISSING, "", "", False, False if written else None)
 
 
-def _inside(label: Label, diagnosis: Diagnosis, wanted: Sequence[str]) -> bool | None:
+def _is_in_interval(label: Label, diagnosis: Diagnosis, wanted: Sequence[str]) -> bool | None:
     for effect in diagnosis.effects:
         ends = next(iter(effect.parameters.values())).ci95 if effect.parameters else None
         if effect.effect == next(iter(wanted), "") and ends is not None and label.value is not None:
@@ -119,15 +120,15 @@ def kit_figures(rows: Sequence[Scored]) -> tuple[Figure, ...]:
     kinds = [change.name for change in CHANGES if any(row.change == change.name for row in changed)]
     return (
         share("changes named", changed, lambda each: each.right),
-        share("nothing changed, nothing named", _of(rows, NOTHING), lambda each: each.right),
-        share("written numbers inside their interval", _asked(rows), lambda each: bool(each.inside)),
-        *(share(kind, _of(rows, kind), lambda each: each.right) for kind in kinds),
+        share("nothing changed, nothing named", _with_change(rows, NOTHING), lambda each: each.right),
+        share("written numbers inside their interval", _with_interval(rows), lambda each: bool(each.inside)),
+        *(share(kind, _with_change(rows, kind), lambda each: each.right) for kind in kinds),
     )
 
 
-def _of(rows: Sequence[Scored], change: str) -> list[Scored]:
+def _with_change(rows: Sequence[Scored], change: str) -> list[Scored]:
     return [row for row in rows if row.change == change]
 
 
-def _asked(rows: Sequence[Scored]) -> list[Scored]:
+def _with_interval(rows: Sequence[Scored]) -> list[Scored]:
     return [row for row in rows if row.inside is not None]

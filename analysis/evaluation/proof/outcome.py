@@ -1,4 +1,4 @@
-"""One case of a bank once its label is revealed: what was concealed, and what was said."""
+"""Outcome of a single case of a bank once its label is revealed: the concealed effects, and the diagnosis."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -63,7 +63,8 @@ class Outcome:
 
     @property
     def seen_by_oracle(self) -> bool:
-        """Who plays the same device with and without the effects sees as much, before a re-tuned model hides part."""
+        """Whether the effects show in a simulation of the same device with and without them, before a re-tuned model
+        hides part of them."""
         return hypot(1.0, self.adds) > DETECTABLE
 
     @property

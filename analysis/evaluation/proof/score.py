@@ -1,4 +1,4 @@
-"""What a bank's outcomes amount to, one figure with its interval each."""
+"""Score of a bank's outcomes: figures with their intervals."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,16 +10,15 @@ from analysis.diagnosis.document import NamedEffect
 from analysis.evaluation.proof.calibration import Calibration, calibration
 from analysis.evaluation.proof.follow_up import FollowUp, follow_up_figures
 from analysis.evaluation.proof.outcome import Concealed, Outcome
-from analysis.evaluation.proof.share import Figure, pooled, share, statistic
+from analysis.evaluation.proof.share import Figure, pooled_share, share, statistic
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 TURN = 2 * math.pi
 
 
-def as_said(name: str, said: float, values: Mapping[str, float]) -> float:
-    """The true value of a number in the way the diagnosis says it. values: all true ones of the effect.
-
-    Where an effect acts the same with another value, that one is taken which lies nearest to what was said.
+def nearest_true_value(name: str, said: float, values: Mapping[str, float]) -> float:
+    """The true value of a parameter; where other values act the same, that nearest to the stated one. values: all true
+    ones of the effect.
     """
     true = values[name]
     if name == "phase":
@@ -33,14 +32,15 @@ NOT_EXPLAINED = ("unexplained", "partly_explained")
 
 
 def is_miss(outcome: Outcome) -> bool:
-    """A wrong name is one even where nothing could be seen; where the true effect is not to be named, any name is."""
+    """Whether an answer counts as a miss: a wrong name always does, even where nothing was detectable; where the true
+    effect is excluded, any name does."""
     if outcome.said is None or has_wrong_name(outcome):
         return True
     if outcome.kind in ("nothing", "without") or not outcome.detectable:
         return False
     if outcome.kind == "outside":
         return outcome.verdict not in NOT_EXPLAINED
-    return not outcome.right or on_another_axis(outcome)
+    return not outcome.right or is_on_other_axis(outcome)
 
 
 def has_wrong_name(outcome: Outcome) -> bool:
@@ -49,7 +49,7 @@ def has_wrong_name(outcome: Outcome) -> bool:
     return not set(outcome.named_names) <= set(there)
 
 
-def on_another_axis(outcome: Outcome) -> bool:
+def is_on_other_axis(outcome: Outcome) -> bool:
     """A right name, but at an axis where nothing is concealed; of devices with several."""
     if len(outcome.axes) < 2:
         return False
@@ -73,26 +73,26 @@ class Score:
 
 def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Score:
     figures = (
-        *_singles(outcomes), *_nothing(outcomes), *_open_set(outcomes), *_pairs(outcomes),
-        *follow_up_figures(followed), *_numbers(outcomes),
+        *_single_figures(outcomes), *_null_figures(outcomes), *_open_set_figures(outcomes), *_pair_figures(outcomes),
+        *follow_up_figures(followed), *_number_figures(outcomes),
     )  # fmt: skip
     return Score(figures, calibration(outcomes), tuple(outcome for outcome in outcomes if is_miss(outcome)))
 
 
-def _of(outcomes: Sequence[Outcome], kind: str, bank: str = "") -> list[Outcome]:
+def _of_kind(outcomes: Sequence[Outcome], kind: str, bank: str = "") -> list[Outcome]:
     return [outcome for outcome in outcomes if outcome.kind == kind and (not bank or outcome.bank == bank)]
 
 
-def _detectable(outcomes: Sequence[Outcome]) -> list[Outcome]:
+def _select_detectable(outcomes: Sequence[Outcome]) -> list[Outcome]:
     return [outcome for outcome in outcomes if outcome.detectable]
 
 
-def _singles(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+def _single_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     words = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
     for bank in BANKS:
-        seen = _detectable(_of(outcomes, "single", bank))
+        seen = _select_detectable(_of_kind(outcomes, "single", bank))
         yield share(f"named right{words[bank]}", seen, lambda each: each.right)
-    whole = _detectable(_of(outcomes, "single"))
+    whole = _select_detectable(_of_kind(outcomes, "single"))
     yield share("named first, all banks", whole, lambda each: each.named_names[:1] == each.names)
     yield share("in the returned set", whole, lambda each: each.names[0] in each.returned)
     named = [each for each in whole if each.named]
@@ -101,8 +101,8 @@ def _singles(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     yield share("right where one name is returned", alone, lambda each: each.right)
     yield share("place", named, lambda each: each.named[0].place == each.concealed[0].place)
     sided = [each for each in named if each.right and each.concealed[0].axis is not None and len(each.axes) > 1]
-    yield share("axis, of two or three", sided, lambda each: not on_another_axis(each))
-    singles = _of(outcomes, "single")
+    yield share("axis, of two or three", sided, lambda each: not is_on_other_axis(each))
+    singles = _of_kind(outcomes, "single")
     seen = [single for single in singles if single.seen_by_oracle]
     yield share("single effects that count as detectable", singles, lambda each: each.detectable)
     yield share("named right, of those that an oracle sees", seen, lambda each: each.right)
@@ -110,37 +110,39 @@ def _singles(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     yield share("not detectable, yet a wrong name", hidden, has_wrong_name)
 
 
-def _nothing(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
-    yield share("nothing missing, yet named", _of(outcomes, "nothing"), lambda each: bool(each.named))
-    clean = _of(outcomes, "nothing")
+def _null_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    yield share("nothing missing, yet named", _of_kind(outcomes, "nothing"), lambda each: bool(each.named))
+    clean = _of_kind(outcomes, "nothing")
     yield share("nothing missing, and said so", clean, lambda each: each.verdict in ("no_mismatch", "parameters"))
 
 
-def _open_set(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
-    outside = _detectable(_of(outcomes, "outside"))
+def _open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    outside = _select_detectable(_of_kind(outcomes, "outside"))
     yield share("outside the catalogue, not explained", outside, lambda each: each.verdict in NOT_EXPLAINED)
     yield share("outside the catalogue, no name at all", outside, lambda each: not each.named)
-    without = _detectable(_of(outcomes, "without"))
+    without = _select_detectable(_of_kind(outcomes, "without"))
     yield share("without the true effect, any name", without, lambda each: bool(each.named))
     yield share("without the true effect, yet explained", without, lambda each: each.verdict == "explained")
 
 
-def _pairs(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
-    pairs = _detectable(_of(outcomes, "pair"))
+def _pair_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    pairs = _select_detectable(_of_kind(outcomes, "pair"))
     yield share("pairs, both and no other", pairs, lambda each: each.right)
     yield share("pairs, at least one", pairs, lambda each: bool(set(each.names) & set(each.named_names)))
 
 
-def _numbers(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
-    right = [each for each in _detectable(_of(outcomes, "single")) if each.right]
+def _number_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    right = [each for each in _select_detectable(_of_kind(outcomes, "single")) if each.right]
     errors = [main_error(each.concealed[0], each.named[0]) for each in right]
     yield statistic("main parameter's error, median", [e for e in errors if e is not None], np.median)
-    covered = [list(within(each.concealed[0], each.named[0]).values()) for each in right]
-    yield pooled("true value in the 95 % interval", covered)
+    covered = [list(interval_coverage(each.concealed[0], each.named[0]).values()) for each in right]
+    yield pooled_share("true value in the 95 % interval", covered)
     mains = [
-        each for each in right if EFFECTS_BY_NAME[each.names[0]].main.name in within(each.concealed[0], each.named[0])
+        each
+        for each in right
+        if EFFECTS_BY_NAME[each.names[0]].main.name in interval_coverage(each.concealed[0], each.named[0])
     ]
-    yield share("the same, main parameters", mains, lambda each: main_within(each.concealed[0], each.named[0]))
+    yield share("the same, main parameters", mains, lambda each: is_main_covered(each.concealed[0], each.named[0]))
     after = [each.left("after") for each in right]
     yield statistic("held-out error over noise, worst channel, median", after, np.median)
     yield statistic("seconds per diagnosis, median", [outcome.seconds for outcome in outcomes], np.median)
@@ -152,19 +154,19 @@ def main_error(true: Concealed, said: NamedEffect) -> float | None:
     if not true.values.get(name):
         return None
     estimate = said.parameters[name].value
-    value = as_said(name, estimate, true.values)
+    value = nearest_true_value(name, estimate, true.values)
     return abs(estimate - value) / abs(value)
 
 
-def within(true: Concealed, said: NamedEffect) -> dict[str, bool]:
+def interval_coverage(true: Concealed, said: NamedEffect) -> dict[str, bool]:
     """Whether the interval holds the true value, of every parameter that has both."""
     found = {}
     for name, estimate in said.parameters.items():
         if estimate.ci95 is not None and name in true.values:
-            value = as_said(name, estimate.value, true.values)
+            value = nearest_true_value(name, estimate.value, true.values)
             found[name] = estimate.ci95[0] <= value <= estimate.ci95[1]
     return found
 
 
-def main_within(true: Concealed, said: NamedEffect) -> bool:
-    return within(true, said)[EFFECTS_BY_NAME[true.effect].main.name]
+def is_main_covered(true: Concealed, said: NamedEffect) -> bool:
+    return interval_coverage(true, said)[EFFECTS_BY_NAME[true.effect].main.name]

@@ -1,4 +1,4 @@
-"""Numbers with their uncertainty: shares after Wilson, medians and means by resampling."""
+"""Figures with 95 % intervals: shares after Wilson, medians and means by bootstrap."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -39,8 +39,8 @@ def wilson(hits: float, of: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def pooled(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
-    """The share of all, where those of a group hang together: groups are resampled whole."""
+def pooled_share(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
+    """Pooled share of dependent groups: groups are resampled as a whole (cluster bootstrap)."""
     hits = np.array([sum(group) for group in groups if group], dtype=np.float64)
     of = np.array([len(group) for group in groups if group], dtype=np.float64)
     if not len(of):
@@ -50,12 +50,12 @@ def pooled(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
     return Figure(name, float(hits.sum() / of.sum()), float(low), float(high), int(of.sum()), int(hits.sum()))
 
 
-def statistic(name: str, values: Iterable[float], of: Callable[..., FloatArray]) -> Figure:
+def statistic(name: str, values: Iterable[float], reduce: Callable[..., FloatArray]) -> Figure:
     """of: takes (resamples, values) and axis=1, such as np.median. Bootstrap intervals, always the same."""
     known = np.array([value for value in values if np.isfinite(value)], dtype=np.float64)
     if not len(known):
         return Figure(name, None, None, None, 0)
-    value = float(of(known[None, :], axis=1)[0])
+    value = float(reduce(known[None, :], axis=1)[0])
     drawn = np.random.default_rng(20).integers(len(known), size=(RESAMPLED, len(known)))
-    low, high = np.quantile(of(known[drawn], axis=1), (0.025, 0.975))
+    low, high = np.quantile(reduce(known[drawn], axis=1), (0.025, 0.975))
     return Figure(name, value, float(low), float(high), len(known))

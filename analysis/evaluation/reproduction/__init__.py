@@ -1,1 +1,1 @@
-"""The published figures beside what came out here: findings, judged by stated rules."""
+"""Comparison of the published figures with their reproduction: findings, judged by stated rules."""

@@ -1,4 +1,4 @@
-"""What a reproduction says: the content of `reproduction.json`, format `hapteq-reproduction`, version 1."""
+"""Document of a reproduction: the content of `reproduction.json`, format `hapteq-reproduction`, version 1."""
 
 import json
 from typing import Annotated, Any, Literal

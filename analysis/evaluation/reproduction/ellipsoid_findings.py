@@ -1,4 +1,4 @@
-"""Figure 3 beside the acceleration ellipses of the simulated device."""
+"""Figure 3 compared with the acceleration ellipses of the simulated device."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.wording import number
 
 ALIKE = 1.25
-"""Couplings whose largest is at most so many times the smallest are nearly the same."""
+"""Largest ratio of couplings that count as nearly the same."""
 
 _DIFFERS = (
     "The simulated device's mount was given its modes so that the coupling follows the published course: alike up to "
@@ -25,7 +25,11 @@ def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
         for result in results
         if result.phasor.off_axis_ratio is not None
     }
-    findings = (*(_coupling(result) for result in results), _alike(coupling), _less(coupling))
+    findings = (
+        *(_coupling_finding(result) for result in results),
+        _low_frequency_finding(coupling),
+        _high_frequency_finding(coupling),
+    )
     return FigureFindings(
         figure=3,
         title="Which way the handle moves along a test direction",
@@ -38,7 +42,7 @@ def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
     )
 
 
-def _coupling(result: EllipsoidResult) -> Finding:
+def _coupling_finding(result: EllipsoidResult) -> Finding:
     ratio, axes = result.phasor.off_axis_ratio, result.moments.normalised_axes
     along = "" if ratio is None else f"off the direction over along it {100 * ratio:.0f} %; "
     return Finding(
@@ -51,7 +55,7 @@ def _coupling(result: EllipsoidResult) -> Finding:
     )
 
 
-def _alike(coupling: dict[float, float]) -> Finding | None:
+def _low_frequency_finding(coupling: dict[float, float]) -> Finding | None:
     low = [coupling[f] for f in (5.0, 10.0, 15.0) if f in coupling]
     if len(low) < 2:
         return None
@@ -67,7 +71,7 @@ def _alike(coupling: dict[float, float]) -> Finding | None:
     )
 
 
-def _less(coupling: dict[float, float]) -> Finding | None:
+def _high_frequency_finding(coupling: dict[float, float]) -> Finding | None:
     if not {25.0, 35.0} <= coupling.keys():
         return None
     ratio = coupling[35.0] / coupling[25.0]

@@ -1,4 +1,4 @@
-"""Figure 5 beside what the simulated device played through the equalizer."""
+"""Figure 5 compared with the equalized response of the simulated device."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from equalizer.signals.signal import FloatArray
 
 RESONANCE_HZ = (9.0, 14.0)
 REMOVED = 1 / 3
-"""Of its height in dB: a resonance of which no more is left is essentially removed."""
+"""Share of a resonance's height in dB up to which it counts as essentially removed."""
 ORDER_DB = (10.0, 30.0)
 """About a factor of ten."""
 
@@ -55,10 +55,10 @@ def equalized_findings(
     findings = (
         _resonance(rows),
         _peaks(rows),
-        _worst("Worst coupling of any line, centre", rows.plain, rows.equalized),
+        _worst_coupling("Worst coupling of any line, centre", rows.plain, rows.equalized),
         _edge_flat(rows),
         _edge_coupling(rows),
-        _blended(rows),
+        _blended_forces(rows),
         _friction(rows),
         _held_out(held_out),
     )
@@ -117,7 +117,7 @@ def _peaks(rows: EqualizedRows) -> Finding:
     )
 
 
-def _worst(what: str, before: PlayedResponse, after: PlayedResponse) -> Finding:
+def _worst_coupling(what: str, before: PlayedResponse, after: PlayedResponse) -> Finding:
     first, second = played_row(before).coupling_db, played_row(after).coupling_db
     return Finding(
         what=what,
@@ -157,7 +157,7 @@ def _edge_coupling(rows: EqualizedRows) -> Finding:
     )
 
 
-def _blended(rows: EqualizedRows) -> Finding:
+def _blended_forces(rows: EqualizedRows) -> Finding:
     found = played_row(rows.edge_blended)
     return Finding(
         what="The same place, forces blended between models of other places (ours)",
@@ -197,7 +197,7 @@ def _held_out(held_out: tuple[float, float] | None) -> Finding | None:
 
 
 def _height_db(played: PlayedResponse) -> float:
-    """Of the worst axis."""
+    """Height of the resonance in dB, on the worst axis."""
     low, high = RESONANCE_HZ
     near = (played.frequency_hz >= low) & (played.frequency_hz <= high)
     level = 20 * np.log10(np.abs(np.einsum("lii->li", played.response[near])))

@@ -1,4 +1,4 @@
-"""What sweeps over the whole range show of a device."""
+"""Results of sweeps over the whole frequency range: transfer functions, resonances, coupling onset."""
 
 from dataclasses import dataclass
 

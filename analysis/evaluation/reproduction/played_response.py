@@ -1,4 +1,4 @@
-"""What a device played of what was wanted, line by line (the published figure 5)."""
+"""Response of a device from wanted to delivered acceleration, line by line (the published figure 5)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class PlayedResponse:
 def wanted_wave(
     kind: SignalKind, band_hz: tuple[float, float], period: int, sample_rate_hz: float, seed: int
 ) -> FloatArray:
-    """One period, (period,), with a peak of 1 and nothing outside the band: an inverse asks for nothing there."""
+    """A period (period,) of the wanted signal, with a peak of 1 and nothing outside the band."""
     low, high = band_hz
     if kind == "multisine":
         lines = lines_between(low, high, period, sample_rate_hz, odd_only=False)
@@ -58,11 +58,11 @@ def lines_of_band(
     return np.asarray((frequency_hz >= band_hz[0] - 1e-9) & (frequency_hz <= band_hz[1] + 1e-9))
 
 
-def delivered_over_wanted(
+def estimate_response(
     wanted: FloatArray, delivered: Sequence[FloatArray], band_hz: tuple[float, float], sample_rate_hz: float
 ) -> tuple[FloatArray, ComplexArray]:
-    """Frequencies (lines,) and response (lines, axes, axes). wanted: (axes, period), one wave for each axis in turn;
-    delivered: for each of them a whole steady period, (period, axes)."""
+    """Frequencies (lines,) and response (lines, axes, axes), delivered over wanted. wanted: (axes, period), a wave for
+    each axis in turn; delivered: for each of them a whole steady period, (period, axes)."""
     period = wanted.shape[1]
     used = lines_of_band(band_hz, period, sample_rate_hz)
     columns = [
@@ -73,15 +73,15 @@ def delivered_over_wanted(
     return frequency_hz, np.stack(columns, axis=2)
 
 
-def scaled(response: ComplexArray) -> ComplexArray:
-    """Divided by the mean gain along the axes, which for a force is no error: a static gain takes it out."""
+def normalise_gain(response: ComplexArray) -> ComplexArray:
+    """The response divided by its mean gain along the axes, which a static gain would correct."""
     along = np.abs(np.einsum("lii->li", response))
     level: ComplexArray = response / np.exp(np.log(along).mean())
     return level
 
 
 def coupling_db(response: ComplexArray) -> FloatArray:
-    """(lines,): the largest off-axis entry over the entry along, worst axis."""
+    """(lines,): the largest off-axis entry over the on-axis entry in dB, of the worst axis."""
     along = np.abs(np.einsum("lii->li", response))
     off = np.abs(response) * (1 - np.eye(response.shape[1]))
     ratio: FloatArray = 20 * np.log10(np.maximum((off.max(axis=1) / along).max(axis=1), 1e-12))

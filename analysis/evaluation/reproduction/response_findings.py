@@ -1,4 +1,4 @@
-"""Figures 4 and 1 beside the transfer functions of the simulated device."""
+"""Figures 4 and 1 compared with the transfer functions of the simulated device."""
 
 from collections.abc import Sequence
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from analysis.evaluation.reproduction.document import FigureFindings, Finding
 from analysis.evaluation.reproduction.study_findings import LIMIT_RULE
-from analysis.wording import signed
+from analysis.wording import signed_number
 from equalizer.identification.frequency_response.coupling_onset import CouplingOnset
 from equalizer.identification.frequency_response.frequency_bands import FrequencyBand
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.resonances import COUPLING, Resonance
 
 NEAR = 0.2
-"""Frequencies that differ by less than this, relative, are near each other."""
+"""Largest relative difference of frequencies that count as near each other."""
 SLOPE_HZ = (4.5, 9.0)
 LARGE = 3.0
-"""A resonance is large where the strongest response rises to so many times its median in the middle band."""
+"""Ratio to the median in the middle band from which a resonance counts as large."""
 
 _GEOMETRY = (
     "Link lengths, inertias, friction and modes of the omega.3 are not public. The simulated device is of its size; a "
@@ -80,12 +80,12 @@ def band_findings(bands: Sequence[FrequencyBand], limit_hz: float | None, used_l
     )
 
 
-def _near(value: float, published: float) -> bool:
+def _is_near(value: float, published: float) -> bool:
     return abs(value - published) <= NEAR * published
 
 
 def _low_resonance(resonances: Sequence[Resonance]) -> Finding:
-    low = [resonance for resonance in resonances if _near(resonance.frequency_hz, 11.0)]
+    low = [resonance for resonance in resonances if _is_near(resonance.frequency_hz, 11.0)]
     found = max(low, key=lambda each: each.prominence_db, default=None)
     couples = found is not None and COUPLING in found.seen_in
     here = "none was found"
@@ -120,7 +120,7 @@ def _large_resonances(response: FrequencyResponse, resonances: Sequence[Resonanc
         here="none" if first is None else f"from {first:.1f} Hz on, {len(large)} of them",
         value=first,
         unit="Hz",
-        as_published=first is not None and _near(first, 80.0),
+        as_published=first is not None and _is_near(first, 80.0),
         rule=f"the first that rises to {LARGE:g} times the middle band's level lies within {NEAR:.0%} of 80 Hz",
     )
 
@@ -136,7 +136,7 @@ def _onset(onset: CouplingOnset) -> Finding:
         here=here,
         value=onset.frequency_hz,
         unit="Hz",
-        as_published=onset.frequency_hz is not None and _near(onset.frequency_hz, 10.0),
+        as_published=onset.frequency_hz is not None and _is_near(onset.frequency_hz, 10.0),
         rule=f"within {NEAR:.0%} of 10 Hz",
     )
 
@@ -152,7 +152,7 @@ def _slope(response: FrequencyResponse) -> Finding | None:
     return Finding(
         what=f"Slope along the axes, {low:g} to {high:g} Hz",
         published="rises: friction and damping rule below 10 Hz",
-        here=f"{signed(slope, 1)} dB per octave (a free mass: 0)",
+        here=f"{signed_number(slope, 1)} dB per octave (a free mass: 0)",
         value=slope,
         unit="dB",
         as_published=slope > 1.0,
@@ -170,14 +170,14 @@ def _unreliable(response: FrequencyResponse) -> Finding | None:
         here=f"{first:.2f} Hz",
         value=first,
         unit="Hz",
-        as_published=_near(first, 3.5),
+        as_published=_is_near(first, 3.5),
         rule=f"within {NEAR:.0%} of 3.5 Hz",
     )
 
 
 def _band(band: FrequencyBand, published: str, edges: tuple[float | None, float | None]) -> Finding:
     low, high = edges
-    as_published = (low is None or _near(band.low_hz, low)) and (high is None or _near(band.high_hz, high))
+    as_published = (low is None or _is_near(band.low_hz, low)) and (high is None or _is_near(band.high_hz, high))
     return Finding(
         what=f"{band.name.capitalize()} band: {band.method}",
         published=published,
@@ -196,6 +196,6 @@ def _limit(limit_hz: float | None) -> Finding:
         here=f"{'none found' if limit_hz is None else f'{limit_hz:g} Hz'}; {LIMIT_RULE}",
         value=limit_hz,
         unit="Hz",
-        as_published=limit_hz is not None and _near(limit_hz, 35.0),
+        as_published=limit_hz is not None and _is_near(limit_hz, 35.0),
         rule=f"within {NEAR:.0%} of 35 Hz",
     )

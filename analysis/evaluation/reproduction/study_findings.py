@@ -1,4 +1,4 @@
-"""Figure 2 beside the study of simulated participants."""
+"""Figure 2 compared with the study of simulated participants."""
 
 from dataclasses import dataclass
 from statistics import mean
@@ -7,7 +7,7 @@ from analysis.evaluation.reproduction.document import FigureFindings, Finding
 from analysis.psychophysics.comparisons import PairDifference
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.threshold_table import frequency_name
-from analysis.wording import signed
+from analysis.wording import signed_number
 
 SIGNIFICANT_P = 0.05
 LIKE = 0.25
@@ -33,7 +33,7 @@ _DIFFERS = (
 class _Means:
     analysis: StudyAnalysis
 
-    def at(self, frequency_hz: float) -> float | None:
+    def mean_at(self, frequency_hz: float) -> float | None:
         values = [value for value in self.analysis.table.groups().get(frequency_name(frequency_hz), ()) if value]
         return mean(values) if values else None
 
@@ -50,7 +50,7 @@ class _Means:
 
 
 def direction_limit_hz(analysis: StudyAnalysis) -> float | None:
-    """By LIMIT_RULE; None where no frequency is like that."""
+    """Direction limit by LIMIT_RULE in Hz; None where no frequency fulfils it."""
     means = _Means(analysis)
     lowest, *others = analysis.table.frequencies_hz
     for frequency_hz in others:
@@ -86,7 +86,7 @@ def study_findings(analysis: StudyAnalysis) -> FigureFindings:
 
 
 def _level(means: _Means, frequency_hz: float) -> Finding:
-    value, cut = means.at(frequency_hz), means.cut(frequency_hz)
+    value, cut = means.mean_at(frequency_hz), means.cut(frequency_hz)
     marks = f", {cut} of {len(means.analysis.table.subjects)} thresholds cut by the cap" if cut else ""
     return Finding(
         what=f"Mean threshold at {frequency_hz:g} Hz",
@@ -99,7 +99,7 @@ def _level(means: _Means, frequency_hz: float) -> Finding:
 
 
 def _rise(means: _Means, low_hz: float, high_hz: float, published: str, significant: bool) -> Finding | None:
-    pair, low, high = means.pair(low_hz, high_hz), means.at(low_hz), means.at(high_hz)
+    pair, low, high = means.pair(low_hz, high_hz), means.mean_at(low_hz), means.mean_at(high_hz)
     if pair is None or low is None or high is None:
         return None
     up = pair.difference > 0
@@ -107,7 +107,7 @@ def _rise(means: _Means, low_hz: float, high_hz: float, published: str, signific
     return Finding(
         what=f"From {low_hz:g} to {high_hz:g} Hz",
         published=published,
-        here=f"{signed(pair.difference)} N, p {_p(pair.p)} (all pairs at once)",
+        here=f"{signed_number(pair.difference)} N, p {_p_text(pair.p)} (all pairs at once)",
         value=pair.difference,
         unit="N",
         as_published=up and (pair.p < SIGNIFICANT_P) == significant,
@@ -131,7 +131,7 @@ def _cut(means: _Means, analysis: StudyAnalysis) -> Finding | None:
 
 
 def _similar(means: _Means) -> Finding | None:
-    first, second = means.at(35.0), means.at(45.0)
+    first, second = means.mean_at(35.0), means.mean_at(45.0)
     if first is None or second is None:
         return None
     away = abs(first - second) / max(first, second)
@@ -146,5 +146,5 @@ def _similar(means: _Means) -> Finding | None:
     )
 
 
-def _p(p: float) -> str:
+def _p_text(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"= {p:.3f}"

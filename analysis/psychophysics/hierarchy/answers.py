@@ -1,4 +1,4 @@
-"""The answers of a study in the form that a likelihood needs: counted by person, frequency, level and direction."""
+"""Counts of a study's answers by person, frequency, level and direction, the data of the likelihood."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ def tally(
     side: FloatArray,
     right: NDArray[np.bool_],
 ) -> Answers:
-    """One entry per trial in; equal trials are counted together."""
+    """Count equal trials together; the arrays have an entry per trial, (trials,)."""
     grid = np.round(level_db / LEVEL_GRID_DB).astype(np.int64)
     grid -= grid.min()
     # Sorted by run, then level, then side: one number per cell is quicker to sort than rows.

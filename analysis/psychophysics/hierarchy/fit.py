@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Prior:
-    """What is believed before the answers, and why."""
+    """Prior distributions of the population parameters, and their reasons."""
 
     lapse_right: float = 40.0
     lapse_wrong: float = 1.0
@@ -78,7 +78,7 @@ class Objective:
         self._middle_db = float(np.average(answers.level_db, weights=answers.right + answers.wrong))
 
     def __call__(self, numbers: FloatArray) -> tuple[float, FloatArray]:
-        value, scores = self.marginal.at(numbers)
+        value, scores = self.marginal.evaluate(numbers)
         penalty, slope = self.penalty(numbers)
         return -float(value.sum()) - penalty, -scores.sum(axis=0) - slope
 
@@ -105,7 +105,7 @@ class Objective:
 
 
 def starting_numbers(answers: Answers, family: Family) -> FloatArray:
-    """Means from the levels played at each frequency, spreads as people have them."""
+    """Starting values of the population parameters: means from the levels played, usual spreads."""
     k = len(answers.frequencies_hz)
     trials = answers.right + answers.wrong
     place = answers.run % k
@@ -116,10 +116,11 @@ def starting_numbers(answers: Answers, family: Family) -> FloatArray:
 
 
 def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prior | None = None) -> HierarchicalFit:
-    """The most probable population numbers, with all persons' latent numbers integrated out. Needs two persons."""
+    """Maximum a posteriori fit of the population parameters, with all persons' latent parameters integrated out. Needs
+    two persons."""
     objective = Objective(answers, family, prior or Prior())
-    found = search(objective, objective.begin)
-    value, scores = objective.marginal.at(found.x)
+    found = maximise(objective, objective.begin)
+    value, scores = objective.marginal.evaluate(found.x)
     return HierarchicalFit(
         answers=answers,
         family=family,
@@ -132,8 +133,8 @@ def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prio
     )
 
 
-def search(objective: Objective, begin: FloatArray, held: int | None = None) -> OptimizeResult:
-    """The most probable numbers; with `held`, that number stays where `begin` has it."""
+def maximise(objective: Objective, begin: FloatArray, held: int | None = None) -> OptimizeResult:
+    """Maximise the penalised likelihood; with `held`, that parameter is fixed at its value in `begin` (profile)."""
     bounds = objective.bounds
     if held is not None:
         bounds[held] = (float(begin[held]), float(begin[held]))

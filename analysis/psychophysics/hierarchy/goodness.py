@@ -1,4 +1,4 @@
-"""Whether the fitted curves describe the answers: predicted against observed shares of right answers."""
+"""Goodness of fit: predicted against observed shares of right answers."""
 
 from dataclasses import dataclass
 

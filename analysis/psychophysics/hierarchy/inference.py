@@ -1,4 +1,4 @@
-"""What the fitted model says of people: the person is the unit that was drawn, so persons carry the uncertainty.
+"""Inference from the hierarchical fit: persons are the sampling units and carry the uncertainty.
 
 Each person's influence on the means is n A^-1 s_i, with A the curvature of the fit and s_i the person's score. Mean
 plus influence is a person's pseudo-threshold in dB: with the thresholds known exactly it would be the threshold itself,
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from analysis.psychophysics.hierarchy.fit import HierarchicalFit, Objective, Prior, search
+from analysis.psychophysics.hierarchy.fit import HierarchicalFit, Objective, Prior, maximise
 from equalizer.signals.signal import FloatArray
 
 BOUND_ROOT, BOUND_STEPS = 0.03, 8
@@ -68,7 +68,8 @@ class DirectionLimit:
 
 
 def pseudo_thresholds(fit: HierarchicalFit) -> FloatArray:
-    """(n, k) in dB: their mean is the estimate, their spread its uncertainty."""
+    """Pseudo-thresholds (n, k) in dB, by influence functions: their mean is the estimate, their spread its
+    uncertainty."""
     centred = fit.scores - fit.scores.mean(axis=0)
     influence = fit.answers.persons * np.linalg.solve(fit.curvature, centred.T).T
     pseudo: FloatArray = fit.means_db + influence[:, : fit.layout.k]
@@ -110,7 +111,7 @@ def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prio
     def root(below_db: float) -> float:
         """Signed root of the likelihood ratio: of a quadratic likelihood, a straight line."""
         # The other numbers begin where a quadratic likelihood would have them.
-        found = search(objective, fit.numbers - below_db * along, held=place)
+        found = maximise(objective, fit.numbers - below_db * along, held=place)
         return math.sqrt(max(0.0, 2.0 * (float(found.fun) - best)))
 
     near, near_root, far = 0.0, 0.0, 2.0

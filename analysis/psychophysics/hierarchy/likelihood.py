@@ -43,22 +43,22 @@ class TrialLikelihood:
         self._starts = np.flatnonzero(np.diff(answers.run, prepend=-1))
         self._runs = answers.run[self._starts]
 
-    def at(self, latent: FloatArray, lapse: float) -> Derivatives:
+    def evaluate(self, latent: FloatArray, lapse: float) -> Derivatives:
         """latent: (n, k + 2)."""
         side, pace = self.answers.side, np.exp(latent[:, self.frequencies]) * NEPER_PER_DB
         tau, a, q1, q2 = self._evidence(latent, pace)
         e = _Evidence(a, self.answers.right, self.answers.wrong, lapse)
         u, u1 = e.score, e.score_by_p
-        one, two = u * e.p1, u1 * e.p1**2 - u * a * e.p1
+        slope, curvature = u * e.p1, u1 * e.p1**2 - u * a * e.p1
         lapsed = u1 * e.p_by_lapse * e.p1 + u * e.p1_by_lapse
-        lt, ltt, ltc = one * q1, two * q1**2 + one * q2, -side * two * q1
+        lt, ltt, ltc = slope * q1, curvature * q1**2 + slope * q2, -side * curvature * q1
         bent, wtt, wtc = ltt * tau + lt, e.weight * q1**2, -side * e.weight * q1
         lapsed_t = lapsed * q1
-        sums = self._by_run([
+        sums = self._sum_by_run([
             e.value, u * e.p_by_lapse,
-            lt, lt * tau, -side * one,
+            lt, lt * tau, -side * slope,
             lapsed_t, lapsed_t * tau, -side * lapsed,
-            ltt, bent, ltc, bent * tau, ltc * tau, two,
+            ltt, bent, ltc, bent * tau, ltc * tau, curvature,
             wtt, wtt * tau, wtc, wtt * tau**2, wtc * tau, e.weight,
         ])  # fmt: skip
         p = pace[:, None]
@@ -71,7 +71,7 @@ class TrialLikelihood:
             first_by_lapse=_gradient(sums[5:8], p),
         )
 
-    def traced(self, latent: FloatArray, lapse: float, inverse: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def trace_derivatives(self, latent: FloatArray, lapse: float, inverse: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Trace of inverse (n, d, d) times the change of the information by each latent number (n, d), and by the
         lapse rate (n,)."""
         k, run, person = self.frequencies, self.answers.run, self._person
@@ -88,7 +88,7 @@ class TrialLikelihood:
         grown = e.weight * (-2.0 * a - e.p1 / e.p + e.p1 / e.rest) * size
         lapsed = e.weight * (-4.0 / (1.0 - 2.0 * lapse) - e.p_by_lapse / e.p + e.p_by_lapse / e.rest) * size
         w = 2.0 * e.weight
-        sums = self._by_run([
+        sums = self._sum_by_run([
             grown * at + w * (vt * att + vb * atb), grown * ab + w * (vt * atb + vb * abb), grown * ac, lapsed
         ])  # fmt: skip
         own, rest = sums[0], sums[1:].sum(axis=2)
@@ -101,7 +101,7 @@ class TrialLikelihood:
         q, q1, q2 = sensitivity(AT_THRESHOLD[self.family] + tau, self.family)
         return tau, q - cells.side * latent[:, k + 1][self._person], q1, q2
 
-    def _by_run(self, rows: list[FloatArray]) -> FloatArray:
+    def _sum_by_run(self, rows: list[FloatArray]) -> FloatArray:
         """Sums over the cells of each run: (rows, n, k); 0 where a person has no answer at a frequency."""
         summed = np.zeros((len(rows), self.persons * self.frequencies))
         summed[:, self._runs] = np.add.reduceat(np.array(rows), self._starts, axis=1)

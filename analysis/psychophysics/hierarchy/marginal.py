@@ -65,15 +65,15 @@ class Marginal:
         self.layout = Layout(likelihood.frequencies)
         self._longest = np.array([LONGEST_STEP_DB] * likelihood.frequencies + [LONGEST_STEP_SLOPE, LONGEST_STEP_D])
 
-    def at(self, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(self, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Log marginal likelihood of each person (n,), and its gradient (n, size)."""
         layout, k = self.layout, self.layout.k
         precision, centre = _precision(numbers, k), _centre(numbers, k)
         lapse = float(expit(numbers[layout.lapse]))
-        found = self._modes(precision, centre, lapse)
+        found = self._find_modes(precision, centre, lapse)
         deviation = self.latent - centre
         inverse = np.linalg.inv(precision + found.information).astype(np.float64)
-        by_latent, by_lapse = self.likelihood.traced(self.latent, lapse, inverse)
+        by_latent, by_lapse = self.likelihood.trace_derivatives(self.latent, lapse, inverse)
         # How the mode moves is a matter of the observed curvature; the volume is that of the expected one.
         adjoint = np.linalg.solve(precision - found.second, by_latent[..., None])[..., 0]
         pull = deviation @ precision
@@ -86,7 +86,7 @@ class Marginal:
         scores = np.empty((len(value), layout.size))
         by_centre = pull - 0.5 * adjoint @ precision
         scores[:, :k], scores[:, layout.slope] = by_centre[:, :k], by_centre[:, k]
-        for place, change, log_det in _by_log_sd(numbers, k):
+        for place, change, log_det in _precision_derivatives(numbers, k):
             moved = deviation @ change
             scores[:, place] = (
                 -0.5 * np.einsum("na,na->n", deviation, moved)
@@ -99,16 +99,16 @@ class Marginal:
         )
         return value, scores
 
-    def _modes(self, precision: FloatArray, centre: FloatArray, lapse: float) -> Derivatives:
+    def _find_modes(self, precision: FloatArray, centre: FloatArray, lapse: float) -> Derivatives:
         """Newton's method for all persons at once; a step that does not gain is halved for that person alone."""
         latent = self.latent.copy()
-        now = self.likelihood.at(latent, lapse)
-        height = _height(now, latent - centre, precision)
+        now = self.likelihood.evaluate(latent, lapse)
+        height = _log_posterior(now, latent - centre, precision)
         for _ in range(NEWTON_STEPS):
             slope = now.first - (latent - centre) @ precision
-            step = np.linalg.solve(_positive(precision - now.second, precision + now.information), slope[..., None])[
-                ..., 0
-            ]
+            step = np.linalg.solve(
+                _positive_curvature(precision - now.second, precision + now.information), slope[..., None]
+            )[..., 0]
             gain = np.einsum("na,na->n", slope, step)
             if gain.max() < SETTLED:
                 break
@@ -116,8 +116,8 @@ class Marginal:
             share = np.where(gain < SETTLED, 0.0, 1.0 / np.maximum(1.0, longest))
             for _ in range(12):
                 tried = latent + share[:, None] * step
-                then = self.likelihood.at(tried, lapse)
-                higher = _height(then, tried - centre, precision)
+                then = self.likelihood.evaluate(tried, lapse)
+                higher = _log_posterior(then, tried - centre, precision)
                 worse = higher < height - 1e-10 * np.abs(height)
                 if not worse.any():
                     break
@@ -127,12 +127,12 @@ class Marginal:
         return now
 
 
-def _height(found: Derivatives, deviation: FloatArray, precision: FloatArray) -> FloatArray:
+def _log_posterior(found: Derivatives, deviation: FloatArray, precision: FloatArray) -> FloatArray:
     height: FloatArray = found.value - 0.5 * np.einsum("na,ab,nb->n", deviation, precision, deviation)
     return height
 
 
-def _positive(observed: FloatArray, expected: FloatArray) -> FloatArray:
+def _positive_curvature(observed: FloatArray, expected: FloatArray) -> FloatArray:
     """Far from a mode the observed curvature may be indefinite: the expected one then leads uphill."""
     lowest = np.linalg.eigvalsh(observed)[:, 0]
     if lowest.min() > LOWEST_CURVATURE:
@@ -154,7 +154,7 @@ def _precision(numbers: FloatArray, k: int) -> FloatArray:
     return out
 
 
-def _by_log_sd(numbers: FloatArray, k: int) -> list[tuple[int, FloatArray, float]]:
+def _precision_derivatives(numbers: FloatArray, k: int) -> list[tuple[int, FloatArray, float]]:
     """Per log SD: its place, the change of the precision, and of the precision's log determinant."""
     shared, own = math.exp(2.0 * numbers[k]), math.exp(2.0 * numbers[k + 1])
     together = own + k * shared

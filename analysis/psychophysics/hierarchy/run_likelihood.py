@@ -1,4 +1,4 @@
-"""Each run by itself: the threshold that makes its answers most probable, with a profile interval.
+"""Maximum-likelihood threshold of each single run, with a profile interval.
 
 One run of some 60 trials does not tell a slope: slope, criterion and lapse rate are the person's from the model of all
 answers. The threshold is the run's alone, not drawn towards anything, and so is the interval.
@@ -21,7 +21,7 @@ from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, F
 from equalizer.signals.signal import FloatArray
 
 GRID_DB, BEYOND_DB = 0.1, 30.0
-"""Thresholds are looked for in such steps, so far below the levels played and so far above them and the cap."""
+"""Step of the threshold grid, and how far it reaches below the levels played and above them and the cap."""
 SAME_HEIGHT = 1e-9
 """Log-likelihoods closer than this differ by rounding alone."""
 
@@ -59,14 +59,14 @@ def run_likelihoods(
     found = []
     for run in np.unique(answers.run):
         person, place = divmod(int(run), k)
-        grid, height = _likelihood(answers, int(run), people[person], lapse, cap_db, family)
+        grid, height = _profile_likelihood(answers, int(run), people[person], lapse, cap_db, family)
         trials = int((answers.right + answers.wrong)[answers.run == run].sum())
-        ends = _ends(grid, height, cap_db, confidence)
+        ends = _profile_interval(grid, height, cap_db, confidence)
         found.append(RunLikelihood(answers.subjects[person], answers.frequencies_hz[place], trials, *ends))
     return tuple(found)
 
 
-def _likelihood(
+def _profile_likelihood(
     answers: Answers, run: int, person: tuple[float, float], lapse: float, cap_db: float, family: Family
 ) -> tuple[FloatArray, FloatArray]:
     """Thresholds (g,) in dB, and the log-likelihood at each."""
@@ -78,10 +78,10 @@ def _likelihood(
     return grid, np.log(p) @ answers.right[cells] + np.log1p(-p) @ answers.wrong[cells]
 
 
-def _ends(
+def _profile_interval(
     grid: FloatArray, height: FloatArray, cap_db: float, confidence: float
 ) -> tuple[float | None, float | None, float | None, bool]:
-    """Most probable threshold, lower and upper end, and whether it is below what was looked at."""
+    """Most probable threshold, lower and upper end, and whether it lies below the grid."""
     best = float(grid[height.argmax()])
     below, above = bool(height[0] >= height.max() - SAME_HEIGHT), best > cap_db
     drop = norm.ppf(confidence) ** 2 / 2 if above or below else chi2.ppf(confidence, 1) / 2

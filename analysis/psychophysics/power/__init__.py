@@ -1,4 +1,4 @@
-"""Whole studies simulated without device, session or file, and what each analysis makes of them.
+"""Power analysis: studies simulated without device, session or file, and the result of each analysis.
 
 Begin at `simulated_study.py`.
 """

@@ -1,4 +1,4 @@
-"""How often a study finds what is there: power, type-1 error, coverage and bias, by analysis and sample size."""
+"""Power, type-1 error, coverage and bias of a study, by analysis and sample size."""
 
 import math
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from scipy.stats import studentized_range
 
-from analysis.psychophysics.anova import one_way
+from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.catch_trials import wilson_interval
 from analysis.psychophysics.group_contrasts import Contrast, contrasts
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
@@ -67,11 +67,13 @@ def judge_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int,
     study = simulate_study(crowd, rule, people, seed)
     true_db = 20.0 * float(np.log10(crowd.medians_n[-1] / crowd.medians_n[0]))
     pseudo = pseudo_thresholds(fit_hierarchy(study.answers))
-    primary, means = (_highest(crowd.frequencies_hz, values) for values in (pseudo, study.threshold_db))
+    primary, means = (_highest_contrast(crowd.frequencies_hz, values) for values in (pseudo, study.threshold_db))
     names = [f"{frequency:g} Hz" for frequency in crowd.frequencies_hz]
-    anova = one_way({name: list(column) for name, column in zip(names, study.threshold_n.T, strict=True)})
+    anova = one_way_anova({name: list(column) for name, column in zip(names, study.threshold_n.T, strict=True)})
     difference_n = abs(float(study.threshold_n[:, -1].mean() - study.threshold_n[:, 0].mean()))
-    margin_n = _critical(len(names), anova.df_within or 1) * math.sqrt((anova.mean_square_within or math.inf) / people)
+    margin_n = _critical_range(len(names), anova.df_within or 1) * math.sqrt(
+        (anova.mean_square_within or math.inf) / people
+    )
     return StudyVerdict(
         people=people,
         trials=study.trials,
@@ -84,7 +86,7 @@ def judge_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int,
     )
 
 
-def _highest(frequencies_hz: Sequence[float], values_db: FloatArray) -> Contrast | None:
+def _highest_contrast(frequencies_hz: Sequence[float], values_db: FloatArray) -> Contrast | None:
     """The highest frequency against the lowest; None where it cannot be judged."""
     found = contrasts(frequencies_hz, values_db, CONFIDENCE)
     return next((contrast for contrast in found if contrast.frequency_hz == frequencies_hz[-1]), None)
@@ -95,7 +97,7 @@ def _mean_difference(values_db: FloatArray) -> float:
 
 
 @cache
-def _critical(groups: int, df: int) -> float:
+def _critical_range(groups: int, df: int) -> float:
     """Tukey's, for equal sizes as here. Kept, because it takes as long as a whole study."""
     return float(studentized_range.ppf(CONFIDENCE, groups, df))
 
@@ -107,15 +109,15 @@ def power_point(verdicts: Sequence[StudyVerdict]) -> PowerPoint:
         people=verdicts[0].people,
         studies=n,
         trials_per_person=sum(v.trials for v in verdicts) / n / verdicts[0].people,
-        primary=_share([v.primary_found for v in verdicts]),
-        means=_share([v.means_found for v in verdicts]),
-        published=_share([v.published_found for v in verdicts]),
-        coverage=_share([v.primary_covers for v in verdicts]),
+        primary=_wilson_share([v.primary_found for v in verdicts]),
+        means=_wilson_share([v.means_found for v in verdicts]),
+        published=_wilson_share([v.published_found for v in verdicts]),
+        coverage=_wilson_share([v.primary_covers for v in verdicts]),
         primary_bias_db=float(np.mean([v.primary_error_db for v in verdicts])),
         means_bias_db=float(np.mean([v.means_error_db for v in verdicts])),
     )
 
 
-def _share(found: Sequence[bool]) -> Share:
+def _wilson_share(found: Sequence[bool]) -> Share:
     lower, upper = wilson_interval(sum(found), len(found))
     return Share(sum(found) / len(found), lower, upper)

@@ -1,4 +1,4 @@
-"""Whole studies of simulated participants, as the analyses take them: answers counted, and reversal means."""
+"""Simulated studies in the form that the analyses take: counted answers, and reversal means."""
 
 import math
 from dataclasses import dataclass

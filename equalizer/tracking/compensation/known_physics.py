@@ -71,7 +71,7 @@ def compensate(
         raise ValueError(f"identified_with_n is {identified_with_n}; it must be a force above zero")
     rate_hz = model.sample_rate_hz
     motion = along_axes(planned_motion(wanted, rate_hz, model.band_hz, lead_s(physics, rate_hz)), physics)
-    reasons = [(effect, why_not(effect, model.input_channels)) for effect in physics.effects]
+    reasons = [(effect, reason_not_compensated(effect, model.input_channels)) for effect in physics.effects]
     used = tuple(effect for effect, reason in reasons if not reason)
     gain = axis_gains(physics, model.input_channels, model.output_channels)
     played, added = forces.copy(), np.zeros_like(forces)

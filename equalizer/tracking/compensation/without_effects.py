@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.laws.evaluate import evaluate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
-from equalizer.tracking.compensation.effect_roles import lead_s, why_not
+from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
 from equalizer.tracking.compensation.known_physics import (
     along_axes,
     axes_of,

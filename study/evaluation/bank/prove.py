@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.diagnosis.document import diagnosis_from_json
-from analysis.evaluation.proof.controlled import Controlled
+from analysis.evaluation.proof.controlled import ControlOutcome
 from analysis.evaluation.proof.follow_up import FollowUp
 from analysis.evaluation.proof.outcome import Concealed, Outcome
 from analysis.evaluation.proof.score import Score, score

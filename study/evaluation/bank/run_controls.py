@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis, diagnosis_from_json
-from analysis.evaluation.proof.controlled import Controlled, controlled
+from analysis.evaluation.proof.controlled import ControlOutcome, judge_control
 from study.errors import StudyError
 from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
@@ -46,7 +46,7 @@ def run_controls(
 
     ask_engine(folder, every, workers, on_answered)
     return tuple(
-        controlled(
+        judge_control(
             f"{control.name}, seed {seed}", control.claim, [_said(folder.open / name) for name in names[control.name]]
         )
         for control in controls

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis
-from analysis.evaluation.proof.lab_kit import MISSING, Label, Scored, kit_figures, not_answered, scored
+from analysis.evaluation.proof.lab_kit import MISSING, Label, Scored, kit_figures, score_label, score_unanswered
 from analysis.evaluation.proof.share import Figure
 from study.errors import StudyError, WrongUseError
 from study.evaluation.kit.lab_kit import read_labels, read_sealed_hash, seal_of
@@ -36,7 +36,8 @@ def score_kit(path: Path, diagnoses: Path, out: Path, seal: str | None = None) -
     labels = read_labels(path)
     found = _diagnoses(diagnoses, labels)
     rows = tuple(
-        not_answered(label) if each is None else scored(label, each) for label, each in zip(labels, found, strict=True)
+        score_unanswered(label) if each is None else score_label(label, each)
+        for label, each in zip(labels, found, strict=True)
     )
     write_text(out, rows_to_csv(rows, Scored))
     return KitScore(rows, kit_figures(rows), digest, compared_with)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from analysis.evaluation.reproduction.equalized_findings import EqualizedRows
-from analysis.evaluation.reproduction.played_response import PlayedResponse, scaled
+from analysis.evaluation.reproduction.played_response import PlayedResponse, normalise_gain
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.periodic_inverse import periodic_command
@@ -54,7 +54,7 @@ def play_equalized(
     for number, (key, playing) in enumerate(playings.items(), start=1):
         played = play_row(plan, playing)
         plain = playing.driver is not_equalized
-        found[key] = replace(played, response=scaled(played.response)) if plain else played
+        found[key] = replace(played, response=normalise_gain(played.response)) if plain else played
         on_share(number / len(playings))
     return _sort_rows(found, (*blended.remarks, *remarks, *_clipping_remarks(found)))
 

@@ -9,7 +9,7 @@ import numpy as np
 from analysis.evaluation.reproduction.played_response import (
     PlayedResponse,
     SignalKind,
-    delivered_over_wanted,
+    estimate_response,
     wanted_wave,
 )
 from equalizer.signals.excitation import apply_fades
@@ -80,7 +80,7 @@ def _play_axes(plan: ReproductionPlan, playing: Playing, device: Device, peak_n:
         wanted.append(scale * wave)
         delivered.append(played)
         clipped += limited
-    frequency_hz, response = delivered_over_wanted(np.array(wanted), delivered, plan.band_hz, rate_hz)
+    frequency_hz, response = estimate_response(np.array(wanted), delivered, plan.band_hz, rate_hz)
     return PlayedResponse(
         name=playing.name,
         device=device.info.name,

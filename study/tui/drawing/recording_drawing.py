@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from analysis.look.channels import Channel, in_unit
+from analysis.look.channels import Channel, format_value
 from analysis.look.overview import Overview
 from equalizer.signals.signal import FloatArray
 from study.tui.drawing.braille import Canvas

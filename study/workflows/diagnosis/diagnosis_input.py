@@ -80,7 +80,8 @@ def _as_forces(
         found = [with_force_constant(recording, constants) for recording in recordings]
     except NoForceConstant as refusal:
         raise WrongUseError(
-            "The force constant cannot be used", f"{begun(str(refusal))}.", "Leave --force-constant out, or mend it.",
+            "The force constant cannot be used", f"{begin_sentence(str(refusal))}.",
+            "Leave --force-constant out, or mend it.",
             saved="Nothing was written.",
         ) from refusal  # fmt: skip
     return tuple(recording for recording, _ in found), (found[0][1],)
@@ -114,7 +115,7 @@ def not_diagnosable_error(problems: Sequence[str], do_now: str = "Correct them, 
 
 
 def _sentences(problems: Sequence[str]) -> str:
-    return " ".join(f"{begun(problem).rstrip('.')}." for problem in problems)
+    return " ".join(f"{begin_sentence(problem).rstrip('.')}." for problem in problems)
 
 
 def _names(sources: Sequence[Path]) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from analysis.psychophysics.population import Population, split_by_population
-from analysis.wording import listed
+from analysis.wording import conjoin
 from equalizer.plant.model_quality import NOT_STORED
 from protocols.definition.study_protocol import StudyProtocol
 from study.errors import StudyError, WrongUseError
@@ -74,7 +74,7 @@ def _qualities(entering: Sequence[tuple[SessionFolder, SessionState]]) -> tuple[
         if (equalized := state.opened.equalized) is not None:
             key = (equalized.sha256, equalized.quality or NOT_STORED)
             sessions.setdefault(key, []).append(folder.name)
-    return tuple((listed(names), sentence) for (_, sentence), names in sessions.items())
+    return tuple((conjoin(names), sentence) for (_, sentence), names in sessions.items())
 
 
 def _folders(data: Path) -> tuple[SessionFolder, ...]:

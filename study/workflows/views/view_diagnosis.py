@@ -12,7 +12,7 @@ from analysis.diagnosis.result.wording import (
     rival_sentences,
     verdict_sentence,
 )
-from analysis.wording import NONE, listed, p_value
+from analysis.wording import NONE, conjoin, p_value
 from study.errors import StudyError
 from study.session.views.archive_views import DiagnosisView
 from study.session.views.printable import printable
@@ -85,12 +85,12 @@ def _next(diagnosis: Diagnosis) -> str:
     following = diagnosis.next_experiment
     if following is None:
         return ""
-    splits = f" It tells {listed([noun_of(name) for name in following.splits])} apart." if following.splits else ""
+    splits = f" It tells {conjoin([noun_of(name) for name in following.splits])} apart." if following.splits else ""
     return f"{following.command}\n{following.why}{splits}"
 
 
 def _notes(diagnosis: Diagnosis) -> tuple[str, ...]:
-    retuned = (f"Re-tuned: {listed(list(diagnosis.retuned))}.",) if diagnosis.retuned else ()
+    retuned = (f"Re-tuned: {conjoin(list(diagnosis.retuned))}.",) if diagnosis.retuned else ()
     left = (remainder_sentence(diagnosis),) if diagnosis.verdict in ("explained", "partly_explained") else ()
     measured = f"Errors are normalised root-mean-square over the channels, measured by {diagnosis.error}."
     return (measured, *retuned, *left)

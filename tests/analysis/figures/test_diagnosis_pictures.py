@@ -9,10 +9,10 @@ from matplotlib.text import Annotation
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
-from analysis.figures.diagnosis_held_out import draw_held_out, telling_excerpt
+from analysis.figures.diagnosis_held_out import draw_held_out, find_excerpt
 from analysis.figures.diagnosis_mismatch_map import draw_mismatch_map, mismatch_map_pictures
 from analysis.figures.diagnosis_remainder import draw_remainder
-from analysis.figures.diagnosis_rivals import draw_rivals, rivals_pictures, tried_explanations
+from analysis.figures.diagnosis_rivals import draw_rivals, list_explanations, rivals_pictures
 from analysis.figures.diagnosis_signature import draw_signature
 from analysis.figures.diagnosis_style import power_of_ten, ratio_ticks
 from analysis.figures.picture import picture_svg
@@ -143,7 +143,7 @@ def test_a_signature_without_samples_says_so(friction_found):
 
 
 def test_the_excerpt_lies_in_held_out_data_where_the_named_effect_changes_the_prediction(friction_found):
-    found = telling_excerpt(friction_found.courses, friction_found.noise_rms)
+    found = find_excerpt(friction_found.courses, friction_found.noise_rms)
     course = friction_found.courses[0]
     (tested,) = course.tested
     assert tested[0] <= found.start < found.stop <= tested[1]
@@ -157,8 +157,8 @@ def test_the_excerpt_lies_in_held_out_data_where_the_named_effect_changes_the_pr
 def test_without_a_change_there_is_no_excerpt(friction_found):
     course = friction_found.courses[0]
     same = replace(course, before=course.after, retuned=course.after)
-    assert telling_excerpt((same,), friction_found.noise_rms) is None
-    assert telling_excerpt((), {}) is None
+    assert find_excerpt((same,), friction_found.noise_rms) is None
+    assert find_excerpt((), {}) is None
 
 
 def test_errors_of_every_channel_stand_beside_the_noise_line(friction_found):
@@ -194,7 +194,7 @@ def test_without_held_out_data_nothing_is_drawn(friction_found):
 
 
 def test_rivals_stand_below_the_best_with_their_errors(friction_found):
-    tried = tried_explanations(friction_found.explanation.rounds[0], ("x",))
+    tried = list_explanations(friction_found.explanation.rounds[0], ("x",))
     assert [each.words for each in tried] == ["dry friction", "a dead band of the force"]
     assert tried[0].seen < 1.1 < tried[1].seen
     axes = draw_rivals(tried, replace(tried[1], words="re-tuned")).axes[0]
@@ -204,7 +204,7 @@ def test_rivals_stand_below_the_best_with_their_errors(friction_found):
 
 def test_the_one_that_was_chosen_stands_on_top_even_where_another_has_less_error(friction_found):
     best, worse = friction_found.explanation.rounds[0]
-    tried = tried_explanations((worse, best), ("x",))
+    tried = list_explanations((worse, best), ("x",))
     assert [each.words for each in tried] == ["a dead band of the force", "dry friction"]
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from analysis.look.channels import channels_of
-from analysis.look.clipping import clipped_samples, clipping
+from analysis.look.clipping import check_clipping, count_clipped_samples
 
 T = np.arange(20_000) / 1000
 
@@ -24,7 +24,7 @@ def test_what_was_cut_off_is_found_and_counted(name, step):
     cut = np.minimum(samples, limit)
     cut = np.round(cut / step) * step if step else cut
     true = int(np.sum(cut >= cut.max() - 1e-12))
-    assert clipped_samples(cut) == pytest.approx(true, rel=0.3)
+    assert count_clipped_samples(cut) == pytest.approx(true, rel=0.3)
 
 
 @pytest.mark.parametrize("name", ["sine", "multisine", "noise"])
@@ -32,8 +32,8 @@ def test_what_was_cut_off_is_found_and_counted(name, step):
 def test_a_signal_that_turns_by_itself_is_not_cut_off(name, step):
     samples = signals()[name]
     rounded = np.round(samples / step) * step if step else samples
-    assert clipped_samples(rounded) == 0
-    assert clipped_samples(-rounded) == 0
+    assert count_clipped_samples(rounded) == 0
+    assert count_clipped_samples(-rounded) == 0
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -41,9 +41,9 @@ def test_the_peak_of_a_periodic_signal_is_not_cut_off_however_often_it_comes(see
     lines = np.arange(1, 200)
     phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
     period = np.cos(2 * np.pi * np.outer(np.arange(500) / 500, lines) + phases).sum(axis=1)
-    assert clipped_samples(np.tile(period, 10)) == 0
+    assert count_clipped_samples(np.tile(period, 10)) == 0
     cut = np.minimum(period, 0.5 * period.max())
-    assert clipped_samples(np.tile(cut, 10)) == 10 * np.sum(period >= cut.max())
+    assert count_clipped_samples(np.tile(cut, 10)) == 10 * np.sum(period >= cut.max())
 
 
 def test_a_place_where_it_comes_to_rest_is_not_cut_off():
@@ -53,12 +53,12 @@ def test_a_place_where_it_comes_to_rest_is_not_cut_off():
     for k in range(1, len(T)):
         place[k] = place[k - 1] + 0.02 * (target[k] - place[k - 1])
     rounded = np.round(place / 0.003) * 0.003
-    assert clipped_samples(rounded) == clipped_samples(-rounded) == 0
+    assert count_clipped_samples(rounded) == count_clipped_samples(-rounded) == 0
 
 
 def test_a_clipped_sensor_is_wrong_and_a_limited_command_is_said(recording):
     samples = signals()["noise"]
-    found = clipping(channels_of(recording(np.clip(samples, -1, 1), np.clip(samples, -2, 9))))
+    found = check_clipping(channels_of(recording(np.clip(samples, -1, 1), np.clip(samples, -2, 9))))
     assert [(check.level, check.name) for check in found] == [("notice", "clipping"), ("wrong", "clipping")]
     assert found[0].seen.startswith("command 'f1' is cut off at 1 N and −1 N: ")
     assert found[1].seen.startswith("response 'a1' is cut off at −2 m/s^2: ")
@@ -66,5 +66,5 @@ def test_a_clipped_sensor_is_wrong_and_a_limited_command_is_said(recording):
 
 def test_a_binary_command_is_meant_so(recording):
     binary = np.sign(signals()["noise"])
-    found = clipping(channels_of(recording(binary, signals()["sine"])))
+    found = check_clipping(channels_of(recording(binary, signals()["sine"])))
     assert [check.level for check in found] == ["fine"]

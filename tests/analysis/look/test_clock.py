@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.look.clock import clock
+from analysis.look.clock import check_clock
 
 N = 5000
 
@@ -22,19 +22,19 @@ def only(found, word):
 
 
 def test_even_stamps_are_fine(recording):
-    assert levels(clock(stamped(recording, np.arange(N) / 1000.0), [(0, N)])) == {"fine"}
+    assert levels(check_clock(stamped(recording, np.arange(N) / 1000.0), [(0, N)])) == {"fine"}
 
 
 def test_jitter_is_measured(recording):
     off = 1e-4 * np.random.default_rng(1).uniform(-1, 1, N)
-    found = only(clock(stamped(recording, np.arange(N) / 1000.0 + off), [(0, N)]), "off their places")
+    found = only(check_clock(stamped(recording, np.arange(N) / 1000.0 + off), [(0, N)]), "off their places")
     assert found.level == "notice"
     assert float(found.seen.split("lie ")[1].split(" us")[0]) == pytest.approx(1e2 / np.sqrt(3), rel=0.05)
 
 
 @pytest.mark.parametrize(("ppm", "level"), [(20, "fine"), (800, "notice"), (20_000, "wrong"), (-800, "notice")])
 def test_drift_is_measured(recording, ppm, level):
-    found = only(clock(stamped(recording, np.arange(N) * (1 + ppm * 1e-6) / 1000.0), [(0, N)]), "ppm")
+    found = only(check_clock(stamped(recording, np.arange(N) * (1 + ppm * 1e-6) / 1000.0), [(0, N)]), "ppm")
     assert found.level == level
     assert float(found.seen.split(" is ")[1].split(" ppm")[0]) == pytest.approx(abs(ppm), rel=1e-3)
     assert ("slower" if ppm > 0 else "faster") in found.seen
@@ -44,7 +44,7 @@ def test_gaps_are_counted_and_do_not_count_as_jitter_or_drift(recording):
     time_s = np.arange(N) / 1000.0
     time_s[2000:] += 0.05
     time_s[3000:] += 0.002
-    found = clock(stamped(recording, time_s), [(0, N)])
+    found = check_clock(stamped(recording, time_s), [(0, N)])
     gap = only(found, "gaps")
     assert gap.level == "wrong"
     assert "2 gaps between time stamps, the first after 1.999 s; the longest is 51 ms in place of 1 ms" in gap.seen
@@ -54,16 +54,16 @@ def test_gaps_are_counted_and_do_not_count_as_jitter_or_drift(recording):
 def test_a_pause_between_parts_is_no_gap(recording):
     time_s = np.arange(N) / 1000.0
     time_s[2500:] += 60.0
-    assert levels(clock(stamped(recording, time_s), [(0, 2500), (2500, N)])) == {"fine"}
+    assert levels(check_clock(stamped(recording, time_s), [(0, 2500), (2500, N)])) == {"fine"}
 
 
 def test_unknown_time_is_said(recording):
     numbered = replace(recording(np.ones(N), np.ones(N)), meta={"time": "unknown"})
-    assert levels(clock(numbered, [(0, N)])) == {"notice"}
+    assert levels(check_clock(numbered, [(0, N)])) == {"notice"}
 
 
 def test_what_an_import_evened_out_is_said(recording):
     notes = ["a: resampled from uneven stamps (about 952 Hz) to 952 Hz, linear."]
-    found = clock(recording(np.ones(N), np.ones(N), meta={"import": {"notes": notes}}), [(0, N)])
+    found = check_clock(recording(np.ones(N), np.ones(N), meta={"import": {"notes": notes}}), [(0, N)])
     assert [check.level for check in found] == ["notice"]
     assert notes[0] in found[0].seen

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from analysis.look.channels import channels_of
-from analysis.look.completeness import constant_channels, copied_channels, missing_samples
+from analysis.look.completeness import check_constant_channels, check_copied_channels, check_missing_samples
 
 N = 1000
 
@@ -15,24 +15,24 @@ def random():
 def test_missing_samples_are_counted(recording, random):
     response = random(1)
     response[[100, 101, 102, 400]] = np.nan
-    (check,) = missing_samples(channels_of(recording(random(2), response)), 1000.0)
+    (check,) = check_missing_samples(channels_of(recording(random(2), response)), 1000.0)
     assert check.level == "notice"
     assert check.seen == ("response 'a1' misses 4 of 1000 samples, the first at 0.1 s; the longest gap is 3 samples.")
 
 
 def test_many_missing_samples_are_wrong_and_none_are_fine(recording, random):
     response = random(1)
-    assert missing_samples(channels_of(recording(random(2), response)), 1000.0)[0].level == "fine"
+    assert check_missing_samples(channels_of(recording(random(2), response)), 1000.0)[0].level == "fine"
     response[:300] = np.nan
-    assert missing_samples(channels_of(recording(random(2), response)), 1000.0)[0].level == "wrong"
+    assert check_missing_samples(channels_of(recording(random(2), response)), 1000.0)[0].level == "wrong"
 
 
 def test_a_constant_response_is_wrong_and_a_constant_command_is_said(recording, random):
-    found = constant_channels(channels_of(recording(np.column_stack([random(1), np.zeros(N)]), np.full(N, 2.5))))
+    found = check_constant_channels(channels_of(recording(np.column_stack([random(1), np.zeros(N)]), np.full(N, 2.5))))
     assert [(check.level, check.seen) for check in found] == [
         ("notice", "command 'f2' is 0 N throughout."), ("wrong", "response 'a1' is 2.5 m/s^2 throughout."),
     ]  # fmt: skip
-    assert constant_channels(channels_of(recording(random(1), random(2))))[0].level == "fine"
+    assert check_constant_channels(channels_of(recording(random(1), random(2))))[0].level == "fine"
 
 
 @pytest.mark.parametrize(
@@ -40,17 +40,22 @@ def test_a_constant_response_is_wrong_and_a_constant_command_is_said(recording, 
 )
 def test_a_copy_of_a_channel_is_found(recording, random, factor, words):
     response = np.column_stack([random(1), factor * random(1) + 3.0 * (factor != 1.0)])
-    (check,) = copied_channels(channels_of(recording(random(2), response)))
+    (check,) = check_copied_channels(channels_of(recording(random(2), response)))
     assert check.level == "wrong"
     assert words in check.seen
 
 
 def test_a_copy_stored_in_single_precision_is_one_and_a_noisy_sensor_is_none(recording, random):
     single = random(1).astype(np.float32).astype(float)
-    assert copied_channels(channels_of(recording(random(2), np.column_stack([random(1), single]))))[0].level == "wrong"
+    assert (
+        check_copied_channels(channels_of(recording(random(2), np.column_stack([random(1), single]))))[0].level
+        == "wrong"
+    )
     noisy = random(1) + 1e-4 * random(3)
-    assert copied_channels(channels_of(recording(random(2), np.column_stack([random(1), noisy]))))[0].level == "fine"
+    assert (
+        check_copied_channels(channels_of(recording(random(2), np.column_stack([random(1), noisy]))))[0].level == "fine"
+    )
 
 
 def test_an_excitation_that_is_the_command_is_in_order(recording, random):
-    assert copied_channels(channels_of(recording(random(1), random(2), excitation=random(1))))[0].level == "fine"
+    assert check_copied_channels(channels_of(recording(random(1), random(2), excitation=random(1))))[0].level == "fine"

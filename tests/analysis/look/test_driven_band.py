@@ -5,9 +5,9 @@ from scipy import signal as sg
 from analysis.look.channels import channels_of
 from analysis.look.cross_spectra import cross_spectra
 from analysis.look.driven_band import (
+    check_driven_axes,
     coherence_checks,
-    driven_axes,
-    driven_bands,
+    find_driven_bands,
     response_coherences,
     silent_segments,
 )
@@ -19,7 +19,7 @@ RATE_HZ = 1000.0
 def seen(found):
     channels = channels_of(found)
     spectra = cross_spectra(channels, [(0, len(found))], RATE_HZ)
-    bands = driven_bands(spectra, channels)
+    bands = find_driven_bands(spectra, channels)
     return bands, response_coherences(spectra, channels, bands), spectra
 
 
@@ -47,7 +47,7 @@ def test_a_command_that_rests_is_not_driven_and_said(recording, noise):
     found = recording(commands, noise())
     bands, _, _ = seen(found)
     assert [band.command for band in bands] == ["f1"]
-    checks = driven_axes(found, bands)
+    checks = check_driven_axes(found, bands)
     assert (checks[0].level, checks[0].seen) == ("notice", "command 'f2' is not driven.")
 
 

@@ -4,7 +4,7 @@ import pytest
 from analysis.look.agreement import Agreement
 from analysis.look.channels import channels_of
 from analysis.look.cross_spectra import cross_spectra
-from analysis.look.kinematics import KinematicPair, kinematic_checks, kinematic_pairs, lag_checks
+from analysis.look.kinematics import KinematicPair, find_kinematic_pairs, kinematic_checks, lag_checks
 from equalizer.signals.recording import Recording
 
 RATE_HZ = 1000.0
@@ -17,7 +17,7 @@ def motion(noise, moved):
 
 
 def pairs_of(found: Recording):
-    return kinematic_pairs(channels_of(found), [(0, len(found))], RATE_HZ)
+    return find_kinematic_pairs(channels_of(found), [(0, len(found))], RATE_HZ)
 
 
 def delayed(samples, lag):

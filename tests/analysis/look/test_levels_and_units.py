@@ -3,8 +3,8 @@ import pytest
 
 from analysis.look.channels import channels_of
 from analysis.look.levels import level_checks, segment_levels
-from analysis.look.overview import resolution
-from analysis.look.plausibility import offsets, units
+from analysis.look.overview import check_resolution
+from analysis.look.plausibility import check_offsets, check_units
 from equalizer.signals.recording import Segment
 
 TWO = (Segment(0, 10_000, "noise", 1.0), Segment(10_000, 20_000, "noise", 2.0))
@@ -52,32 +52,32 @@ def test_axes_that_are_driven_in_turn_are_not_compared(recording, two_levels):
     ],
 )  # fmt: skip
 def test_sizes_that_no_device_has_are_doubted(recording, noise, samples, quantity, unit, level):
-    found = units(channels_of(recording(noise(), (samples * noise(seed=2), quantity, unit))))
+    found = check_units(channels_of(recording(noise(), (samples * noise(seed=2), quantity, unit))))
     assert [check.level for check in found] == [level]
 
 
 @pytest.mark.parametrize(("rest", "level"), [(1.0, "wrong"), (9.81, "fine"), (0.0, "fine")])
 def test_an_accelerometer_in_g_is_recognised_by_gravity(recording, noise, rest, level):
-    found = units(channels_of(recording(noise(), rest + 0.1 * noise(seed=2))))
+    found = check_units(channels_of(recording(noise(), rest + 0.1 * noise(seed=2))))
     assert [check.level for check in found] == [level]
 
 
 def test_offsets_are_said_and_gravity_is_known(recording, noise):
-    found = offsets(channels_of(recording(noise() - noise().mean() + 2.0, 9.81 + noise(seed=2))))
+    found = check_offsets(channels_of(recording(noise() - noise().mean() + 2.0, 9.81 + noise(seed=2))))
     assert [check.level for check in found] == ["notice", "fine"]
     assert "command 'f1' stands 2 N beside zero" in found[0].seen
     assert "gravity" in found[1].seen
-    assert offsets(channels_of(recording(noise(), noise(seed=2))))[0].level == "fine"
+    assert check_offsets(channels_of(recording(noise(), noise(seed=2))))[0].level == "fine"
 
 
 @pytest.mark.parametrize(("steps", "level"), [(0.8, "wrong"), (10.0, "notice"), (200.0, "fine")])
 def test_the_step_of_a_converter_is_found(recording, noise, steps, level):
     step = 1.0 / steps
-    (check,) = resolution(channels_of(recording(noise(), np.round(noise(seed=2) / step) * step)))
+    (check,) = check_resolution(channels_of(recording(noise(), np.round(noise(seed=2) / step) * step)))
     assert check.level == level
     assert f"in steps of {step:.3g} m/s^2" in check.seen
 
 
 def test_an_analog_channel_has_no_step(recording, noise):
-    (check,) = resolution(channels_of(recording(noise(), noise(seed=2))))
+    (check,) = check_resolution(channels_of(recording(noise(), noise(seed=2))))
     assert (check.level, check.seen) == ("fine", "No step of a converter matters in any sensor.")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.found_segments import find_period
-from analysis.look.repeats import repeat_checks, repeats
+from analysis.look.repeats import find_repeats, repeat_checks
 from equalizer.signals.recording import Segment
 
 
@@ -42,7 +42,7 @@ def test_an_undeclared_period_is_said_with_the_noise_between_repeats(recording):
     command, rng = tiled(500, 8), np.random.default_rng(2)
     response = 3 * command + 0.3 * rng.standard_normal(len(command))
     found = recording(command, response)
-    seen = repeats(found, [(0, len(found))])
+    seen = find_repeats(found, [(0, len(found))])
     assert seen.found == 500
     assert seen.noise[0].share[0] == pytest.approx(0.1, rel=0.1)
     levels = {check.level for check in repeat_checks(found, seen)}
@@ -52,17 +52,17 @@ def test_an_undeclared_period_is_said_with_the_noise_between_repeats(recording):
 def test_a_period_across_segments_that_only_split_fit_from_test_is_found(recording):
     command = tiled(700, 3)
     halves = (Segment(0, 1050, "noise", role="fit"), Segment(1050, 2100, "noise", role="test"))
-    assert repeats(recording(command, command, segments=halves), [(0, 2100)]).found == 700
+    assert find_repeats(recording(command, command, segments=halves), [(0, 2100)]).found == 700
 
 
 def test_declared_periods_are_taken_and_checked(recording):
     command = tiled(500, 8)
     right = recording(command, command, segments=(Segment(0, 4000, "noise", period=500),))
-    seen = repeats(right, [(0, 4000)])
+    seen = find_repeats(right, [(0, 4000)])
     assert (seen.found, seen.noise[0].looks, seen.noise[0].segment) == (0, 7, 1)
     assert {check.level for check in repeat_checks(right, seen)} == {"fine"}
     wrong = recording(command, command, segments=(Segment(0, 4000, "noise", period=480),))
-    (check, *_) = repeat_checks(wrong, repeats(wrong, [(0, 4000)]))
+    (check, *_) = repeat_checks(wrong, find_repeats(wrong, [(0, 4000)]))
     assert check.level == "wrong"
     assert "Segment 1 states a period of 480 samples, but its command differs by" in check.seen
 
@@ -70,11 +70,11 @@ def test_declared_periods_are_taken_and_checked(recording):
 def test_a_feedback_does_not_hide_that_the_excitation_repeats(recording):
     decided = tiled(500, 8)
     command = decided + 0.5 * np.random.default_rng(3).standard_normal(4000)
-    assert repeats(recording(command, command, excitation=decided), [(0, 4000)]).found == 500
+    assert find_repeats(recording(command, command, excitation=decided), [(0, 4000)]).found == 500
 
 
 def test_where_nothing_repeats_that_is_said(recording):
     command = np.random.default_rng(1).standard_normal(3000)
     found = recording(command, command)
-    (check,) = repeat_checks(found, repeats(found, [(0, 3000)]))
+    (check,) = repeat_checks(found, find_repeats(found, [(0, 3000)]))
     assert (check.level, "Nothing repeats" in check.seen) == ("notice", True)

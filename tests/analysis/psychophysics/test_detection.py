@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.detection import Below, detection_thresholds, directions_below_detection
+from analysis.psychophysics.detection import BelowDetection, detection_thresholds, directions_below_detection
 from analysis.psychophysics.runs import InconsistentTrialsError
 from analysis.psychophysics.threshold_table import threshold_table
 from analysis.psychophysics.thresholds import thresholds
@@ -84,7 +84,7 @@ def tables(asking, direction_n, detection_n, felt, simulate):
 def test_a_direction_told_before_it_is_felt_is_found(asking, felt, simulate):
     direction, detection = tables(asking, 0.2, 1.0, felt, simulate)
     (below,) = directions_below_detection(direction, detection)
-    assert below == Below("s01", 35.0, direction.values[0][0], detection.values[0][0])
+    assert below == BelowDetection("s01", 35.0, direction.values[0][0], detection.values[0][0])
 
 
 @pytest.mark.parametrize(("direction_n", "detection_n"), [(1.0, 0.1), (float("inf"), float("inf"))])

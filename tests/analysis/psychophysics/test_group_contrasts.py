@@ -6,7 +6,7 @@ from scipy.stats import ttest_rel
 from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.weightstats import ttost_paired
 
-from analysis.psychophysics.group_contrasts import contrasts, holm
+from analysis.psychophysics.group_contrasts import contrasts, holm_correction
 
 HZ = (5.0, 15.0, 25.0, 35.0)
 VALUES = np.array([0.0, 0.3, 1.0, 5.0]) + np.random.default_rng(3).normal(0, [1, 1, 1, 6], (10, 4))
@@ -28,7 +28,7 @@ def test_equivalence_and_holm_agree_with_statsmodels():
     assert found[2].p_equivalence is None  # 35 Hz: not asked
     peer = multipletests([c.p for c in found], method="holm")[1]
     assert [c.p_holm for c in found] == pytest.approx(list(peer))
-    assert holm([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
+    assert holm_correction([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
 
 
 def test_unequal_spread_is_found_and_equal_spread_is_not():

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.psychophysics.anova import one_way
+from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.population import Population
 from analysis.psychophysics.repeated_measures import repeated_measures
 from analysis.psychophysics.study_analysis import analyse_study, anova_document
@@ -46,7 +46,7 @@ def test_without_an_effect_few_studies_find_one(simulate_study, protocol):
     for seed in range(24):
         rows = thresholds(simulate_study(subjects=6, true_n=(0.6,) * 5, seed=seed), protocol.staircase)
         table = threshold_table(rows, frequencies)
-        p.append((one_way(table.groups()).p, repeated_measures(table.subjects, table.values).p))
+        p.append((one_way_anova(table.groups()).p, repeated_measures(table.subjects, table.values).p))
     # At 5 % a right test exceeds four of 24 in one of 200 repetitions of this test; the seeds are fixed.
     assert np.all(np.sum(np.array(p) < 0.05, axis=0) <= 4)
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.anova import one_way
+from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.repeated_measures import repeated_measures
 from analysis.psychophysics.study_analysis import analyse_study, design_difference
 from protocols.procedure.run_rules import staircase_rule
@@ -164,7 +164,7 @@ DRUGS = ((30.0, 28.0, 16.0, 34.0), (14.0, 18.0, 10.0, 22.0), (24.0, 20.0, 18.0, 
 
 def both(values):
     columns = {str(i): column for i, column in enumerate(zip(*values, strict=True))}
-    return one_way(columns), repeated_measures([str(i) for i in range(len(values))], values)
+    return one_way_anova(columns), repeated_measures([str(i) for i in range(len(values))], values)
 
 
 def test_the_two_analyses_are_told_apart_in_numbers():

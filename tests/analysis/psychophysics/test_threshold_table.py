@@ -22,13 +22,13 @@ def test_each_participant_has_one_value_per_frequency(rows):
         at = table.subjects.index(row.subject), table.frequencies_hz.index(row.frequency_hz)
         assert table.values[at[0]][at[1]] == row.threshold_n
         assert table.censored[at[0]][at[1]] is row.censored
-    assert table.missing() == ()
+    assert table.gaps() == ()
 
 
 def test_an_incomplete_run_leaves_a_gap(rows):
     unfinished = [replace(row, complete=False) if row.subject == "s02" else row for row in rows]
     table = threshold_table(unfinished, FREQUENCIES)
-    assert table.missing() == tuple(("s02", frequency) for frequency in FREQUENCIES)
+    assert table.gaps() == tuple(("s02", frequency) for frequency in FREQUENCIES)
     assert table.groups()["5 Hz"][1] is None
 
 

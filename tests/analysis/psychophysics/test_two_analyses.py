@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.psychophysics.study_analysis import analyse_study, anova_document
-from analysis.psychophysics.two_analyses import SIMULATED_RULE, analyses_compared, declared_words
+from analysis.psychophysics.two_analyses import SIMULATED_RULE, comparison_text, declaration_text
 from analysis.reports.study_report import render_study_report
 from protocols.definition.declared_analysis import AnalysisSettings
 from study.workflows.results.analyze_data import text_table
@@ -28,9 +28,9 @@ def test_what_the_cap_hides_is_said(analysis):
 
 def test_numbers_simulated_with_the_published_rule_are_said_of_no_other(analysis):
     parts = analysis.primary, analysis.mean_contrasts, analysis.comparisons, analysis.table
-    assert analyses_compared(*parts, SIMULATED_RULE) == analysis.compared
+    assert comparison_text(*parts, SIMULATED_RULE) == analysis.compared
     for other in (replace(SIMULATED_RULE, cap_n=2.0), replace(SIMULATED_RULE, down_after_right=2)):
-        said = analyses_compared(*parts, other)
+        said = comparison_text(*parts, other)
         assert "Near the cap the published intervals do not hold" in said
         assert "covers 3 %" not in said and "0.4 %" not in said
 
@@ -55,15 +55,15 @@ def test_one_participant_leaves_the_published_analysis_alone(simulate_study, pro
     alone = analyse_study(simulate_study(subjects=1), protocol)
     assert alone.primary is None
     assert "stands alone" in alone.compared
-    assert analyses_compared(None, (), alone.comparisons, alone.table, SIMULATED_RULE) == alone.compared
+    assert comparison_text(None, (), alone.comparisons, alone.table, SIMULATED_RULE) == alone.compared
 
 
 def test_what_was_declared_and_what_was_not_is_said():
-    assert "declares no primary analysis" in declared_words(AnalysisSettings())
-    said = declared_words(AnalysisSettings("hierarchical", (45.0, 5.0), 10))
+    assert "declares no primary analysis" in declaration_text(AnalysisSettings())
+    said = declaration_text(AnalysisSettings("hierarchical", (45.0, 5.0), 10))
     assert "hierarchical model" in said and "45 Hz minus 5 Hz" in said and "participants: 10" in said
     assert "Not declared: exclusions." in said
-    assert "Not declared" not in declared_words(AnalysisSettings("published", (45.0, 5.0), 10, ("Nobody.",)))
+    assert "Not declared" not in declaration_text(AnalysisSettings("published", (45.0, 5.0), 10, ("Nobody.",)))
 
 
 def test_the_page_and_the_document_show_both(analysis):

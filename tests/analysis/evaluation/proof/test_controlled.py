@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
-from analysis.evaluation.proof.controlled import CLAIMS, controlled
+from analysis.evaluation.proof.controlled import CLAIMS, judge_control
 
 CELL = Mismatch("ax", "fx", (1.0, 5.0), None, None, 0.5, 0.001)
 ERRORS = Errors(0.5, 0.3, 0.1, 0.1)
@@ -45,11 +45,11 @@ def unnamed(verdict):
     ],
 )
 def test_a_claim_holds_or_does_not(claim, answers, held):
-    assert controlled("a control", claim, answers).held is held
+    assert judge_control("a control", claim, answers).held is held
 
 
 def test_answers_are_said_in_words():
-    said = controlled("a control", "same", [pushed(1.0), None]).said
+    said = judge_control("a control", "same", [pushed(1.0), None]).said
     assert said == ("explained: constant_force of x", "no answer")
 
 

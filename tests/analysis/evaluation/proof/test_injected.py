@@ -2,7 +2,7 @@
 
 import pytest
 
-from analysis.evaluation.proof.injected import DETECTABLE, injected_figures, outcome_of, tallies
+from analysis.evaluation.proof.injected import DETECTABLE, injected_figures, read_outcome, tallies
 from analysis.reports.injected_section import figure_text, injected_section, kind_of
 
 PLACES = {"sensor_lag": "sensor", "sensor_gain": "sensor", "amplifier_lag": "actuator", "added_mass": "mechanism"}
@@ -21,7 +21,7 @@ def outcome(effects=("sensor_lag",), named=("sensor_lag",), rivals=(), change=3.
         {"effect": each, "place": PLACES[each], "rivals": [{"effect": other, "inseparable": True} for other in rivals]}
         for each in named
     ]
-    return outcome_of(label, {"seconds": 2.0, "diagnosis": {"verdict": "partly_explained", "effects": said}})
+    return read_outcome(label, {"seconds": 2.0, "diagnosis": {"verdict": "partly_explained", "effects": said}})
 
 
 def by_name(outcomes):
@@ -57,7 +57,7 @@ def test_nothing_injected_is_right_where_nothing_is_named():
 
 def test_an_answer_that_failed_is_no_right_answer():
     label = {"recording": "rig", "effects": [], "places": [], "strength": 0.0, "values": {}, "change": 1.0}
-    failed = outcome_of(label, {"failed": "it broke"})
+    failed = read_outcome(label, {"failed": "it broke"})
     assert failed.verdict == "failed"
     assert not failed.right
 

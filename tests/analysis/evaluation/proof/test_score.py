@@ -5,11 +5,11 @@ import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
 from analysis.evaluation.proof.calibration import calibration
-from analysis.evaluation.proof.detection import detection_strips, seen_from, shares_by_size, what_became_of
+from analysis.evaluation.proof.detection import classify_outcome, detection_strips, oracle_threshold, shares_by_size
 from analysis.evaluation.proof.follow_up import FollowUp
 from analysis.evaluation.proof.outcome import Concealed, Outcome
 from analysis.evaluation.proof.score import is_miss, score
-from analysis.evaluation.proof.share import pooled, share, statistic
+from analysis.evaluation.proof.share import pooled_share, share, statistic
 from analysis.evaluation.proof.wording import concealed_text, figure_text, said_text
 from analysis.figures.proof_pictures import proof_pictures
 from analysis.reports.proof_report import ProofFacts, render_proof_report
@@ -118,10 +118,10 @@ def test_a_right_name_on_another_axis_is_a_miss_where_there_are_several():
 
 def test_what_hangs_together_is_resampled_together():
     whole = [[True] * 10, [False] * 10] * 10
-    found, alone = pooled("together", whole), share("alone", [each for group in whole for each in group], bool)
+    found, alone = pooled_share("together", whole), share("alone", [each for group in whole for each in group], bool)
     assert found.value == alone.value == 0.5
     assert found.high - found.low > 2 * (alone.high - alone.low)
-    assert pooled("none", [[], []]).value is None
+    assert pooled_share("none", [[], []]).value is None
 
 
 def test_shares_of_nothing_have_no_value():
@@ -150,14 +150,14 @@ def test_each_draw_becomes_a_mark_of_its_effect():
     strips = detection_strips([RIGHT, WRONG, IN_SET, UNSEEN])
     assert [strip.effect for strip in strips] == ["coulomb_friction"]
     assert sorted(how for _, how in strips[0].draws) == ["in the set", "invisible", "missed", "right"]
-    assert what_became_of(BROKEN) == "missed"
+    assert classify_outcome(BROKEN) == "missed"
 
 
 def test_an_oracle_sees_an_effect_from_where_it_adds_three_quarters_of_the_noise():
     drawn = [outcome(adds=0.075 * 100**strength, strengths=(strength,)) for strength in (0.0, 0.2, 0.7, 1.0)]
-    assert seen_from(drawn) == pytest.approx(0.5)
-    assert seen_from([outcome(adds=9.0, strengths=(s,)) for s in (0.0, 0.5, 1.0)]) is None  # it does not grow
-    assert seen_from(drawn[:2]) is None
+    assert oracle_threshold(drawn) == pytest.approx(0.5)
+    assert oracle_threshold([outcome(adds=9.0, strengths=(s,)) for s in (0.0, 0.5, 1.0)]) is None  # it does not grow
+    assert oracle_threshold(drawn[:2]) is None
     assert detection_strips(drawn)[0].oracle == pytest.approx(0.5)
 
 

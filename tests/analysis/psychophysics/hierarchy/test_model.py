@@ -56,7 +56,7 @@ def test_the_likelihood_is_the_sum_over_trials():
         says_1 = lapse + (1 - 2 * lapse) * norm.cdf((evidence if trial.direction_shown == 1 else -evidence) - c)
         expected += np.log(says_1 if trial.answer == 1 else 1 - says_1)
     latent = np.tile([theta[15.0], theta[35.0], np.log(slope), c], (2, 1))
-    found = TrialLikelihood(answers, Family.WEIBULL).at(latent, lapse)
+    found = TrialLikelihood(answers, Family.WEIBULL).evaluate(latent, lapse)
     assert found.value.sum() == pytest.approx(expected, rel=1e-9)
 
 
@@ -64,8 +64,11 @@ def test_the_likelihood_is_the_sum_over_trials():
 def test_derivatives_of_the_likelihood(answers, family):
     likelihood, lapse, step = TrialLikelihood(answers, family), 0.03, 1e-5
     latent = np.tile([-7.0, -1.0, 8.0, 0.8, 0.1], (4, 1)) + np.random.default_rng(1).normal(0, 0.2, (4, 5))
-    found = likelihood.at(latent, lapse)
-    sides = [(likelihood.at(latent + step * e, lapse), likelihood.at(latent - step * e, lapse)) for e in np.eye(5)]
+    found = likelihood.evaluate(latent, lapse)
+    sides = [
+        (likelihood.evaluate(latent + step * e, lapse), likelihood.evaluate(latent - step * e, lapse))
+        for e in np.eye(5)
+    ]
     np.testing.assert_allclose(
         found.first, np.stack([(u.value - d.value) / (2 * step) for u, d in sides], 1), atol=1e-6
     )
@@ -76,7 +79,7 @@ def test_derivatives_of_the_likelihood(answers, family):
     traced = np.stack(
         [np.einsum("nab,nba->n", inverse, u.information - d.information) / (2 * step) for u, d in sides], 1
     )
-    np.testing.assert_allclose(likelihood.traced(latent, lapse, inverse)[0], traced, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(likelihood.trace_derivatives(latent, lapse, inverse)[0], traced, rtol=1e-4, atol=1e-6)
 
 
 def test_information_is_what_the_curvature_is_on_average(answers):
@@ -93,7 +96,7 @@ def test_information_is_what_the_curvature_is_on_average(answers):
     share = lapse + (1 - 2 * lapse) * ndtr(sensitivity(t, Family.WEIBULL)[0] - answers.side * 0.1)
     n = answers.right + answers.wrong
     expected = replace(answers, right=n * share, wrong=n * (1 - share))  # the curvature is linear in the counts
-    found = TrialLikelihood(expected, Family.WEIBULL).at(latent, lapse)
+    found = TrialLikelihood(expected, Family.WEIBULL).evaluate(latent, lapse)
     np.testing.assert_allclose(-found.second, found.information, atol=1e-9)
 
 
@@ -116,7 +119,7 @@ def test_the_marginal_likelihood_is_the_integral(answers):
     alone = replace(answers, subjects=answers.subjects[:1], **{name: getattr(answers, name)[chosen] for name in parts})
     objective = Objective(alone, Family.WEIBULL, Prior())
     numbers = objective.begin
-    value = objective.marginal.at(numbers)[0][0]
+    value = objective.marginal.evaluate(numbers)[0][0]
     rng, n = np.random.default_rng(5), 20_000
     k = 3
     theta = (
@@ -128,7 +131,7 @@ def test_the_marginal_likelihood_is_the_integral(answers):
     c = np.exp(numbers[k + 4]) * rng.standard_normal(n)
     likelihood, lapse = TrialLikelihood(alone, Family.WEIBULL), float(expit(numbers[k + 5]))
     values = [
-        likelihood.at(np.array([[*row, slope, bias]]), lapse).value[0]
+        likelihood.evaluate(np.array([[*row, slope, bias]]), lapse).value[0]
         for row, slope, bias in zip(theta[:4000], b, c, strict=False)
     ]
     plain = np.logaddexp.reduce(values) - np.log(len(values))

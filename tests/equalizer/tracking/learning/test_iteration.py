@@ -57,7 +57,7 @@ def error(device, forces, wanted) -> float:
 
 
 def repeated(device, repetition, repeats, seed):
-    """Plays once and at most `repeats` times more."""
+    """Plays once and at most `find_repeats` times more."""
     state = begin(repetition)
     for play in range(repeats + 1):
         if state.verdict is not Verdict.CONTINUE:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.anova import one_way
+from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.comparisons import compare_all
 from analysis.psychophysics.group_contrasts import contrasts
 from analysis.psychophysics.power.power_curve import judge_study
@@ -56,7 +56,7 @@ def test_the_published_verdict_is_that_of_the_pair_in_the_report():
         study = simulate_study(crowd, RULE, 8, (5, number))
         groups = {f"{f:g} Hz": list(column) for f, column in zip((5, 25, 45), study.threshold_n.T, strict=True)}
         (pair,) = [
-            pair for pair in compare_all(one_way(groups)).pairs if (pair.first, pair.second) == ("5 Hz", "45 Hz")
+            pair for pair in compare_all(one_way_anova(groups)).pairs if (pair.first, pair.second) == ("5 Hz", "45 Hz")
         ]
         found.append(judge_study(crowd, RULE, 8, (5, number)).published_found)
         assert found[-1] == (pair.p < 0.05)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from analysis.look.clock import clock
+from analysis.look.clock import check_clock
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
@@ -91,7 +91,7 @@ def test_seconds_that_are_called_milliseconds_are_noticed(tmp_path):
     assert any("1e+06 Hz is an unlikely rate" in note and "(s, called ms)" in note for note in notes)
     found, notes = read_any_recording(tmp_path / "b.csv")
     assert not any("unlikely" in note for note in notes)
-    (check,) = clock(found, [(0, len(found))])
+    (check,) = check_clock(found, [(0, len(found))])
     assert (check.level, check.seen) == (
         "fine", "The time stamps of the file were even at its import; they give 1000 Hz."
     )  # fmt: skip
