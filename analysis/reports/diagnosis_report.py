@@ -175,7 +175,7 @@ _UNMOVED = {
 """By whether the model was fitted to the recordings first."""
 
 
-def _own_numbers(found: Findings) -> Section:
+def _parameter_section(found: Findings) -> Section:
     moved = final_moved_numbers(found)
     said = retuned_sentence(moved, found.fitted) or _UNMOVED[found.fitted]
     table = retuned_table(found)

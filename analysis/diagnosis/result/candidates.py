@@ -13,7 +13,7 @@ from analysis.diagnosis.effect_words import noun_of, place_of
 from analysis.diagnosis.first_model.reduced_recordings import linear_laws
 from analysis.diagnosis.result.candidate_wording import REFINED
 from analysis.diagnosis.result.findings import BalanceErrors
-from analysis.wording import listed
+from analysis.wording import conjoin
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
 

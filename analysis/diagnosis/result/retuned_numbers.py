@@ -59,7 +59,7 @@ def retuned_sentence(moved: Sequence[MovedNumber], fitted: bool = False) -> str:
         return ""
     texts = [f"{number.name} {number.size}" if fitted else number.text for number in moved[:_LISTED]]
     more = len(moved) - _LISTED
-    said = listed([*texts, f"{more} more"] if more > 0 else texts)
+    said = conjoin([*texts, f"{more} more"] if more > 0 else texts)
     if fitted:
         return f"Fitted once more, these numbers of the first model moved by more than was left open at first: {said}."
     return f"Re-tuned beyond the calibration's standard deviation: {said}."

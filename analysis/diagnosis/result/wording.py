@@ -92,7 +92,9 @@ def answer_of(found: Findings) -> str:
     """The verdict's sentence."""
     diagnosis, device = found.diagnosis, device_of(found)
     if found.explanation.statistic is not None:
-        return impact_sentence(diagnosis, listed([effect_title(effect, device.single) for effect in diagnosis.effects]))
+        return impact_sentence(
+            diagnosis, conjoin([effect_title(effect, device.single) for effect in diagnosis.effects])
+        )
     return verdict_sentence(diagnosis, final_moved_numbers(found) if diagnosis.verdict == "parameters" else (), device)
 
 

@@ -62,7 +62,7 @@ class Proof:
     """Digests of the code that answered the bank."""
     beside: tuple[str, ...]
     """Digests of the code that answered follow-ups and controls."""
-    controls: tuple[Controlled, ...]
+    controls: tuple[ControlOutcome, ...]
     followed: tuple[FollowUp, ...]
     left_out: int
     """Cases of the second physics engine, where it is not installed."""
@@ -110,8 +110,8 @@ def _answer_cases(
     answer_bank(folder, numbers, tuple(numbers), options, on_progress)
 
 
-def _controls(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> tuple[Controlled, ...]:
-    found: tuple[Controlled, ...] = ()
+def _controls(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> tuple[ControlOutcome, ...]:
+    found: tuple[ControlOutcome, ...] = ()
     for seed in range(plan.seed, plan.seed + CONTROL_TURNS) if options.controls else ():
         there = path / "controls" / str(seed)
         found += run_controls(there, seed, options.workers, lambda done, of: on_progress("controls", done, of))

@@ -28,7 +28,7 @@ def run_controls(
     on_done: Callable[[int, int], None],
     controls: Sequence[Control] = CONTROLS,
     rig: Rig = SHORT,
-) -> tuple[Controlled, ...]:
+) -> tuple[ControlOutcome, ...]:
     """Write, diagnose and judge the controls in the folder `path`. `on_done(answered, total)`. Resumable. Raises
     StudyError."""
     folder = ProofFolder(path)

@@ -151,4 +151,4 @@ def run_injections(
         label["name"] for label, said in zip(labels, answers, strict=True) if not answers_sealed_case(label, said)
     ]:
         raise broken_seal_error(broken, folder.path)
-    return tuple(outcome_of(label, said) for label, said in zip(labels, answers, strict=True))
+    return tuple(read_outcome(label, said) for label, said in zip(labels, answers, strict=True))

@@ -10,7 +10,7 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.baselines import Inverse
 from equalizer.tracking.feedforward.comparison import baseline_inverses
-from equalizer.tracking.workspace.blended_inverse import blended_at
+from equalizer.tracking.workspace.blended_inverse import blend_at
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, blending_driver, single_model_driver
 from study.evaluation.reproduction.reproduce_playback import Driver, Playing, play_row
 from study.evaluation.reproduction.reproduction_plan import CENTRE, EDGE, Place, ReproductionPlan
@@ -57,7 +57,7 @@ def _for_the_place(where: _Placement, models: PlacedModels) -> tuple[Playing, ..
         return (Playing("model identified in the hand", single_model_driver(models.hand), hand=True),)
     if where.place_m == EDGE:
         return (
-            Playing("models of other places, blended, edge", blending_driver(blended_at(models.workspace, EDGE)), EDGE),
+            Playing("models of other places, blended, edge", blending_driver(blend_at(models.workspace, EDGE)), EDGE),
         )
     return ()
 

@@ -47,7 +47,7 @@ def play_equalized(
     plan: ReproductionPlan, models: PlacedModels, on_share: Callable[[float], None]
 ) -> EqualizedPlayback:
     """Play all rows. on_share: progress, 0 to 1."""
-    blended = blended_at(models.workspace, EDGE)
+    blended = blend_at(models.workspace, EDGE)
     interpolated, remarks = _interpolate_modes(models.workspace)
     playings = _playings(models, blended) | interpolated
     found: dict[str, PlayedResponse] = {}

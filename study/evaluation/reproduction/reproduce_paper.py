@@ -198,7 +198,7 @@ def _results(
 
 
 def _measure_device(recording: Recording) -> MeasuredDevice:
-    response = transfer_estimate((recording,))
+    response = estimate_transfer((recording,))
     return MeasuredDevice(response, find_resonances(response), coupling_onset(response))
 
 

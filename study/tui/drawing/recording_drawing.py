@@ -29,8 +29,8 @@ def time_series_lines(channel: Channel) -> Iterable[str]:
             from_y, to_y = (round((high - value) / span * (canvas.height - 1)) for value in (top, bottom))
             canvas.line((x, from_y), (x, to_y))
     first, last = canvas.lines()
-    yield f"{_channel_label(channel)} {first:{COLUMNS}} {in_unit(high, channel.unit)}".rstrip()
-    yield f"{'':{LABEL}} {last:{COLUMNS}} {in_unit(low, channel.unit)}".rstrip()
+    yield f"{_channel_label(channel)} {first:{COLUMNS}} {format_value(high, channel.unit)}".rstrip()
+    yield f"{'':{LABEL}} {last:{COLUMNS}} {format_value(low, channel.unit)}".rstrip()
 
 
 def _columns(samples: FloatArray, columns: int) -> list[tuple[float, float]]:

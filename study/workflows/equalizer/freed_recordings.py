@@ -19,10 +19,10 @@ def remove_effects(recordings: Sequence[Recording], physics: MechanicalModel, pa
     """The recordings without the effects of `physics`. path: of the mechanical model, for messages. Raises
     StudyError if it names no removable effect, or if a recording does not measure the motion."""
     if not removable_effects(physics):
-        left = "".join(f" {effect.kind}: {why_not(effect)}." for effect in physics.effects)
+        left = "".join(f" {effect.kind}: {reason_not_compensated(effect)}." for effect in physics.effects)
         raise _not_removable(f"{path.name} names no effect that can be taken off a recording.{left}")
     try:
-        return tuple(without_effects(recording, physics, excitation_band_hz(recording)) for recording in recordings)
+        return tuple(subtract_effects(recording, physics, excitation_band_hz(recording)) for recording in recordings)
     except ValueError as problem:
         raise _not_removable(f"{path.name}: {problem}.") from problem
 
