@@ -20,13 +20,7 @@ from equalizer.identification.state_space.misfit import Misfit, count_unknowns, 
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
 from equalizer.identification.state_space.refinement import FittedForm, refine
 from equalizer.identification.state_space.refusals import IdentificationRefused, require_lines
-from equalizer.identification.state_space.relaxed_poles import (
-    RelaxedFit,
-    SlowPole,
-    relax_poles,
-    slow_poles,
-    update_relaxed,
-)
+from equalizer.identification.state_space.relaxed_poles import RelaxedFit, SlowPole, relax_poles, retighten, slow_poles
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.stable_poles import Radius
 from equalizer.identification.state_space.weighted_lines import WeightedLines
@@ -150,11 +144,11 @@ def identify(
     _refuse_foreign(records, responses[0])
 
     if near is not None:
-        again = RelaxedFit(update_relaxed(near, lines, settings), bound_costs=False)
+        again = RelaxedFit(retighten(near, lines, settings), bound_costs=False)
         return _assess_model((again.candidate,), again, lines, responses[0], settings)
-    found = _search_candidates(lines, settings, records, lambda share: tell(FIRST_SEARCH * share))
+    found = _search(lines, settings, records, lambda share: tell(FIRST_SEARCH * share))
     after = relax_poles(
-        choose_best(found), lambda freer: _search_candidates(lines, freer, records, lambda _: None), lines, settings
+        choose_best(found), lambda freer: _search(lines, freer, records, lambda _: None), lines, settings
     )
     every = found if after.candidate in found else [*found, after.candidate]
     identified = _assess_model(tuple(every), after, lines, responses[0], settings)
@@ -162,7 +156,7 @@ def identify(
     return identified
 
 
-def _search_candidates(
+def _search(
     lines: WeightedLines,
     settings: IdentificationSettings,
     records: tuple[Recording, ...],

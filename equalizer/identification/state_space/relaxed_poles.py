@@ -71,7 +71,7 @@ def relax_poles(
     return RelaxedFit(again, bound_costs=False) if taken else RelaxedFit(chosen, costs)
 
 
-def update_relaxed(near: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
+def retighten(near: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
     """Refine a candidate of another estimate of the same device, and keep of its relaxed poles those still needed."""
     again = refine_candidate(near.name, near.fitted, lines, settings, near.radius)
     return _tighten_poles(again, lines, settings, float(np.max(near.radius)))
