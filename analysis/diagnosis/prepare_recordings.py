@@ -54,7 +54,7 @@ def comparable(recordings: Sequence[Recording], names: Sequence[str], short: boo
     except NothingToDiagnose as refusal:
         if not short or not all(FEW_CYCLES in problem for problem in refusal.problems):
             raise
-        few = tuple(f"{begun(problem)}." for problem in refusal.problems)
+        few = tuple(f"{begin_sentence(problem)}." for problem in refusal.problems)
     alike = keep_common_position(recordings)
     moving = _drop_constant_position(alike.recordings)
     return PreparedRecordings(moving.recordings, (*few, *alike.remarks, *moving.remarks))

@@ -135,7 +135,7 @@ def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Cal
         other = fit_modal_structure(recordings, "two-mode", on_progress)
     except StructureRefused as refusal:
         return _with_tried(plain, TriedStructure("two-mode", None, str(refusal)))
-    fit, test = roles(recordings)
+    fit, test = split_fit_and_test(recordings)
     lines = [found for part in test or fit if (found := segment_lines(*part)) is not None]
     ends = [float(bound(line.frequency_hz[line.excited])) for line in lines for bound in (np.min, np.max)]
     errors = [

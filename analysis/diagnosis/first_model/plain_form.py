@@ -16,7 +16,7 @@ from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.first_model.restore_sign import restore_sign
 from analysis.diagnosis.first_model.reversed_commands import reverse_commands
 from analysis.diagnosis.first_model.unnamed_motion import name_motion
-from analysis.wording import listed
+from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal

@@ -32,7 +32,7 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
     quantity = "force" if moved else _likely_quantity(recordings)
     if quantity == "position" and set(first.response.quantities) == {"voltage"}:
         return recordings, ""
-    names = listed(list(first.response.channels))
+    names = conjoin(list(first.response.channels))
     return tuple(_with_quantity(each, quantity) for each in recordings), (
         f"Nothing says what {names} measures: it was taken for a {quantity}, as its course suggests; if it is another, "
         "say so in the map (quantity)."

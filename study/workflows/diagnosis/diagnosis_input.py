@@ -8,7 +8,7 @@ from typing import TypeVar
 from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_alike, require_model_of
 from analysis.diagnosis.prepare_recordings import comparable, prepare
-from analysis.wording import begun
+from analysis.wording import begin_sentence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError, WrongUseError

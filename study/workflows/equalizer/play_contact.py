@@ -18,11 +18,11 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.baselines import static_gain
 from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY, TRANSIENT, Trajectory, require_rate
-from equalizer.tracking.learning.model_inverse import under_spring
+from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.lqr.contact import CausalStart, causal_start
-from equalizer.tracking.lqr.limits import ForceLimitError, require_within
+from equalizer.tracking.lqr.limits import ForceLimitError, require_under_cap
 from equalizer.tracking.lqr.padding import Padding, band_error
-from equalizer.tracking.lqr.tracking_problem import TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings
 from study.devices.opening import needs_real_time, open_device
@@ -105,7 +105,7 @@ def play_contact(plan: ContactPlan, on_progress: Callable[[float], None]) -> Con
     try:
         require_rate(transient, rate_hz)
         recording = plan.scale * transient.signal.samples[:, 0]
-        start = causal_start(augmented(model, TrackingWeights(plan.weight)), recording, REST)
+        start = causal_start(make_tracking_problem(model, TrackingWeights(plan.weight)), recording, REST)
     except ValueError as problem:
         raise _refused(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
     wanted = _along(recording, normal, len(start.basis.forces(normal)))
@@ -151,7 +151,7 @@ def _along(recording: FloatArray, normal: FloatArray, rows: int) -> FloatArray:
 
 def _beside_spring(forces: FloatArray, wanted: FloatArray, models: ModelsForPlaying) -> FloatArray:
     """Commands that leave to the spring what it does along the wanted motion."""
-    commands = under_spring(lambda _: forces, acting_spring(models), models.nearest.sample_rate_hz, models.band_hz)
+    commands = compensate_spring(lambda _: forces, acting_spring(models), models.nearest.sample_rate_hz, models.band_hz)
     return commands(wanted)
 
 
@@ -168,7 +168,7 @@ def _plain_forces(model: IdentifiedModel, wanted: FloatArray) -> FloatArray:
 
 def _within_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatArray:
     try:
-        require_within(forces, plan.cap_n, rate_hz)
+        require_under_cap(forces, plan.cap_n, rate_hz)
     except ForceLimitError as limit:
         fits = np.floor(1e3 * plan.scale * limit.peaks.largest_scale) / 1e3
         raise _refused(
