@@ -11,7 +11,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.known_physics import compensate
-from equalizer.tracking.compensation.without_effects import without_effects
+from equalizer.tracking.compensation.without_effects import subtract_effects
 from equalizer.tracking.feedforward.band_part import band_part
 
 RATE_HZ, BAND_HZ = 1000.0, (5.0, 35.0)
@@ -58,6 +58,6 @@ def test_what_is_taken_off_turns_with_the_command():
             Signal(shaken(3) * way, RATE_HZ, "force", "N", FORCES),
             Signal(shaken(4), RATE_HZ, "acceleration", "m/s^2", ACCELERATIONS),
         )
-        return without_effects(recording, physics(turned), BAND_HZ).command.samples
+        return subtract_effects(recording, physics(turned), BAND_HZ).command.samples
 
     np.testing.assert_allclose(freed(WAY, True), freed(np.ones(3), False) * WAY, atol=1e-9)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
@@ -26,6 +26,6 @@ def lab_model(tmp_path_factory) -> IdentifiedModel:
     record_device(RecordingPlan(protocol, "simulated", (0.0, 0.0, 0.0), 3, path), lambda _: None)
     recording = read_recording(path)
     settings = IdentificationSettings(draws=3, longer_horizons=(0,), record_horizons=())
-    model = identify(transfer_estimate([recording]), settings).model
+    model = identify(estimate_transfer([recording]), settings).model
     facts = {"input": "command", "feedback": recording.meta["feedback"], "hand": ["none"], "amplitude_n": 2.0}
     return replace(model, place_m=(0.0, 0.0, 0.0), provenance=facts)
