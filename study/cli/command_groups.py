@@ -1,4 +1,4 @@
-"""How `--help` lists commands: under headings, each line whole."""
+"""Grouped command list of `--help`, with each line whole."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from typer.core import TyperGroup
 
 
 class CommandGroups(TyperGroup):
-    """The heading is a command's `rich_help_panel`, so that plain help and a typer with rich show the same groups."""
+    """Groups by each command's `rich_help_panel`, so that plain help and typer with rich show the same groups."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         groups: dict[str, list[tuple[str, str]]] = {}

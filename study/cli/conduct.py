@@ -1,4 +1,4 @@
-"""What `study` and `resume` share: who sits at the device, and what is shown at the end."""
+"""Common part of `study` and `resume`: the participant, and the output at the end."""
 
 import sys
 from collections.abc import Iterator
@@ -29,6 +29,8 @@ from study.workflows.trial.requests_port import QueuedRequests
 
 @dataclass(frozen=True, slots=True)
 class Sitter:
+    """Who takes the sitting."""
+
     observer: str | None
     """Name of the simulated participant; None for a person."""
     subject: str | None
@@ -44,6 +46,7 @@ def begin(
     as_json: bool,
     model: Path | None = None,
 ) -> None:
+    """Run a new session in line mode or simulated, and print its results. Raises StudyError."""
     plan = plan_sitting(protocol_name, sitter.subject or _ask_subject(sitter), sitter.observer, seed, data, model)
     for note in plan.notes:
         typer.echo(f"Note: {note}", err=True)
@@ -56,6 +59,7 @@ def begin(
 
 
 def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS) -> None:
+    """Resume a session in line mode or simulated, and print its results. Raises StudyError."""
     folder = find_session(session, data)
     if still_open := data_folder_warning(folder.path.parent):
         typer.echo(f"Note: {still_open}", err=True)
@@ -95,7 +99,7 @@ def _say_wait(observer: str | None) -> None:
 
 
 def code_of_simulated(observer: str) -> str:
-    """Each kind of simulated participant by its own name, so that their sessions stay apart."""
+    """Participant code of a simulated participant: one per kind, so that their sessions stay separate."""
     return "".join(c for c in observer if c.isascii() and c.isalnum())[:15] + "1"
 
 

@@ -37,6 +37,7 @@ def look(
 
 
 def look_lines(found: "Overview", everything: bool) -> Iterable[str]:
+    """Checks and measurements of one recording as lines; everything: also passed checks."""
     from analysis.reports.look_report import brief
     from study.tui.text_rows import wrap_hanging
 
@@ -53,7 +54,7 @@ def look_lines(found: "Overview", everything: bool) -> Iterable[str]:
 
 
 def recording_lines(found: "Overview") -> Iterable[str]:
-    """Courses, spectra, and tables of channels and segments."""
+    """Time series, spectra, and tables of channels and segments."""
     from study.tui.drawing.recording_drawing import spectrum_lines, time_series_lines
 
     yield ""
@@ -92,7 +93,7 @@ MOST_SEGMENTS = 20
 
 
 def say(lines: Iterable[str]) -> None:
-    """Names in a file must not move the cursor."""
+    """Print lines; control characters from a file are removed."""
     from study.session.views.printable import printable_text
 
     for line in lines:

@@ -211,7 +211,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _settle_in() -> None:
-    """What streams, signals and libraries do in this process."""
+    """Configure streams, signals and libraries of this process."""
     for output in (sys.stdout, sys.stderr):
         if isinstance(output, io.TextIOWrapper):
             output.reconfigure(errors="replace")  # a terminal without braille shows question marks, not a traceback
@@ -224,7 +224,7 @@ def _settle_in() -> None:
 
 
 def say(error: StudyError) -> None:
-    """Title on a line, then what happened, what is safe, what to do."""
+    """Print an error on stderr: title, what happened, what is saved, what to do."""
     parts = [as_typed(part) for part in (error.happened, error.saved, error.do_now)]
     try:
         sys.stderr.write(f"{error.title}\n" + "".join(f"  {part}\n" for part in parts if part))
@@ -242,7 +242,7 @@ def as_typed(sentence: str) -> str:
 
 
 def _system_error(problem: OSError) -> StudyError:
-    """What has no named error: a folder without rights, a full disk, a terminal that went away."""
+    """The error for operating-system errors without a named one: missing rights, a full disk, a closed terminal."""
     where = f" ({problem.filename})" if problem.filename else ""
     return StudyError(
         "The system refused",
@@ -253,5 +253,5 @@ def _system_error(problem: OSError) -> StudyError:
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
-    """A closed terminal or a polite kill: leave like Ctrl-C, with the device released and the log closed."""
+    """SIGTERM or a closed terminal: leave like Ctrl-C, with the device released and the log closed."""
     raise KeyboardInterrupt

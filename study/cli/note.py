@@ -26,6 +26,7 @@ def note(
 
 
 def write_note(folder: "SessionFolder", text: str, adverse: bool) -> None:
+    """Write the note and say where it is."""
     from study.devices.clock import RealClock
     from study.session.watching.requests import NoteAsked
     from study.workflows.views.take_note import take_note

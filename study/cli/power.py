@@ -73,7 +73,7 @@ def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "
 
 
 def sample_sizes(text: str) -> tuple[int, ...]:
-    """5:40:5 as 5, 10 ... 40. Raises WrongUseError."""
+    """Sample sizes of "5:40:5": 5, 10 ... 40. Raises WrongUseError."""
     parts = [int(part) for part in text.split(":")] if re.fullmatch(r"\d{1,4}(:\d{1,4}){0,2}", text) else []
     low = parts[0] if parts else 0
     high = parts[1] if len(parts) > 1 else low

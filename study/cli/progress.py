@@ -1,4 +1,4 @@
-"""Progress on stderr: bars on a terminal, nothing that would spoil a log where there is none."""
+"""Progress on stderr: bars on a terminal, nothing in a log."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -21,7 +21,8 @@ from study.session.views.views import Question
 
 @contextmanager
 def answer_count(title: str) -> Iterator[Callable[[Question], None]]:
-    """Which run and trial a simulated participant is at. The length of a staircase is not known beforehand."""
+    """Callback with the current run and trial of a simulated participant; the length of a staircase is unknown
+    beforehand."""
     columns = (TextColumn("{task.description}"), TextColumn("{task.fields[where]}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(file=sys.stderr), transient=True) as progress:
         task = progress.add_task(title, where="")
@@ -35,7 +36,7 @@ def answer_count(title: str) -> Iterator[Callable[[Question], None]]:
 
 @contextmanager
 def bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
-    """Done of total; what is yielded says how much is done."""
+    """Progress bar; the yielded function takes how much is done."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(file=sys.stderr)) as progress:
         task = progress.add_task(title, total=total)
@@ -44,7 +45,7 @@ def bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
 
 @contextmanager
 def late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
-    """As `bar`, but nothing is drawn before the first progress: something may have to be read or asked first."""
+    """As `bar`, but drawn only at the first progress, because something may have to be read or asked first."""
     with ExitStack() as stack:
 
         @cache
@@ -56,7 +57,7 @@ def late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
 
 @contextmanager
 def steps(title: str) -> Iterator[Callable[[str, float], None]]:
-    """What is yielded takes what is being done now, and the share of all that is done. Quiet without a terminal."""
+    """The yielded function takes the current step and the share that is done. Silent without a terminal."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     quiet = not sys.stderr.isatty()
     with ExitStack() as stack:

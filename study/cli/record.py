@@ -47,7 +47,7 @@ def record(
 
 
 def announce(notice: str) -> None:
-    """Say it, and wait for Enter where there is a terminal."""
+    """Print the notice, and wait for Enter if there is a keyboard."""
     from study.cli.screen import has_keys
 
     typer.echo(notice, err=True)

@@ -1,4 +1,4 @@
-"""How results reach stdout: lines for a person, one JSON document for a program. Talk goes to stderr."""
+"""Output of results: lines for a person or one JSON document on stdout; messages on stderr."""
 
 import json
 from dataclasses import asdict
@@ -12,6 +12,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Results as one JSON do
 
 
 def show(written: WrittenAnalysis, as_json: bool) -> None:
+    """Print the results of a session or analysis."""
     if as_json:
         document = {
             "thresholds": [asdict(threshold) for threshold in written.thresholds],

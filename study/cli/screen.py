@@ -1,4 +1,4 @@
-"""The screen of `study` and `resume`: started from here, and what it ends with is said here."""
+"""Start the screen of `study` and `resume`, and print the results when it ends."""
 
 import os
 import shutil
@@ -28,17 +28,17 @@ def has_screen() -> bool:
 
 
 def has_keys() -> bool:
-    """Whether there may be a keyboard."""
+    """Whether standard input may be a keyboard."""
     return sys.stdin is not None and sys.stdin.isatty()
 
 
 def columns() -> int | None:
-    """Of the terminal that results go to; None where they go to a file or a pipe, whose lines are not wrapped."""
+    """Width of the terminal for results; None for a file or pipe, whose lines are not wrapped."""
     return shutil.get_terminal_size().columns if sys.stdout is not None and sys.stdout.isatty() else None
 
 
 def open_screen(start: "AppStart", as_json: bool) -> None:
-    """Raises StudyError for a sitting that was not finished."""
+    """Run the screen. Raises StudyError for an unfinished sitting."""
     from study.tui.app.app import HapteqApp
 
     app = HapteqApp(start)

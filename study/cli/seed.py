@@ -1,13 +1,13 @@
-"""The seed of a command: as large as every file of ours holds it."""
+"""The `--seed` option: limited to what all our files can hold."""
 
 from study.errors import WrongUseError
 
 LARGEST_BITS = 128
-"""`study.store.disk.strict_json` reads whole numbers of up to 40 digits."""
+"""`study.store.disk.strict_json` reads integers of up to 40 digits."""
 
 
 def check_seed(seed: int | None) -> int | None:
-    """Of an option. Raises WrongUseError."""
+    """Option callback: the seed, unchanged. Raises WrongUseError if it is too large."""
     if seed is not None and seed.bit_length() > LARGEST_BITS:
         raise WrongUseError(
             "This seed is too large",

@@ -73,4 +73,5 @@ def study(
 
 
 def protocol_or_default(protocol: str | None, model: Path | None) -> str:
+    """The protocol's name; the default depends on whether stimuli are equalized."""
     return protocol or ("direction_threshold" if model is None else "equalized_threshold")

@@ -30,9 +30,9 @@ def rms(samples: FloatArray) -> float:
     return float(np.sqrt(np.mean((samples - samples.mean()) ** 2)))
 
 
-def level_of(moved: AxisMotion, strength: float) -> float:
+def level_of(motion: AxisMotion, strength: float) -> float:
     """Rms of the injected force: log-uniform from a fiftieth of the command's rms to all of it."""
-    return rms(moved.command) * float(0.02 * 50.0**strength)
+    return rms(motion.command) * float(0.02 * 50.0**strength)
 
 
 def _shift_later(samples: FloatArray, by: float) -> FloatArray:
@@ -40,43 +40,43 @@ def _shift_later(samples: FloatArray, by: float) -> FloatArray:
     return np.asarray(np.interp(at - by, at, samples))
 
 
-def _undo_cubic_gain(moved: AxisMotion, of: Numbers) -> FloatArray:
+def _undo_cubic_gain(motion: AxisMotion, numbers: Numbers) -> FloatArray:
     """Command u' with u' + cubic u'^3 = u (Newton iteration)."""
-    found = moved.command.copy()
+    found = motion.command.copy()
     for _ in range(60):
-        found -= (found + of["cubic"] * found**3 - moved.command) / (1 + 3 * of["cubic"] * found**2)
+        found -= (found + numbers["cubic"] * found**3 - motion.command) / (1 + 3 * numbers["cubic"] * found**2)
     return found
 
 
-def _draw_limit(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
-    limit = float(np.quantile(np.abs(moved.command), 0.98))
+def _draw_limit(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    limit = float(np.quantile(np.abs(motion.command), 0.98))
     return {"limit": limit, "more": float(0.05 * 20.0**strength)}
 
 
-def _undo_saturation(moved: AxisMotion, of: Numbers) -> FloatArray:
+def _undo_saturation(motion: AxisMotion, numbers: Numbers) -> FloatArray:
     """A larger command wherever the force was at its limit."""
-    over = np.abs(moved.command) >= 0.97 * of["limit"]
-    return np.asarray(np.where(over, moved.command * (1 + of["more"]), moved.command))
+    over = np.abs(motion.command) >= 0.97 * numbers["limit"]
+    return np.asarray(np.where(over, motion.command * (1 + numbers["more"]), motion.command))
 
 
-def _draw_rate(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
-    steps = np.abs(np.diff(moved.command))
+def _draw_rate(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    steps = np.abs(np.diff(motion.command))
     top = float(np.quantile(steps[steps > 0], 0.98)) if steps.any() else 0.0
-    return {"rate": top * moved.rate_hz, "from": 1.0 - 0.05 * 14.0**strength}
+    return {"rate": top * motion.rate_hz, "from": 1.0 - 0.05 * 14.0**strength}
 
 
-def _undo_slew_limit(moved: AxisMotion, of: Numbers) -> FloatArray:
+def _undo_slew_limit(motion: AxisMotion, numbers: Numbers) -> FloatArray:
     """A command that arrives at once wherever the force changed at about its highest rate."""
-    steps = np.diff(moved.command)
-    fast = np.abs(steps) * moved.rate_hz >= of["from"] * of["rate"]
+    steps = np.diff(motion.command)
+    fast = np.abs(steps) * motion.rate_hz >= numbers["from"] * numbers["rate"]
     goes_on = fast[1:] & fast[:-1] & (steps[1:] * steps[:-1] > 0)
-    found = moved.command.copy()
+    found = motion.command.copy()
     for k in np.flatnonzero(goes_on)[::-1]:
         found[k + 1] = found[k + 2]
     return found
 
 
-def _gain(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+def _gain(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     return {"gain": float(1 + random.choice((-0.5, 1.0)) * 0.02 * 40.0**strength)}
 
 
@@ -88,49 +88,51 @@ def _middle_turn(samples: FloatArray, rate_hz: float) -> float:
 
 
 DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
-    ForceInjection("force_gain", _gain, lambda moved, of: moved.command / of["gain"], actuator=True),
+    ForceInjection("force_gain", _gain, lambda motion, numbers: motion.command / numbers["gain"], actuator=True),
     ForceInjection(
         "force_offset",
-        lambda moved, s, r: {"offset": float(r.choice((-1.0, 1.0))) * level_of(moved, s)},
-        lambda moved, of: moved.command - of["offset"],
+        lambda motion, s, r: {"offset": float(r.choice((-1.0, 1.0))) * level_of(motion, s)},
+        lambda motion, numbers: motion.command - numbers["offset"],
         actuator=True,
     ),
     ForceInjection(
         "transport_delay",
-        lambda moved, s, r: {"delay": max(0.3 * 0.02 * 50.0**s / _middle_turn(moved.command, moved.rate_hz), 1e-9)},
-        lambda moved, of: _shift_later(moved.command, -of["delay"] * moved.rate_hz),
+        lambda motion, s, r: {"delay": max(0.3 * 0.02 * 50.0**s / _middle_turn(motion.command, motion.rate_hz), 1e-9)},
+        lambda motion, numbers: _shift_later(motion.command, -numbers["delay"] * motion.rate_hz),
         actuator=True,
     ),
     ForceInjection(
         "amplifier_lag",
-        lambda moved, s, r: {"time_constant": 0.3 * 0.02 * 50.0**s / _middle_turn(moved.command, moved.rate_hz)},
-        lambda moved, of: moved.command + of["time_constant"] * np.gradient(moved.command) * moved.rate_hz,
+        lambda motion, s, r: {"time_constant": 0.3 * 0.02 * 50.0**s / _middle_turn(motion.command, motion.rate_hz)},
+        lambda motion, numbers: (
+            motion.command + numbers["time_constant"] * np.gradient(motion.command) * motion.rate_hz
+        ),
         actuator=True,
     ),
     ForceInjection("force_saturation", _draw_limit, _undo_saturation, actuator=True),
     ForceInjection("slew_limit", _draw_rate, _undo_slew_limit, actuator=True),
     ForceInjection(
         "force_quantization",
-        lambda moved, s, r: {"step": level_of(moved, 0.3 + 0.7 * s)},
-        lambda moved, of: of["step"] * np.round(moved.command / of["step"]),
+        lambda motion, s, r: {"step": level_of(motion, 0.3 + 0.7 * s)},
+        lambda motion, numbers: numbers["step"] * np.round(motion.command / numbers["step"]),
         actuator=True,
     ),
     ForceInjection(
         "force_deadband",
-        lambda moved, s, r: {"width": 0.5 * level_of(moved, s)},
-        lambda moved, of: moved.command + of["width"] * np.sign(moved.command),
+        lambda motion, s, r: {"width": 0.5 * level_of(motion, s)},
+        lambda motion, numbers: motion.command + numbers["width"] * np.sign(motion.command),
         actuator=True,
     ),
     ForceInjection(
         "actuator_cubic",
-        lambda moved, s, r: {"cubic": 0.02 * 30.0**s / float(np.abs(moved.command).max()) ** 2},
+        lambda motion, s, r: {"cubic": 0.02 * 30.0**s / float(np.abs(motion.command).max()) ** 2},
         _undo_cubic_gain,
         actuator=True,
     ),
     ForceInjection(
         "force_gain_drift",
-        lambda moved, s, r: {"change": float(r.choice((-0.5, 1.0))) * 0.05 * 20.0**s},
-        lambda moved, of: moved.command / (1 + of["change"] * moved.share_of_time),
+        lambda motion, s, r: {"change": float(r.choice((-0.5, 1.0))) * 0.05 * 20.0**s},
+        lambda motion, numbers: motion.command / (1 + numbers["change"] * motion.share_of_time),
         actuator=True,
     ),
 )

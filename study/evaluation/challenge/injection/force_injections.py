@@ -28,79 +28,79 @@ SHARP = 0.05
 def _scaled_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> ForceInjection:
     """Injection of a force with one parameter, which scales a given shape."""
 
-    def draw(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
-        return {"size": level_of(moved, strength) / max(rms(shape(moved)), 1e-300)}
+    def draw(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+        return {"size": level_of(motion, strength) / max(rms(shape(motion)), 1e-300)}
 
-    return ForceInjection(name, draw, lambda moved, of: moved.command + of["size"] * shape(moved))
-
-
-def _sign(moved: AxisMotion) -> FloatArray:
-    return np.asarray(np.tanh(moved.v / max(SHARP * float(np.sqrt(np.mean(moved.v**2))), 1e-300)))
+    return ForceInjection(name, draw, lambda motion, numbers: motion.command + numbers["size"] * shape(motion))
 
 
-def _centre_position(moved: AxisMotion) -> FloatArray:
-    return np.asarray(moved.q - 0.5 * (moved.q.min() + moved.q.max()))
+def _sign(motion: AxisMotion) -> FloatArray:
+    return np.asarray(np.tanh(motion.v / max(SHARP * float(np.sqrt(np.mean(motion.v**2))), 1e-300)))
 
 
-def _draw_cogging(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
-    pitch = float(np.ptp(moved.q)) * float(random.uniform(0.03, 0.3))
-    return {"amplitude": 1.4 * level_of(moved, strength), "pitch": pitch, "turn": float(random.random())}
+def _centre_position(motion: AxisMotion) -> FloatArray:
+    return np.asarray(motion.q - 0.5 * (motion.q.min() + motion.q.max()))
 
 
-def _add_cogging(moved: AxisMotion, of: Numbers) -> FloatArray:
-    return moved.command + of["amplitude"] * np.sin(2 * np.pi * (moved.q / of["pitch"] + of["turn"]))
+def _draw_cogging(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    pitch = float(np.ptp(motion.q)) * float(random.uniform(0.03, 0.3))
+    return {"amplitude": 1.4 * level_of(motion, strength), "pitch": pitch, "turn": float(random.random())}
 
 
-def _travel_beyond(moved: AxisMotion, position: float) -> FloatArray:
-    far = _centre_position(moved)
+def _add_cogging(motion: AxisMotion, numbers: Numbers) -> FloatArray:
+    return motion.command + numbers["amplitude"] * np.sin(2 * np.pi * (motion.q / numbers["pitch"] + numbers["turn"]))
+
+
+def _travel_beyond(motion: AxisMotion, position: float) -> FloatArray:
+    far = _centre_position(motion)
     return np.asarray(np.sign(far) * np.maximum(np.abs(far) - position, 0.0))
 
 
-def _draw_stop(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
-    position = float(random.uniform(0.4, 0.9)) * float(np.abs(_centre_position(moved)).max())
-    stiffness = level_of(moved, strength) / max(rms(_travel_beyond(moved, position)), 1e-300)
+def _draw_stop(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    position = float(random.uniform(0.4, 0.9)) * float(np.abs(_centre_position(motion)).max())
+    stiffness = level_of(motion, strength) / max(rms(_travel_beyond(motion, position)), 1e-300)
     return {"position": position, "stiffness": stiffness}
 
 
-def _draw_asymmetric(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
-    level, share = 1.2 * level_of(moved, strength), float(random.uniform(0.2, 0.6))
+def _draw_asymmetric(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    level, share = 1.2 * level_of(motion, strength), float(random.uniform(0.2, 0.6))
     return {"level_positive": level * (1 + share), "level_negative": level * (1 - share)}
 
 
-def _add_asymmetric_friction(moved: AxisMotion, of: Numbers) -> FloatArray:
-    sign = _sign(moved)
-    return moved.command + np.where(sign > 0, of["level_positive"], of["level_negative"]) * sign
+def _add_asymmetric_friction(motion: AxisMotion, numbers: Numbers) -> FloatArray:
+    sign = _sign(motion)
+    return motion.command + np.where(sign > 0, numbers["level_positive"], numbers["level_negative"]) * sign
 
 
-def _draw_bristles(moved: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
-    give = float(np.ptp(moved.q)) * float(random.uniform(0.01, 0.15))
-    level = 1.2 * level_of(moved, strength)
+def _draw_bristles(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    give = float(np.ptp(motion.q)) * float(random.uniform(0.01, 0.15))
+    level = 1.2 * level_of(motion, strength)
     return {"level": level, "stiffness": level / give}
 
 
-def _add_bristles(moved: AxisMotion, of: Numbers) -> FloatArray:
+def _add_bristles(motion: AxisMotion, numbers: Numbers) -> FloatArray:
     """Elastoplastic friction: a spring that slides at the level."""
-    force, found = 0.0, np.empty(len(moved.q))
-    for k, way in enumerate(np.diff(moved.q, prepend=moved.q[0])):
-        force = min(max(force + of["stiffness"] * way, -of["level"]), of["level"])
+    force, found = 0.0, np.empty(len(motion.q))
+    for k, way in enumerate(np.diff(motion.q, prepend=motion.q[0])):
+        force = min(max(force + numbers["stiffness"] * way, -numbers["level"]), numbers["level"])
         found[k] = force
-    return moved.command + found
+    return motion.command + found
 
 
 FORCE_INJECTIONS: tuple[ForceInjection, ...] = (
-    _scaled_shape("added_mass", lambda moved: moved.a),
-    _scaled_shape("viscous_damping", lambda moved: moved.v),
-    _scaled_shape("quadratic_damping", lambda moved: moved.v * np.abs(moved.v)),
+    _scaled_shape("added_mass", lambda motion: motion.a),
+    _scaled_shape("viscous_damping", lambda motion: motion.v),
+    _scaled_shape("quadratic_damping", lambda motion: motion.v * np.abs(motion.v)),
     _scaled_shape("coulomb_friction", _sign),
     ForceInjection("asymmetric_friction", _draw_asymmetric, _add_asymmetric_friction),
     ForceInjection("presliding_hysteresis", _draw_bristles, _add_bristles),
     _scaled_shape("added_stiffness", _centre_position),
-    _scaled_shape("hardening_stiffness", lambda moved: _centre_position(moved) ** 3),
+    _scaled_shape("hardening_stiffness", lambda motion: _centre_position(motion) ** 3),
     ForceInjection("cogging", _draw_cogging, _add_cogging),
     ForceInjection(
         "end_stop",
         _draw_stop,
-        lambda moved, of: moved.command + of["stiffness"] * _travel_beyond(moved, of["position"]),
+        lambda motion, numbers: motion.command + numbers["stiffness"] * _travel_beyond(motion, numbers["position"]),
     ),
     *DRIVE_INJECTIONS,
 )

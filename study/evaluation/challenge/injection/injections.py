@@ -163,11 +163,11 @@ def _inject_force(
     """Inject a fault of mechanism or drive at a randomly drawn axis."""
     samples = recording.command.samples.copy()
     axis = int(random.integers(samples.shape[1]))
-    moved = axis_motion(recording, axis)
-    if moved is None:
+    motion = axis_motion(recording, axis)
+    if motion is None:
         raise ValueError(f"{wanted.effect} needs a motion along command {axis + 1}")
-    values = wanted.draw(moved, strength, random)
-    samples[:, axis] = wanted.command(moved, values)
+    values = wanted.draw(motion, strength, random)
+    samples[:, axis] = wanted.command(motion, values)
     change = np.sqrt(np.mean((samples - recording.command.samples) ** 2, axis=0))
     command = replace(recording.command, samples=samples)
     return Injected(replace(recording, command=command), wanted.effect, values, strength, np.asarray(change))
