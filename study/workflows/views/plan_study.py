@@ -45,11 +45,11 @@ def planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[
     begun = _begun(data, simulated)
     if protocol is not None:
         chosen = read_study_protocol(protocol, data).protocol
-        return (_planned(data, chosen, [each for each in begun if each.protocol == chosen.name], simulated),)
+        return (_plan_from_sessions(data, chosen, [each for each in begun if each.protocol == chosen.name], simulated),)
     found = []
     for name, sessions in groupby(sorted(begun, key=lambda each: each.protocol), key=lambda each: each.protocol):
         kept = list(sessions)
-        found.append(_planned(data, _latest_protocol(name, kept), kept, simulated))
+        found.append(_plan_from_sessions(data, _latest_protocol(name, kept), kept, simulated))
     if not found:
         raise WrongUseError(
             "There is no study to plan",
@@ -68,7 +68,7 @@ def _begun(data: Path, simulated: bool) -> list[_Begun]:
     return found
 
 
-def _planned(data: Path, protocol: StudyProtocol, begun: Sequence[_Begun], simulated: bool) -> PlannedStudy:
+def _plan_from_sessions(data: Path, protocol: StudyProtocol, begun: Sequence[_Begun], simulated: bool) -> PlannedStudy:
     people: dict[str, list[_Begun]] = {}
     for each in sorted(begun, key=_by_number):
         people.setdefault(each.folder.subject, []).append(each)
@@ -174,8 +174,10 @@ def lines(study: PlannedStudy) -> list[str]:
     done, begun, out = (plan.count(each) for each in ("done", "begun", "left out"))
     size = f" of {plan.planned} planned" if plan.planned else ""
     found = [f"{plan.protocol}: {done} done{size}, {begun} begun, {out} left out"]
-    found += _named("to resume", [who.code for who in plan.participants if who.progress == "begun"])
-    found += _named("left out", [f"{who.code} ({who.why})" for who in plan.participants if who.progress == "left out"])
+    found += _titled_list("to resume", [who.code for who in plan.participants if who.progress == "begun"])
+    found += _titled_list(
+        "left out", [f"{who.code} ({who.why})" for who in plan.participants if who.progress == "left out"]
+    )
     if plan.planned and plan.planned % plan.balanced_sizes:
         found.append(
             f"{plan.planned} participants do not balance the orders: multiples of {plan.balanced_sizes} would."
@@ -192,7 +194,7 @@ def lines(study: PlannedStudy) -> list[str]:
     return [*found, *study.remarks]
 
 
-def _named(title: str, codes: Sequence[str]) -> list[str]:
+def _titled_list(title: str, codes: Sequence[str]) -> list[str]:
     return [f"{title}: {', '.join(codes)}"] if codes else []
 
 

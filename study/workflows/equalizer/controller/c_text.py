@@ -41,12 +41,12 @@ def check_text(cases: ControllerCases) -> str:
 
 def c_table(name: str, values: npt.ArrayLike) -> str:
     numbers = np.asarray(values, dtype=np.float64)
-    return f"static const double {name}{''.join(f'[{size}]' for size in numbers.shape)} = {_braced(numbers)};"
+    return f"static const double {name}{''.join(f'[{size}]' for size in numbers.shape)} = {_c_initializer(numbers)};"
 
 
-def _braced(numbers: FloatArray) -> str:
+def _c_initializer(numbers: FloatArray) -> str:
     if numbers.ndim > 1:
-        return "{" + ",\n".join(_braced(row) for row in numbers) + "}"
+        return "{" + ",\n".join(_c_initializer(row) for row in numbers) + "}"
     texts = [repr(value) for value in numbers.tolist()]
     lines = [", ".join(texts[start : start + A_LINE]) for start in range(0, len(texts), A_LINE)]
     return "{" + ",\n".join(lines) + "}"
@@ -61,8 +61,8 @@ def _sizes(controller: RealtimeController) -> str:
         "STATES": str(problem.order),
         "INPUTS": str(problem.inputs),
         "OUTPUTS": str(problem.outputs),
-        "DEPTH": str(_filled(problem.step).shape[0]),
-        "WIDTH": str(_filled(problem.step).shape[1]),
+        "DEPTH": str(_pad_to_groups(problem.step).shape[0]),
+        "WIDTH": str(_pad_to_groups(problem.step).shape[1]),
         "ROWS": f"{len(controller.transient)}L",
         "DIRECTIONS": str(controller.transient.g.shape[2]),
         "PREVIEW": str(len(tracker)),
@@ -79,7 +79,7 @@ def _tables(controller: RealtimeController) -> str:
     problem, split, tracker = controller.problem, controller.split, controller.tracker
     powers = range((split.order + 1) // 2, split.order + 1)
     tables = [
-        c_table("hapteq_step", _filled(problem.step)),
+        c_table("hapteq_step", _pad_to_groups(problem.step)),
         c_table("hapteq_gains", controller.transient.K),
         c_table("hapteq_basis", controller.transient.g),
         c_table("hapteq_gain", tracker.K),
@@ -93,7 +93,7 @@ def _tables(controller: RealtimeController) -> str:
     return "\n".join(tables)
 
 
-def _filled(matrix: FloatArray) -> FloatArray:
+def _pad_to_groups(matrix: FloatArray) -> FloatArray:
     """Rows and columns to whole groups, with zeros."""
     return np.pad(matrix, [(0, -size % GROUP) for size in matrix.shape])
 

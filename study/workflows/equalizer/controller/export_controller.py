@@ -50,15 +50,15 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
     """Computes and writes. Raises StudyError; nothing is written then."""
     require_free(plan.out, title=TITLE, kind="controllers")
     if plan.settings.cap_n > STRONGEST_N:
-        raise _refused(f"The cap is {plan.settings.cap_n:g} N; the strongest device gives {STRONGEST_N:g} N.", TRY)
+        raise _refusal(f"The cap is {plan.settings.cap_n:g} N; the strongest device gives {STRONGEST_N:g} N.", TRY)
     model = read_identified_model(plan.model)
     try:
         _require_plain(model)
-        wanted = None if plan.transient is None else _wanted(plan.transient, model)
+        wanted = None if plan.transient is None else _read_wanted(plan.transient, model)
         controller = realtime_controller(model, wanted, plan.settings)
         cases = controller_cases(controller)
     except (TrackingError, TableError) as problem:
-        raise _refused(_sentence(problem), "Correct what it says, or choose another model.") from problem
+        raise _refusal(_sentence(problem), "Correct what it says, or choose another model.") from problem
     exported = ExportedController(plan, model, controller)
     sources = (header_text(controller, _origin(plan, model)), example_text(), check_text(cases))
     plan.out.mkdir()
@@ -70,11 +70,11 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
 def controller_settings(weight: float, preview_s: float, cap_n: float) -> RealtimeSettings:
     """Raises StudyError for what no loop can run."""
     if not preview_s <= LONGEST_PREVIEW_S:
-        raise _refused(f"A preview of {preview_s:g} s was asked for; {LONGEST_PREVIEW_S:g} s is the longest.", TRY)
+        raise _refusal(f"A preview of {preview_s:g} s was asked for; {LONGEST_PREVIEW_S:g} s is the longest.", TRY)
     try:
         return RealtimeSettings(weight, preview_s, cap_n)
     except TrackingError as problem:
-        raise _refused(_sentence(problem), TRY) from problem
+        raise _refusal(_sentence(problem), TRY) from problem
 
 
 def exported_summary(exported: ExportedController) -> dict[str, Any]:
@@ -115,7 +115,7 @@ def exported_lines(exported: ExportedController) -> tuple[str, ...]:
     )
 
 
-def _wanted(path: Path, model: IdentifiedModel) -> FloatArray:
+def _read_wanted(path: Path, model: IdentifiedModel) -> FloatArray:
     table = read_trajectory(path)
     if table.kind is not TRAJECTORY:
         raise TableError((f"{path.name} holds forces; a transient is a table of accelerations",))
@@ -146,5 +146,5 @@ def _sentence(problem: Exception) -> str:
     return f"{str(problem)[:1].upper()}{str(problem)[1:]}."
 
 
-def _refused(happened: str, do_now: str) -> StudyError:
+def _refusal(happened: str, do_now: str) -> StudyError:
     return StudyError(TITLE, happened, do_now, saved="Nothing was written.")
