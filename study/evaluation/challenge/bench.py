@@ -26,6 +26,7 @@ class Oscillators:
     def and_one(
         self, frequency_hz: float, mass_kg: float, damping_ratio: float, direction: FloatArray
     ) -> "Oscillators":
+        """With one more oscillator."""
         return Oscillators(
             np.append(self.frequency_hz, frequency_hz),
             np.append(self.mass_kg, mass_kg),
@@ -36,6 +37,8 @@ class Oscillators:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bench:
+    """Matrices of the handle on its ground, and the oscillators attached to it."""
+
     mass: FloatArray
     """(3, 3), kg, at the handle"""
     damping: FloatArray

@@ -43,6 +43,8 @@ ONE_ROW = (
 
 @dataclass(frozen=True, slots=True)
 class Draw:
+    """What was drawn for one number of the bank."""
+
     number: int
     seed: int
     kind: Kind

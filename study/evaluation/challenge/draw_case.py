@@ -54,6 +54,8 @@ noise seed."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
+    """A recording with a model that lacks something, and the truth."""
+
     recording: Recording
     model: MechanicalModel
     truth: tuple[Truth, ...]

@@ -9,8 +9,10 @@ from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.rig import WHOLE, Rig
 
 RATE_HZ = 1000.0
+"""Sample rate of all challenge recordings."""
 AXES = ("x", "y", "z")
 LEVELS_N = (0.5, 1.5, 3.0)
+"""Peaks of the multisines."""
 PERIOD, PERIODS, TEST_PERIODS = 2000, 4, 2
 REST = 500
 FIRST_LINE, LAST_LINE = 3, 479
@@ -21,6 +23,8 @@ SLOW_N, SLOW_HZ, SLOW_SAMPLES, SLOW_FADE = 1.6, (0.9, 1.3, 2.1), 4000, 500
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrivePlan:
+    """Commands of a recording and their segments."""
+
     command: FloatArray
     """(samples, 3), N"""
     segments: tuple[Segment, ...]

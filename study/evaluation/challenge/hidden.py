@@ -40,9 +40,11 @@ class EffectContext:
         return float(np.exp(self.random.uniform(np.log(lowest), np.log(highest))))
 
     def sign(self) -> float:
+        """+1 or -1 with equal probability."""
         return float(self.random.choice((-1.0, 1.0)))
 
     def direction(self) -> FloatArray:
+        """Unit vector (3,), uniformly distributed."""
         drawn = self.random.normal(size=3)
         unit: FloatArray = drawn / np.linalg.norm(drawn)
         return unit
@@ -50,6 +52,8 @@ class EffectContext:
 
 @dataclass(frozen=True, slots=True)
 class HiddenEffect:
+    """One effect that can be concealed."""
+
     name: str
     """Name in the vocabulary; a name of its own for a decoy."""
     place: Place
@@ -69,6 +73,7 @@ def with_cells(table: FloatArray, axis: int, cells: Mapping[int, float]) -> Floa
 
 
 def with_forces(device: Device, axis: int, cells: Mapping[int, float]) -> Device:
+    """The device with these columns of position- and velocity-dependent forces set on one axis."""
     return replace(device, forces=with_cells(device.forces, axis, cells))
 
 

@@ -22,11 +22,15 @@ JUST_NOW_S = 60.0
 CATCH_TRIALS, LAPSES = 5, 2
 """This many wrong ones among the last five catch trials: an attentive participant misses none at full level."""
 PRESENTATIONS, VOIDS = 10, 3
+"""This many void ones among the last ten presentations raise an alarm."""
 NEAR = 0.8
+"""Fraction of a limit (time, dose) at which the experimenter is warned."""
 
 
 @dataclass(frozen=True, slots=True)
 class Situation:
+    """Everything that alarms depend on, at one moment."""
+
     watched: Watched
     live: Live | None
     problem: str

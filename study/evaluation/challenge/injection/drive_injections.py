@@ -14,6 +14,8 @@ Numbers = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class ForceInjection:
+    """A fault that is injected by altering the command."""
+
     effect: str
     """Name in the vocabulary, or a new name in its style."""
     draw: Callable[[AxisMotion, float, np.random.Generator], dict[str, float]]
@@ -27,6 +29,7 @@ class ForceInjection:
 
 
 def rms(samples: FloatArray) -> float:
+    """Root mean square."""
     return float(np.sqrt(np.mean((samples - samples.mean()) ** 2)))
 
 

@@ -61,6 +61,8 @@ Spoil = Callable[[FloatArray, float, Mapping[str, float], np.random.Generator], 
 
 @dataclass(frozen=True, slots=True)
 class Injection:
+    """A fault of sensor, clock or line that can be injected."""
+
     effect: str
     """Name in the vocabulary."""
     draw: Draw
@@ -71,6 +73,8 @@ class Injection:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Injected:
+    """A recording with its injected fault."""
+
     recording: Recording
     effect: str
     """Empty where nothing was injected."""

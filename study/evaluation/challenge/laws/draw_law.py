@@ -40,6 +40,8 @@ FRESH_N, FRESH_PERIOD, FRESH_PERIODS = 2.0, 2000, 2
 
 @dataclass(frozen=True, slots=True)
 class LawDraw:
+    """What was drawn for one number of the bank of laws."""
+
     number: int
     seed: int
     kind: LawBankKind
@@ -66,6 +68,8 @@ class Fresh:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LawCase:
+    """A case with a law, its label, and fresh test motions."""
+
     case: Case
     truth: LawTruth | None
     fresh: tuple[Fresh, ...]

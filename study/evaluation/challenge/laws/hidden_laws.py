@@ -29,6 +29,8 @@ class Sizes:
 
 @dataclass(frozen=True, slots=True)
 class LawKind:
+    """One family of laws, and how its numbers are drawn."""
+
     name: str
     formula: str
     """For a reader; k is the size, a and b parameters, s a sign, x along its axis, y along another."""
