@@ -57,7 +57,7 @@ MUTATIONS = {
         govern, "/ settings[LET_GO_TICKS]", "/ (2.0 * settings[LET_GO_TICKS])", "fade: longer",
     ),
     "the release turns the force round": (
-        govern, "left = 1.0 - _risen(", "left = _risen(", "",
+        govern, "left = 1.0 - _fade_share(", "left = _fade_share(", "",
     ),
     "the stimulus' fade turns round": (
         govern, "    return left * state[STIMULUS_GAIN], left * state[SPRING_GAIN]",
