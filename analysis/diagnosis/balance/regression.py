@@ -1,8 +1,8 @@
 """Products of all laws' columns, block by block, from which any sum of laws is fitted and tested without new passes.
 
 The base of each balance is mass, damping and stiffness along every measured motion, linear dynamics of a higher order
-where there are any (`BaseTerms`), and a constant. Errors are those of the force within the band. A fold's error is that of
-numbers fitted to all other folds (Stone, J. R. Stat. Soc. B 36:111, 1974).
+where there are any (`BaseTerms`), and a constant. Errors are those of the force within the band. A fold's error is that
+of numbers fitted to all other folds (Stone, J. R. Stat. Soc. B 36:111, 1974).
 """
 
 from collections.abc import Sequence
