@@ -10,7 +10,7 @@ from analysis.diagnosis.diagnose import DiagnosisSettings
 def test_units_are_those_of_the_recording_as_it_was_given(diagnosed):
     recording = diagnosed.recorded(1)
     forces = replace(recording, response=replace(recording.response, quantity="force", unit="N"))
-    measure = SimpleNamespace(records=(SimpleNamespace(recording=forces),), shortened=lambda: None)
+    measure = SimpleNamespace(records=(SimpleNamespace(recording=forces),), shorten=lambda: None)
     look = SimpleNamespace(model=diagnosed.device(1), chosen=SimpleNamespace(measure=measure))
     context = engine._search_context(recording, look, DiagnosisSettings(), map)
     assert context.tuning.model.units is None

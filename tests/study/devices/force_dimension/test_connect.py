@@ -31,6 +31,7 @@ def refused(opened, name: str = "omega3", hand: bool = True) -> str:
     return str(refusal.value)
 
 
+@pytest.mark.real_time
 def test_it_opens_says_what_it_is_and_ends_braked(stub, opened, rigs):
     with opened() as device:
         assert (device.info.name, device.info.simulated, device.info.sample_rate_hz) == ("omega.3", False, 1000.0)
