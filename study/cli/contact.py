@@ -30,9 +30,10 @@ def contact(
     Writes forces.csv, wanted.csv, measured.csv, contact.json and a picture beside the same as a force with one gain.
     """
     from study.cli.progress import late_bar
+    from study.cli.record import announce
     from study.workflows.equalizer.play_contact import ContactPlan, contact_lines, contact_summary, play_contact
 
     plan = ContactPlan(model, transient, normal, out, device, scale, weight, cap, seed)
     with late_bar("Plays (%)", total=100) as show:
-        done = play_contact(plan, lambda share: show(round(100 * share)))
+        done = play_contact(plan, lambda share: show(round(100 * share)), announce)
     typer.echo(json.dumps(contact_summary(done), indent=2) if as_json else "\n".join((str(out), *contact_lines(done))))

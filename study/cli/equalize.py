@@ -85,6 +85,7 @@ def _play_repeatedly(
     plan: "EqualizePlan", repeat: int, device: str, earlier: Path | None, seed: int
 ) -> "tuple[dict[str, Any], tuple[str, ...]]":
     from study.cli.progress import late_bar
+    from study.cli.record import announce
     from study.workflows.equalizer.repeat_trajectory import (
         RepeatOrder,
         repeat_lines,
@@ -94,5 +95,5 @@ def _play_repeatedly(
 
     order = RepeatOrder(repeat, device, earlier, seed)
     with late_bar("Plays", total=repeat + 1) as show:
-        done = repeat_trajectory(plan, order, lambda number, share: show(number + share))
+        done = repeat_trajectory(plan, order, lambda number, share: show(number + share), announce)
     return repeat_summary(done), repeat_lines(done)

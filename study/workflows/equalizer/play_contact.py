@@ -24,9 +24,9 @@ from equalizer.tracking.lqr.limits import ForceLimitError, require_under_cap
 from equalizer.tracking.lqr.padding import Padding, band_error
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 from study.devices.clock import RealClock, VirtualClock
-from study.devices.device import Device, DeviceSettings
+from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
-from study.errors import StudyError, WrongUseError
+from study.errors import DeviceError, LeftError, StudyError, WrongUseError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
 from study.store.disk.json_document import write_json
 from study.store.disk.new_folder import new_folder, require_new_folder
@@ -34,10 +34,13 @@ from study.store.disk.provenance import gather_provenance
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.models_for_playing import ModelsForPlaying, Vector, models_for_playing
 from study.workflows.equalizer.play_forces import (
+    BeforeMoving,
     acting_spring,
+    announce_motion,
     measured_acceleration,
     play_forces,
     playback_settings,
+    refuse_unannounced,
     require_device_alone,
 )
 
@@ -47,6 +50,7 @@ REST = Padding(after_s=0.5)
 """Played after the recording, to come to rest."""
 FADE_S = 0.2
 """At its end: what a solution with a free end does in its last ticks serves nothing, and would end with a step."""
+AGAIN, NOTHING = "Start again.", "Nothing was written."
 SETTLE_S = 1.0
 """Between two plays, and before the first."""
 
@@ -67,7 +71,7 @@ class ContactPlan:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Played:
+class PlayedTransient:
     """One way to play the transient."""
 
     forces: FloatArray
@@ -88,14 +92,16 @@ class ContactPlay:
     wanted: FloatArray
     """(N, 3), m/s^2: the part in the model's band, with the time to come to rest."""
     start: CausalStart
-    equalized: Played
-    plain: Played
+    equalized: PlayedTransient
+    plain: PlayedTransient
     """The recording as a force along the normal, with one gain."""
 
 
-def play_contact(plan: ContactPlan, on_progress: Callable[[float], None]) -> ContactPlay:
-    """Reads, solves, plays and writes. on_progress: told the share that is played. Raises StudyError, before anything
-    moves for what cannot be played; nothing is written then."""
+def play_contact(
+    plan: ContactPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving = refuse_unannounced
+) -> ContactPlay:
+    """Reads, solves, plays and writes. on_progress: told the share that is played. before_moving: see
+    `BeforeMoving`. Raises StudyError, before anything moves for what cannot be played; nothing is written then."""
     require_new_folder(plan.out)
     normal = _unit(plan.normal)
     transient = _transient(plan)
@@ -108,15 +114,18 @@ def play_contact(plan: ContactPlan, on_progress: Callable[[float], None]) -> Con
         start = causal_start(make_tracking_problem(model, TrackingWeights(plan.weight)), recording, REST)
     except ValueError as problem:
         raise _refused(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
-    wanted = _along(recording, normal, len(start.basis.forces(normal)))
+    tracked = start.basis.forces(normal)
+    wanted = _along(recording, normal, len(tracked))
     forces = (
-        _within_cap(_faded(_beside_spring(start.basis.forces(normal), wanted, models), rate_hz), plan, rate_hz),
+        _within_cap(_faded(_beside_spring(tracked, wanted, models), rate_hz), plan, rate_hz),
         _within_cap(_plain_forces(model, wanted), plan, rate_hz),
     )
-    measured = _play_both(plan, models, forces, on_progress)
+    measured = _play_both(plan, models, forces, on_progress, before_moving)
     in_band = band_part(wanted, rate_hz, models.band_hz)
     equalized, plain = (
-        Played(sent, band_part(came, rate_hz, models.band_hz), band_error(wanted, came, rate_hz, models.band_hz))
+        PlayedTransient(
+            sent, band_part(came, rate_hz, models.band_hz), band_error(wanted, came, rate_hz, models.band_hz)
+        )
         for sent, came in zip(forces, measured, strict=True)
     )
     done = ContactPlay(plan, normal, rate_hz, models.band_hz, in_band, start, equalized, plain)
@@ -183,6 +192,7 @@ def _play_both(
     models: ModelsForPlaying,
     forces: tuple[FloatArray, FloatArray],
     on_progress: Callable[[float], None],
+    before_moving: BeforeMoving,
 ) -> list[FloatArray]:
     """(N, 3) each, measured."""
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
@@ -199,8 +209,16 @@ def _play_both(
                 f"{device.info.sample_rate_hz:g} Hz.",
                 "Identify a model from recordings of this device.",
             )
-        for each in forces:
-            measured.append(_play(device, each, advance))
+        total_s = sum(len(each) / device.info.sample_rate_hz + 2 * SETTLE_S for each in forces)
+        try:
+            announce_motion(device, plan.cap_n, total_s, before_moving)
+            for each in forces:
+                measured.append(_play(device, each, advance))
+        except KeyboardInterrupt as interruption:
+            if device.fault() is Fault.FORCE_LEFT:
+                raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, AGAIN, NOTHING) from None
+            happened = f"{len(measured)} of {len(forces)} plays were measured; the force was released."
+            raise LeftError("Interrupted", happened, AGAIN, NOTHING) from interruption
     return measured
 
 

@@ -17,7 +17,13 @@ from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
 from study.store.formats.repeats_file import repeats_path
-from study.workflows.equalizer.play_forces import measured_acceleration, play_forces
+from study.workflows.equalizer.play_forces import (
+    BeforeMoving,
+    announce_motion,
+    measured_acceleration,
+    play_forces,
+    refuse_unannounced,
+)
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, make_result, write_repeated
 
 REST_S = 2.0
@@ -28,11 +34,14 @@ OnProgress = Callable[[int, float], None]
 """Called with the number of the play, from 0, and the share of it that is done."""
 
 
-def repeat_playback(plan: RepeatPlan, on_progress: OnProgress) -> Repeated:
+def repeat_playback(
+    plan: RepeatPlan, on_progress: OnProgress, before_moving: BeforeMoving = refuse_unannounced
+) -> Repeated:
     """Play and correct. If interrupted (KeyboardInterrupt) or stopped by the device, the best result so far is written
     and the error says so.
 
-    Raises StudyError before anything moves if a person holds the handle, forces exceed the cap, or a name is taken.
+    before_moving: see `BeforeMoving`. Raises StudyError before anything moves if a person holds the handle, forces
+    exceed the cap, or a name is taken.
     """
     _check(plan)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
@@ -40,6 +49,8 @@ def repeat_playback(plan: RepeatPlan, on_progress: OnProgress) -> Repeated:
         played: list[Played] = []
         states: list[IterationState] = []
         try:
+            total_s = (plan.repeats + 1) * plan.wanted.signal.duration_s
+            announce_motion(device, plan.settings.limits.stimulus_cap_n, total_s, before_moving)
             _play_all(plan, device, states, played, on_progress)
         except KeyboardInterrupt as interruption:
             saved = _write_best(plan, states, played)

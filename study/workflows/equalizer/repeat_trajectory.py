@@ -24,7 +24,13 @@ from study.workflows.equalizer.equalize_trajectory import (
 )
 from study.workflows.equalizer.equalized_summary import summary, summary_lines
 from study.workflows.equalizer.models_for_playing import ModelsForPlaying
-from study.workflows.equalizer.play_forces import acting_spring, playback_settings, require_device_alone
+from study.workflows.equalizer.play_forces import (
+    BeforeMoving,
+    acting_spring,
+    playback_settings,
+    refuse_unannounced,
+    require_device_alone,
+)
 from study.workflows.equalizer.repeat_playback import OnProgress, repeat_playback
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, earlier_forces
 
@@ -51,7 +57,9 @@ class RepeatedTrajectory:
     gain: float
 
 
-def repeat_trajectory(plan: EqualizePlan, order: RepeatOrder, on_progress: OnProgress) -> RepeatedTrajectory:
+def repeat_trajectory(
+    plan: EqualizePlan, order: RepeatOrder, on_progress: OnProgress, before_moving: BeforeMoving = refuse_unannounced
+) -> RepeatedTrajectory:
     """Solve, play, correct and write. Raises StudyError, before anything moves if repeating is not possible."""
     check_free(plan.out, repeats_path(plan.out))
     solved = solve_trajectory(plan)
@@ -78,7 +86,7 @@ def repeat_trajectory(plan: EqualizePlan, order: RepeatOrder, on_progress: OnPro
         seed=order.seed,
         out=plan.out,
     )
-    return RepeatedTrajectory(solved, order, repeat_playback(repeat_plan, on_progress), tested, gain)
+    return RepeatedTrajectory(solved, order, repeat_playback(repeat_plan, on_progress, before_moving), tested, gain)
 
 
 def repeat_summary(done: RepeatedTrajectory) -> dict[str, Any]:

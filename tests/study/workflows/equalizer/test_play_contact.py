@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,10 +10,15 @@ import pytest
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, TRANSIENT, Trajectory
 from study.cli.main import main
-from study.errors import StudyError
+from study.devices.device import Fault
+from study.errors import LeftError, StudyError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
+from study.workflows.equalizer import play_contact as play_contact_module
+from study.workflows.equalizer import repeat_playback as repeat_playback_module
+from study.workflows.equalizer.equalize_trajectory import EqualizePlan
 from study.workflows.equalizer.play_contact import ContactPlan, contact_lines, play_contact
+from study.workflows.equalizer.repeat_trajectory import RepeatOrder, repeat_trajectory
 
 NORMAL = (1.0, 2.0, -2.0)
 
@@ -99,6 +105,58 @@ def test_a_model_from_a_hand_is_not_played(folder, tmp_path):
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 0.0), (float("nan"), 0.0, 1.0)])
 def test_a_direction_that_is_none_is_refused(folder, tmp_path, normal):
     assert refusal(folder, tmp_path, normal=normal).title == "This is no normal"
+
+
+@pytest.fixture
+def real_device(monkeypatch):
+    """In the simulated device's place: one that moves, and that fails the test if it does."""
+
+    def play(*_):
+        raise AssertionError("it moved")
+
+    info = SimpleNamespace(name="omega.3", simulated=False, sample_rate_hz=1000.0)
+    device = SimpleNamespace(info=info, play=play, fault=lambda: Fault.NONE, close=lambda: None)
+    for module in (play_contact_module, repeat_playback_module):
+        monkeypatch.setattr(module, "open_device", lambda *_: device)
+
+
+def refuse_after(said):
+    def refuse(notice):
+        said.append(notice)
+        raise KeyboardInterrupt
+
+    return refuse
+
+
+@pytest.mark.usefixtures("real_device")
+def test_a_real_device_is_announced_and_does_not_move_for_a_person_who_says_no(folder, tmp_path):
+    said = []
+    plan = ContactPlan(folder / "model.h5", folder / "tap.csv", NORMAL, tmp_path / "out")
+    with pytest.raises(LeftError) as left:
+        play_contact(plan, lambda _: None, refuse_after(said))
+    assert "0 of 2 plays were measured" in left.value.happened
+    assert "No person may hold the handle: 'omega.3' is going to move by itself" in said[0]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("real_device")
+def test_a_real_device_does_not_move_unannounced(folder, tmp_path):
+    assert "without a warning" in refusal(folder, tmp_path).happened
+
+
+@pytest.mark.usefixtures("real_device")
+def test_repeats_on_a_real_device_are_announced_first(folder, tmp_path):
+    signal = tap(kind=TRAJECTORY).signal
+    padded = replace(signal, samples=0.3 * np.pad(signal.samples, ((500, 500), (0, 0))))
+    write_trajectory(tmp_path / "wanted.csv", Trajectory(padded))
+    plan = EqualizePlan((folder / "model.h5",), tmp_path / "wanted.csv", tmp_path / "forces.csv")
+    order, said = RepeatOrder(repeats=1, device="omega3"), []
+    with pytest.raises(StudyError, match="without a warning"):
+        repeat_trajectory(plan, order, lambda *_: None)
+    with pytest.raises(LeftError) as left:
+        repeat_trajectory(plan, order, lambda *_: None, refuse_after(said))
+    assert "0 of up to 2 plays" in left.value.happened
+    assert "No person may hold the handle" in said[0]
 
 
 def test_a_table_of_three_axes_is_no_transient(folder, tmp_path):
