@@ -36,7 +36,7 @@ def columns(row_type: type[Any]) -> tuple[str, ...]:
 def rows_to_csv(rows: Iterable[Row], row_type: type[Row]) -> str:
     """CSV text with a header."""
     names = columns(row_type)
-    lines = [_line(names), *(_line([_field_text(getattr(row, name)) for name in names]) for row in rows)]
+    lines = [csv_line(names), *(csv_line([_field_text(getattr(row, name)) for name in names]) for row in rows)]
     return "\n".join(lines) + "\n"
 
 
@@ -98,7 +98,7 @@ def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
     return ""
 
 
-def _line(fields_of_row: Sequence[str]) -> str:
+def csv_line(fields_of_row: Sequence[str]) -> str:
     text = io.StringIO()
     # Only the characters of its own line end make the writer quote a field: with both, a carriage return is safe.
     csv.writer(text, lineterminator="\r\n").writerow(fields_of_row)

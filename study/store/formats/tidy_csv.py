@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from protocols.trial import Trial
-from study.store.disk.csv_rows import columns, rows_to_csv
+from study.store.disk.csv_rows import columns, csv_line, rows_to_csv
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
@@ -28,7 +28,7 @@ def write_tidy_csv(
     rows = [["column", "description", "unit"], *([column, *TRIAL_COLUMNS[column]] for column in columns(Trial))]
     texts = {
         TRIALS_NAME: rows_to_csv(trials, Trial),
-        DICTIONARY_NAME: "".join(",".join(map(_quote, row)) + "\n" for row in rows),
+        DICTIONARY_NAME: "".join(csv_line(row) + "\n" for row in rows),
         PROTOCOL_NAME: protocol_text,
         FACTS_NAME: json.dumps({"study": name, **facts}, indent=2, ensure_ascii=False) + "\n",
     }
@@ -48,8 +48,3 @@ def read_tidy_csv(folder: Path) -> ExportedTrials:
         raise UnusableFileError(path, KIND, ("it is no JSON object",))
     table = folder / TRIALS_NAME
     return ExportedTrials(trials_in(table, KIND), read_text(folder / PROTOCOL_NAME), facts, (table,))
-
-
-def _quote(text: str) -> str:
-    """RFC 4180."""
-    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\n') else text

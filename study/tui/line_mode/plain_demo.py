@@ -14,7 +14,7 @@ SAY_AGAIN_S = 1.0
 """A screen reader that hears more than a sentence a second never finishes one."""
 
 CUT_SHORT = Unanswered(WaitOver.CUT_SHORT.value, leave=False)
-NOBODY = Unanswered(WaitOver.INPUT_ENDED.value, leave=True)
+INPUT_ENDED = Unanswered(WaitOver.INPUT_ENDED.value, leave=True)
 
 
 def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> DemoChoice:
@@ -62,7 +62,7 @@ def await_handle(look: Callable[[], HandleView], talk: Conversation, sign_of_lif
         if view.sentence != said and now_s - said_at_s >= SAY_AGAIN_S:
             talk.say(view.sentence)
             said, said_at_s = view.sentence, now_s
-        cut = NOBODY if talk.input_is_over() else _glance(talk, sign_of_life, GLANCE_S)
+        cut = INPUT_ENDED if talk.input_is_over() else _glance(talk, sign_of_life, GLANCE_S)
         if cut is not None:
             return cut
     return None

@@ -37,6 +37,8 @@ class _Begun:
     protocol: str
     number: int | None
     line: SessionLine
+    protocol_text: str | None
+    """None where the log does not say it: withdrawn or damaged."""
 
 
 def planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[PlannedStudy, ...]:
@@ -64,8 +66,16 @@ def _begun(data: Path, simulated: bool) -> list[_Begun]:
     for folder in session_folders(data):
         begun = begun_in(folder)
         if begun is not None and begun.protocol and begun.simulated == simulated:
-            found.append(_Begun(folder, begun.protocol, begun.number, session_line(folder)))
+            found.append(_Begun(folder, begun.protocol, begun.number, session_line(folder), _protocol_text(folder)))
     return found
+
+
+def _protocol_text(folder: SessionFolder) -> str | None:
+    try:
+        opening = read_opening(folder.log)
+    except (StudyError, OSError, ValueError):
+        return None
+    return opening.protocol_text if isinstance(opening, SessionOpened) else None
 
 
 def _plan_from_sessions(data: Path, protocol: StudyProtocol, begun: Sequence[_Begun], simulated: bool) -> PlannedStudy:
@@ -101,14 +111,14 @@ def _participant(code: str, sessions: Sequence[_Begun]) -> Participant:
 def _latest_protocol(name: str, begun: Sequence[_Begun]) -> StudyProtocol:
     """Of the latest session whose log can be read. Raises WrongUseError where there is none."""
     for each in sorted(begun, key=lambda each: each.line.begun_utc, reverse=True):
-        try:
-            opening = read_opening(each.folder.log)
-            if isinstance(opening, SessionOpened):
-                protocol = load_protocol(opening.protocol_text, "the log")
-                if isinstance(protocol, StudyProtocol):
-                    return protocol
-        except (StudyError, ProtocolError, OSError, ValueError):
+        if each.protocol_text is None:
             continue
+        try:
+            protocol = load_protocol(each.protocol_text, "the log")
+        except ProtocolError:
+            continue
+        if isinstance(protocol, StudyProtocol):
+            return protocol
     raise WrongUseError(
         "The protocol cannot be read",
         f"No session of '{name}' has a log that says what its protocol was: all are withdrawn or damaged.",
@@ -118,14 +128,7 @@ def _latest_protocol(name: str, begun: Sequence[_Begun]) -> StudyProtocol:
 
 def _remarks(begun: Sequence[_Begun]) -> tuple[str, ...]:
     """Texts that differ: orders of one protocol would then be counted with those of another."""
-    texts = set()
-    for each in begun:
-        try:
-            opening = read_opening(each.folder.log)
-        except (StudyError, OSError):
-            continue
-        if isinstance(opening, SessionOpened):
-            texts.add(opening.protocol_text)
+    texts = {each.protocol_text for each in begun if each.protocol_text is not None}
     if len(texts) < 2:
         return ()
     return (f"{len(texts)} different texts of this protocol were used. Lock it: hapteq protocol lock.",)

@@ -63,7 +63,9 @@ def test_what_was_declared_and_what_was_not_is_said():
     said = declaration_text(AnalysisSettings("hierarchical", (45.0, 5.0), 10))
     assert "hierarchical model" in said and "45 Hz minus 5 Hz" in said and "participants: 10" in said
     assert "Not declared: exclusions." in said
-    assert "Not declared" not in declaration_text(AnalysisSettings("published", (45.0, 5.0), 10, ("Nobody.",)))
+    assert "Not declared" not in declaration_text(
+        AnalysisSettings("published", (45.0, 5.0), 10, ("No participant is left out.",))
+    )
 
 
 def test_the_page_and_the_document_show_both(analysis):

@@ -29,7 +29,7 @@ def test_withdrawal_erases_all_sessions_of_the_participant_and_nobody_elses(run,
     assert "withdrew" in err
     code, _, err = run("analyze", data)
     assert "P01_001 was withdrawn by the participant." in err
-    # Nobody else gets the code.
+    # No other participant gets the code.
     code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)
     assert code == 2
     assert "P01 withdrew" in err

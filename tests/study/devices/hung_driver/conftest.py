@@ -15,7 +15,7 @@ def rig(rigs):
 
 @pytest.fixture
 def hang():
-    """Blocks whoever waits for it, until the test is over."""
+    """Blocks its caller until the test is over."""
     event = threading.Event()
     yield event
     event.set()

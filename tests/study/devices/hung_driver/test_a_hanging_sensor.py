@@ -81,7 +81,7 @@ def test_a_write_that_goes_through_late_is_taken_back(device, rigs, rig, hang):
     hold(device, rigs, rig)
     rig.before_writing = in_loop(hang.wait)
     time.sleep(0.02)
-    assert device.release().health.fault is Fault.FORCE_LEFT  # nobody can know what the late write does
+    assert device.release().health.fault is Fault.FORCE_LEFT  # what the late write does is not known
     device.close()
     assert not rig.last_n.any()
     late, closed = len(rig.written_n), rig.closed

@@ -16,7 +16,7 @@ FRAMES = {ord(character): " " for character in "┏┓┗┛┃━╭╮╰╯�
 
 
 class Seat:
-    """Whoever sits before the screen."""
+    """The person before the screen, by keys."""
 
     def __init__(self, app: WatchApp, clock: VirtualClock, source: Source, asked: list, bells: list) -> None:
         self.app, self.clock, self.source, self.asked, self.bells = app, clock, source, asked, bells
