@@ -1,6 +1,6 @@
-"""Columns of a table as arrays: header, delimiter and comments are detected, invalid fields are reported."""
+"""Columns of a table as arrays: encoding and layout are detected, invalid fields are reported."""
 
-import csv
+import codecs
 import io
 import re
 from collections import Counter
@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from study.importing.arrays.table_layout import EMPTY, Line, TableLayout, find_layout, is_comment, split_row
 from study.importing.map_format.import_map import CsvMap
-from study.store.disk.text_file import read_text
+from study.store.disk.file_errors import CannotReadError
+from study.store.disk.regular_file import TABLE_BYTES, read_regular
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,110 +21,83 @@ if TYPE_CHECKING:
 MOST_ROWS = 20_000_000
 """Five hours at 1 kHz."""
 MOST_COLUMNS = 10_000
-_DELIMITERS = (",", ";", "\t", "|")
-_COMMENTS = ("#", "%")
-_EMPTY = ("", "nan", "na", "n/a", "null", "-", "none")
+_LOOKED_AT = 4096
+"""Bytes in which UTF-16 without a mark shows: every other one of a table in it is zero."""
 _AS_NUMBERS: dict[str, Any] = {
     "dtype": np.float64,
-    "na_values": [*_EMPTY, *(word.upper() for word in _EMPTY), "NaN", "None", "Null"],
+    "na_values": [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"],
 }
 _AS_WORDS: dict[str, Any] = {"dtype": str}
 
 
 def read_csv_arrays(path: Path, settings: CsvMap) -> dict[str, npt.NDArray[Any]]:
     """Empty fields are missing samples. Raises CannotReadError; ValueError with line and column of a problem."""
-    numbered, comment = _lines(read_text(path), settings)
-    if not numbered:
-        raise ValueError("it holds no lines")
-    delimiter = settings.delimiter or _delimiter(numbered[0][1], settings)
-    header, body = _header(numbered, delimiter, settings)
-    if body is numbered and not settings.names and len(said := _fields(comment, delimiter)) == len(header):
-        header = said
-    if not body:
+    layout = find_layout(_lines(_read_text(path), settings), settings)
+    if not layout.body:
         raise ValueError("it has a header, but no rows below it")
-    if len(header) > MOST_COLUMNS:
-        raise ValueError(f"it has {len(header)} columns; up to {MOST_COLUMNS} are read")
-    if doubled := sorted(name for name, count in Counter(header).items() if count > 1):
+    if len(layout.names) > MOST_COLUMNS:
+        raise ValueError(f"it has {len(layout.names)} columns; up to {MOST_COLUMNS} are read")
+    if doubled := sorted(name for name, count in Counter(layout.names).items() if count > 1):
         raise ValueError(f"its header names '{doubled[0]}' twice; give the columns names of their own in [csv] names")
-    _require_equal_rows(body, header, delimiter)
+    body = [line for line in layout.body if not is_comment(line[1])]
+    _require_equal_rows(body, layout)
     text = "\n".join(line for _, line in body)
     try:
-        numbers = _read(text, header, delimiter, settings, _AS_NUMBERS)
+        numbers = _read(text, layout, _AS_NUMBERS)
     except ValueError:
-        words = _read(text, header, delimiter, settings, _AS_WORDS)  # slower, and it tells which field is wrong
-        return {name: _numbers(words[name], name, body, settings) for name in header}
-    return {name: numbers[name].to_numpy() for name in header}
+        words = _read(text, layout, _AS_WORDS)  # slower, and it tells which field is wrong
+        return {name: _numbers(words[name], name, body, layout) for name in layout.names}
+    return {name: numbers[name].to_numpy() for name in layout.names}
 
 
-def _lines(text: str, settings: CsvMap) -> tuple[list[tuple[int, str]], str]:
-    """Numbered lines without comments and empty lines; and the comment directly above the first line, which is the
-    header in files of some programs."""
-    kept: list[tuple[int, str]] = []
-    above = ""
+def _read_text(path: Path) -> str:
+    """UTF-8, UTF-16, or what Windows writes in western languages. Raises CannotReadError, ValueError."""
+    try:
+        data = read_regular(path, TABLE_BYTES)
+        if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            return data.decode("utf-16")
+        if b"\0" in data[:_LOOKED_AT]:
+            high_bytes = data[1:_LOOKED_AT:2], data[:_LOOKED_AT:2]
+            for zeros, encoding in zip(high_bytes, ("utf-16-le", "utf-16-be"), strict=True):
+                if 2 * zeros.count(0) > len(zeros):
+                    return data.decode(encoding)
+            raise ValueError("it holds bytes of zero, as no text does; is it a table?")
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as problem:
+        if problem.encoding != "utf-8":
+            raise ValueError(f"it is no whole {problem.encoding} text") from problem
+    except OSError as problem:
+        raise CannotReadError(path, problem) from problem
+    return data.decode("cp1252", errors="replace")
+
+
+def _lines(text: str, settings: CsvMap) -> list[Line]:
+    kept: list[Line] = []
     for number, line in enumerate(text.splitlines(), start=1):
         if len(kept) > MOST_ROWS:
             raise ValueError(f"it has more than {MOST_ROWS} rows; save it as .npz or .h5")
-        if number <= settings.skip_lines or not line.strip():
-            continue
-        if not line.lstrip().startswith(_COMMENTS):
+        if number > settings.skip_lines and line.strip():
             kept.append((number, line))
-        elif not kept:
-            above = line.strip().lstrip("".join(_COMMENTS)).strip()
-    return kept, above
+    return kept
 
 
-def _delimiter(line: str, settings: CsvMap) -> str:
-    counts = {mark: line.count(mark) for mark in _DELIMITERS if mark != settings.decimal}
-    best = max(counts, key=lambda mark: counts[mark])
-    return best if counts[best] else " "
-
-
-def _header(
-    numbered: list[tuple[int, str]], delimiter: str, settings: CsvMap
-) -> tuple[list[str], list[tuple[int, str]]]:
-    first = _fields(numbered[0][1], delimiter)
-    if settings.names:
-        names, body = list(settings.names), numbered
-        if not all(_is_number(field, settings) for field in first):
-            body = numbered[1:]
-        return names, body
-    if all(_is_number(field, settings) for field in first):
-        return [f"column{number}" for number in range(1, len(first) + 1)], numbered
-    return [name or f"column{number}" for number, name in enumerate(first, start=1)], numbered[1:]
-
-
-def _fields(line: str, delimiter: str) -> list[str]:
-    if not line:
-        return []
-    if delimiter == " " and '"' not in line:
-        return line.split()
-    return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
-
-
-def _is_number(field: str, settings: CsvMap) -> bool:
-    try:
-        float(field.replace(",", ".") if settings.decimal == "," else field)
-    except ValueError:
-        return field.lower() in _EMPTY
-    return True
-
-
-def _require_equal_rows(body: list[tuple[int, str]], header: list[str], delimiter: str) -> None:
+def _require_equal_rows(body: list[Line], layout: TableLayout) -> None:
+    delimiter, columns = layout.delimiter, len(layout.names)
     for number, line in body:
-        count = len(_fields(line, delimiter)) if '"' in line or delimiter == " " else line.count(delimiter) + 1
-        if count != len(header):
-            raise ValueError(f"line {number} has {count} fields, but there are {len(header)} columns")
+        count = len(split_row(line, delimiter)) if '"' in line or delimiter == " " else line.count(delimiter) + 1
+        if count != columns:
+            raise ValueError(f"line {number} has {count} fields, but there are {columns} columns")
 
 
-def _read(text: str, header: list[str], delimiter: str, settings: CsvMap, how: dict[str, Any]) -> "pd.DataFrame":
+def _read(text: str, layout: TableLayout, how: dict[str, Any]) -> "pd.DataFrame":
     # Imported where tables are read: it takes longer than all that is done with other files.
     import pandas as pd
 
     table: pd.DataFrame = pd.read_csv(
         io.StringIO(text),
-        sep=r"\s+" if delimiter == " " else delimiter,
-        names=header,
-        decimal=settings.decimal,
+        sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
+        names=list(layout.names),
+        decimal=layout.decimal,
         skipinitialspace=True,
         index_col=False,
         keep_default_na=False,
@@ -131,21 +106,19 @@ def _read(text: str, header: list[str], delimiter: str, settings: CsvMap, how: d
     return table
 
 
-def _numbers(
-    column: "pd.Series[str]", name: str, body: list[tuple[int, str]], settings: CsvMap
-) -> npt.NDArray[np.float64]:
+def _numbers(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> npt.NDArray[np.float64]:
     import pandas as pd
 
     fields = column.str.strip()
-    if settings.decimal == ",":
-        fields = fields.str.replace(",", ".", regex=False)
-    missing = fields.str.lower().isin(_EMPTY)
+    if layout.decimal == ",":
+        fields = fields.str.replace(".", " ", regex=False).str.replace(",", ".", regex=False)
+    missing = fields.str.lower().isin(EMPTY)
     values = pd.to_numeric(fields.where(~missing), errors="coerce")
     wrong = np.flatnonzero((values.isna() & ~missing).to_numpy())
     if len(wrong):
         number = body[int(wrong[0])][0]
         text = str(column.iloc[int(wrong[0])])
-        comma = settings.decimal == "." and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", text.strip())
+        comma = layout.decimal == "." and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", text.strip())
         hint = '; where the decimal sign is a comma, the map says decimal = "," under [csv]' if comma else ""
         raise ValueError(f"line {number}, column '{name}': '{text}' is not a number{hint}")
     return np.asarray(values, dtype=np.float64)

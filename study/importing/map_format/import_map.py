@@ -21,8 +21,8 @@ class CsvMap:
     """How tables are written, where it cannot be seen from the file itself."""
 
     skip_lines: Annotated[int, Field(ge=0, description="Lines before the header. Default 0.")] = 0
-    delimiter: Annotated[str, Field(description="Between fields. Default: what the header shows.")] = ""
-    decimal: Annotated[Literal[".", ","], Field(description='Decimal sign. Default ".".')] = "."
+    delimiter: Annotated[str, Field(description="Between fields. Default: what the numbers show.")] = ""
+    decimal: Annotated[Literal["", ".", ","], Field(description="Decimal sign. Default: what the numbers show.")] = ""
     names: Annotated[
         tuple[str, ...], Field(description="Names of the columns of a table without a header. Default: none.")
     ] = ()

@@ -100,6 +100,9 @@ uniform rate ([file formats](formats.md)). What was done to the samples is print
 (`meta/import`): what was resampled and how, which clock was moved and by how much, how many samples are missing. What
 cannot be understood is refused by name, and then nothing is written. `hapteq validate MAP.toml` checks a map.
 
+* **Tables** are read from their rows of numbers upwards: the row above them is the header, or units (`s,N,mm`,
+  `[s] [N]`) with the header above; what stands higher, and lines with `#` or `%`, are remarks. Delimiter and decimal
+  sign are those by which the rows are numbers. UTF-8, UTF-16 and Windows' western encoding (`µ`, `°`) are understood.
 * **Units** are never guessed: a channel without one keeps its numbers, in the unit `1`, and that is said. So is the
   unit in which each computed channel is taken to be. {ALLOWED[0].upper()}{ALLOWED[1:]}; `lb` and `oz` are masses.
 * **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.

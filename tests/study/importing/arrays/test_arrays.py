@@ -53,19 +53,24 @@ _COMMA = (
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    ("text", "settings", "sentence"),
     [
-        ("", "It holds no lines."),
-        ("t,u\n", "It has a header, but no rows below it."),
-        ("t,u\n0,1\n1,OK\n", "Line 3, column 'u': 'OK' is not a number."),
-        ("t;u\n0;1\n1;0,25\n", _COMMA),
-        ("# c\nt,u\n0,1\n1,2,3\n", "Line 4 has 3 fields, but there are 2 columns."),
-        ("t,t\n0,1\n", "Its header names 't' twice; give the columns names of their own in [csv] names."),
+        ("", {}, "It holds no lines."),
+        ("t,u\n", {}, "It has a header, but no rows below it."),
+        ("t,u\n0,1\n1,OK\n", {}, "Line 3, column 'u': 'OK' is not a number."),
+        ("t;u\n0;1.5\n1;0,25\n", {}, _COMMA),
+        ("t;u\n0;1\n1;0,25\n", {"decimal": "."}, _COMMA),
+        ("# c\nt,u\n0,1\n1,2,3\n", {}, "Line 4 has 3 fields, but there are 2 columns."),
+        ("t,t\n0,1\n", {}, "Its header names 't' twice; give the columns names of their own in [csv] names."),
+        ("t [s],u [V]\ns,N\n0,1\n", {}, "Its header says V in 'u [V]', and its row of units says N."),
+        ("t_s,travel_mm\ns,m\n0,1\n", {}, "Its header says mm in 'travel_mm', and its row of units says m."),
+        ("t;u\n0;1.234,5\n1;2,5\n", {}, "Line 2, column 'u': '1.234,5' is not a number."),
+        ("t,u\nabc,def\n0,x\n", {}, "Line 2, column 't': 'abc' is not a number."),
     ],
 )
-def test_what_is_wrong_with_a_table_is_said_with_its_line(tmp_path, text, sentence):
+def test_what_is_wrong_with_a_table_is_said_with_its_line(tmp_path, text, settings, sentence):
     with pytest.raises(ImportRefusedError) as refused:
-        read(written(tmp_path, text))
+        read(written(tmp_path, text), **settings)
     assert refused.value.happened == sentence
     assert refused.value.saved == "Nothing was written."
 
