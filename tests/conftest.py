@@ -14,6 +14,7 @@ from hypothesis import settings
 
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.loading import load_protocol
+from tests.machine_pauses import PauseMeter
 
 # The same examples each time: what fails, fails for everybody. `--hypothesis-profile explore` draws new ones.
 settings.register_profile("repeatable", derandomize=True)
@@ -56,14 +57,26 @@ def summer_and_winter(monkeypatch) -> Iterator[None]:
     time.tzset()
 
 
+PAUSES = PauseMeter()
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """A busy machine shows a screen late, and a trial whose screen fell silent is void, as it must be: again, then.
 
-    Never where something may not happen even once: a force that stays, an answer that is lost, a race of threads.
+    What runs against the clock without a screen runs again only where the process is known to have stood still: a force
+    that stays, an answer that is lost, a race of threads may not happen even once.
     """
     for item in items:
         if item.get_closest_marker("may_be_late"):
             item.add_marker(pytest.mark.flaky(reruns=2, reruns_delay=2))
+        elif item.get_closest_marker("real_time"):
+            item.add_marker(pytest.mark.flaky(reruns=3, reruns_delay=2, condition=PAUSES.paused))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("real_time"):
+        PAUSES.reset()
 
 
 SMALL = """
