@@ -16,6 +16,8 @@ from equalizer.signals.signal import FloatArray
 
 _ROUNDED = " A missing force is known only as fast as noise lets it be, so that corners look rounder than they are."
 
+_BEYOND = " Shaded: no recording came there; what the formula says there is not known."
+
 
 def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
     return tuple(
@@ -24,7 +26,8 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
             title=f"What shows {noun_of(signature.effect)}{f' ({signature.axis})' if signature.axis else ''}",
             caption="Dots: what the model, with all else that was found, fails to explain without this effect, mean "
             "per bin; bars: two standard errors. Line: the fitted law, simulated and averaged alike."
-            + (_ROUNDED if signature.of.startswith("missing") else ""),
+            + (_ROUNDED if signature.of.startswith("missing") else "")
+            + (_BEYOND if signature.visited else ""),
             figure=draw_signature(signature),
             alternative=_alternative_text(signature),
         )
@@ -57,6 +60,8 @@ def draw_signature(signature: Signature) -> Figure:
         axes.xaxis.set_minor_formatter(NullFormatter())
     else:
         axes.axhline(0, color=GREY, linewidth=0.8, zorder=1)
+        for begins, ends in _never_visited(signature):
+            axes.axvspan(x_factor * begins, x_factor * ends, color=GREY, alpha=0.15, linewidth=0, zorder=0)
         if signature.measured_at.min() < 0 < signature.measured_at.max():
             axes.axvline(0, color=GREY, linewidth=0.8, zorder=1)
     axes.set_xlabel(along)
@@ -72,6 +77,13 @@ def _scaled_label(said: str, values: FloatArray) -> tuple[str, float]:
         return said[:1].upper() + said[1:], 1.0
     scale = scale_of(rest.removesuffix(")"), float(np.max(np.abs(values))))
     return f"{words[:1].upper()}{words[1:]} ({scale.unit})", scale.factor
+
+
+def _never_visited(signature: Signature) -> tuple[tuple[float, float], ...]:
+    if signature.visited is None:
+        return ()
+    low, high = signature.visited
+    return ((float(signature.law_at.min()), low), (high, float(signature.law_at.max())))
 
 
 def _alternative_text(signature: Signature) -> str:

@@ -103,7 +103,8 @@ def _left_hand_side(law: Law) -> str:
     return {"force": "F =", "command": f"command on {law.axis} =", "response": f"response {law.axis} ="}[law.acts_on]
 
 
-def _has_memory(law: Law) -> bool:
+def has_memory(law: Law) -> bool:
+    """Whether it depends on the past of its signals."""
     return any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree))
 
 
@@ -156,7 +157,7 @@ def _command_action(law: Law, channels: Channels) -> OnCommand:
         held = evaluate_held(law_with_values(law, values), signal_values, 1 / step_s)
         return np.asarray(held.mean(axis=0)), held[1]
 
-    return OnCommand(lambda commands, step_s, values: commands, fine=_has_memory(law), of_all=of_all)
+    return OnCommand(lambda commands, step_s, values: commands, fine=has_memory(law), of_all=of_all)
 
 
 def _response_action(law: Law, channels: Channels) -> OnResponse:

@@ -55,6 +55,8 @@ class Signature:
     """(q,)"""
     law: FloatArray
     """(q,)"""
+    visited: tuple[float, float] | None = None
+    """Range of the abscissa that the recordings visited, where the law is drawn beyond it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -44,6 +44,14 @@ def bin_law_means(at: FloatArray, values: FloatArray) -> tuple[FloatArray, Float
     return means[0], means[1]
 
 
+def correlation_ratio(at: FloatArray, values: FloatArray) -> float:
+    """Share of the values' variance that their mean per bin of `at` takes (eta squared). at, values: (n,)"""
+    bin_of = np.digitize(at, _edges(at, _BINS)[1:-1])
+    count = np.maximum(np.bincount(bin_of), 1)
+    means = np.bincount(bin_of, weights=values) / count
+    return float(np.var(means[bin_of]) / max(float(np.var(values)), 1e-300))
+
+
 def running_rms(seconds: FloatArray, values: FloatArray, used: Mask) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Time, rms and its standard error, in stretches with equal numbers of used samples. All inputs: (n,)"""
     parts = [part for part in np.array_split(np.flatnonzero(used), _BINS) if len(part)]

@@ -10,6 +10,7 @@ import numpy as np
 from analysis.diagnosis.errors.unexplained_motion import EXPECTED
 from analysis.diagnosis.forces.missing_force import missing_force
 from analysis.diagnosis.result.findings import Signature
+from analysis.diagnosis.result.law_curves import law_signature
 from analysis.diagnosis.result.signature_bins import bin_law_means, bin_means, running_rms
 from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
 from equalizer.effects.simulation.simulator import SimulationResult, simulate_mechanism
@@ -69,6 +70,9 @@ def signature_of(
     evidence: Evidence, placed: PlacedEffect, others: Sequence[PlacedEffect], names: Names, hold: Hold
 ) -> Signature:
     """The curve of one effect. evidence: of the final model with all its effects but this one; others: those."""
+    law = law_signature(evidence, placed, names.axes, names.system)
+    if law is not None:
+        return law
     acts, along = placed.effect.acts, ALONG.get(placed.effect.name, "frequency")
     if along in ("velocity", "position", "acceleration") and not isinstance(acts, (OnCommand, OnResponse)):
         return _of_motion(evidence, placed, along, names, hold)

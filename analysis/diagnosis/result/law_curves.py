@@ -1,0 +1,97 @@
+"""Curve of a discovered law of the force: what is missing without it, against the variable that carries most of it, or,
+where no variable alone does, against the law's own value."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.result.findings import Signature
+from analysis.diagnosis.result.signature_bins import bin_law_means, bin_means, correlation_ratio
+from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, axis_names, has_memory, law_with_values
+from equalizer.effects.effect import PlacedEffect
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.laws.evaluate import evaluate
+from equalizer.laws.law import Law
+from equalizer.signals.signal import FloatArray
+from equalizer.signals.unit_system import UnitSystem
+
+_BEYOND = 0.25
+"""Share of the visited range by which a formula is drawn beyond it, on either side."""
+_LINE_POINTS = 400
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Variable:
+    name: str
+    """With unit: "velocity of x (m/s)"."""
+    values: FloatArray
+    """(n,)"""
+
+
+def law_signature(
+    evidence: Evidence, placed: PlacedEffect, axes: tuple[str, ...], system: UnitSystem
+) -> Signature | None:
+    """The curve of a discovered law along the measured motion; None where it does not act on the force, or asks for a
+    signal that is neither time nor an axis's motion or command. axes: name of each driven axis."""
+    if placed.effect.law is None or placed.effect.law.acts_on != "force":
+        return None
+    law = law_with_values(placed.effect.law, placed.values)
+    variables = _variables(evidence, axes, system)
+    if not law.variables or not set(law.variables) <= variables.keys():
+        return None
+    rate_hz, axis = evidence.sample_rate_hz, placed.sites[0]
+    force = evaluate(law, {name: variables[name].values for name in law.variables}, rate_hz)
+    used = (evidence.used > 0) & np.isfinite(force)
+    shares = {name: correlation_ratio(variables[name].values[used], force[used]) for name in law.variables}
+    main = variables[max(shares, key=lambda name: shares[name])]
+    along, visited = main.name, None
+    if max(shares.values()) < 0.5:  # the variables tell most of it only together
+        main = _Variable(f"force of the law ({system.force})", force)
+        along, law_at, values = main.name, *_identity(force[used])
+    elif len(law.variables) == 1 and not has_memory(law):
+        law_at, values, visited = _extended(law, main.values[used], rate_hz)
+    else:
+        law_at, values = bin_law_means(main.values[used], force[used])
+    at, mean, spread = bin_means(main.values, evidence.axis_force[:, axis], used, rate_hz)
+    return Signature(
+        placed.effect.name,
+        axes[axis],
+        along,
+        f"missing force ({system.force})",
+        at,
+        mean,
+        spread,
+        law_at,
+        values,
+        visited,
+    )
+
+
+def _variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) -> Mapping[str, _Variable]:
+    """By their names in a formula."""
+    rate_hz, length = evidence.sample_rate_hz, system.length
+    found = {"t": _Variable("time (s)", np.arange(len(evidence.command)) / rate_hz)}
+    for number, (axis, letter) in enumerate(zip(axes, axis_names(axes), strict=True)):
+        velocity = evidence.axis_velocity[:, number]
+        motions = (evidence.axis_position[:, number], velocity, np.gradient(velocity) * rate_hz)
+        kinds = (("position", length), ("velocity", f"{length}/s"), ("acceleration", f"{length}/s^2"))
+        for prefix, values, (kind, unit) in zip(DERIVATIVES, motions, kinds, strict=True):
+            found[prefix + letter] = _Variable(f"{kind} of {axis} ({unit})", np.asarray(values))
+        found[COMMAND + letter] = _Variable(f"command of {axis} ({system.force})", evidence.command[:, number])
+    return found
+
+
+def _extended(law: Law, seen: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
+    """The formula of one variable over what was visited and beyond, and the visited range."""
+    low, high = float(seen.min()), float(seen.max())
+    margin = _BEYOND * (high - low)
+    at = np.linspace(low - margin, high + margin, _LINE_POINTS)
+    values = evaluate(law, {law.variables[0]: at}, rate_hz)
+    known = np.isfinite(values)
+    return at[known], values[known], (low, high)
+
+
+def _identity(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    ends = np.array([values.min(), values.max()])
+    return ends, ends
