@@ -38,9 +38,9 @@ from analysis.diagnosis.reference.search_beside_reference import search_beside_r
 from analysis.diagnosis.result.assemble_findings import assemble_findings
 from analysis.diagnosis.result.candidates import balance_errors, beside_given, linear_remarks, with_balances
 from analysis.diagnosis.result.contrast_findings import add_contrast
+from analysis.diagnosis.result.curves.state_maps import StateMaps, state_maps
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
-from analysis.diagnosis.result.state_maps import StateMaps, state_maps
 from analysis.diagnosis.result.unconfirmed import unconfirmed_candidates
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Guard

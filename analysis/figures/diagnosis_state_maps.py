@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.diagnosis.result.state_maps import Loop, StateMaps, StateView
+from analysis.diagnosis.result.curves.state_maps import Loop, StateMaps, StateView
 from analysis.diagnosis.unit_wording import scale_of, share_text
 from analysis.figures.diagnosis_style import AFTER, BEFORE, MEASURED
 from analysis.figures.picture import Picture

@@ -9,7 +9,7 @@ from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.next_experiment.propose_experiment import Proposal
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.result.state_maps import StateMaps
+from analysis.diagnosis.result.curves.state_maps import StateMaps
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.unit_wording import error_text
 from equalizer.effects.effect import PlacedEffect

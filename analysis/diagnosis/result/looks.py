@@ -10,10 +10,10 @@ from analysis.diagnosis.localisation.localisation import Localisation, find_entr
 from analysis.diagnosis.localisation.mismatch_maps import Maps
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.black_box import black_box
+from analysis.diagnosis.result.curves.signature_curves import Names, signature_of
 from analysis.diagnosis.result.error_table import errors_of
 from analysis.diagnosis.result.findings import BlackBox, Signature
 from analysis.diagnosis.result.named_effects import labels_of
-from analysis.diagnosis.result.signature_curves import Names, signature_of
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Part
 from analysis.diagnosis.search.search import SearchResult

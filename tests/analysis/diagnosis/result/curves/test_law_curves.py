@@ -8,8 +8,8 @@ from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.result.law_curves import law_signature
-from analysis.diagnosis.result.signature_bins import correlation_ratio
+from analysis.diagnosis.result.curves.law_curves import law_signature
+from analysis.diagnosis.result.curves.signature_bins import correlation_ratio
 from analysis.figures.diagnosis_signature import draw_signature
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect

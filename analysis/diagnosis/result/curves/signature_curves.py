@@ -9,9 +9,9 @@ import numpy as np
 
 from analysis.diagnosis.errors.unexplained_motion import EXPECTED
 from analysis.diagnosis.forces.missing_force import missing_force
+from analysis.diagnosis.result.curves.law_curves import law_signature
+from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, running_rms
 from analysis.diagnosis.result.findings import Signature
-from analysis.diagnosis.result.law_curves import law_signature
-from analysis.diagnosis.result.signature_bins import bin_law_means, bin_means, running_rms
 from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
 from equalizer.effects.simulation.simulator import SimulationResult, simulate_mechanism
 from equalizer.effects.starts.evidence import Evidence

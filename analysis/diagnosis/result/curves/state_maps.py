@@ -10,7 +10,7 @@ from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.document import Diagnosis
-from analysis.diagnosis.result.signature_bins import bin_means
+from analysis.diagnosis.result.curves.signature_bins import bin_means
 from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import axis_letter
 from equalizer.effects.starts.evidence import Evidence

@@ -9,7 +9,7 @@ from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
 from analysis.diagnosis.result.candidates import balance_errors, with_balances
-from analysis.diagnosis.result.state_maps import NOT_CONFIRMED, state_maps
+from analysis.diagnosis.result.curves.state_maps import NOT_CONFIRMED, state_maps
 from analysis.diagnosis.search.time_budget import always
 from analysis.figures.diagnosis_state_maps import state_map_pictures
 from equalizer.signals.recording import Recording

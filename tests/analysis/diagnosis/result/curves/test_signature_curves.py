@@ -6,8 +6,8 @@ from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.result.signature_bins import bin_law_means
-from analysis.diagnosis.result.signature_curves import Names, signature_of
+from analysis.diagnosis.result.curves.signature_bins import bin_law_means
+from analysis.diagnosis.result.curves.signature_curves import Names, signature_of
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
 from equalizer.signals.recording import Hold

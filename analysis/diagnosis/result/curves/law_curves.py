@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, correlation_ratio
 from analysis.diagnosis.result.findings import Signature
-from analysis.diagnosis.result.signature_bins import bin_law_means, bin_means, correlation_ratio
 from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, axis_names, has_memory, law_with_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.starts.evidence import Evidence
