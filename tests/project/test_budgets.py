@@ -10,11 +10,14 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("protocols", "equalizer", "analysis", "study")
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
 
 FUNCTION_LINES = 40
 FILE_LINES, LONG_FILE_LINES = 500, 300
 """No file is longer than the first; one longer than the second stands in the list."""
 FILES_IN_A_FOLDER = 20
+TEST_FILE_LINES, TEST_FILES_IN_A_FOLDER = 300, 25
+"""Test files have no list of exceptions: a longer one is split by what it tests."""
 SMALL_FILE_LINES = 60
 """A smaller file that a single neighbour imports belongs into that neighbour."""
 
@@ -100,6 +103,12 @@ def test_a_folder_can_be_taken_in_at_a_glance():
     full = {short(folder) for folder in modules if modules.count(folder) > FILES_IN_A_FOLDER}
     assert full - CATALOGUES.keys() == set(), "make rooms"
     assert all((ROOT / folder).is_dir() for folder in CATALOGUES)
+
+
+def test_test_files_and_folders_stay_small():
+    assert [short(path) for path in TESTS if line_count(path) > TEST_FILE_LINES] == []
+    folders = [path.parent for path in TESTS]
+    assert [short(each) for each in set(folders) if folders.count(each) > TEST_FILES_IN_A_FOLDER] == []
 
 
 def test_a_small_file_is_no_part_of_a_single_neighbour():

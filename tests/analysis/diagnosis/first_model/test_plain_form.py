@@ -6,41 +6,11 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.motion import motion_signal
-from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.driven_response import response_significance
 from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.first_model.plain_form import plain_form
 from analysis.diagnosis.settings import ANSWER_DEVIATIONS
-from equalizer.signals.recording import Hold, Recording
-from equalizer.signals.signal import Signal
-
-RATE_HZ = 100.0
-
-
-def smooth(count, seed, width=25):
-    noise = np.random.default_rng(seed).standard_normal(count + width)
-    course = np.convolve(noise, np.hanning(width), "same")[:count]
-    return course / course.std()
-
-
-def of(command, response):
-    """Each a list of (name, quantity, unit, samples)."""
-
-    def signal(channels):
-        names, quantities, units, samples = zip(*channels, strict=True)
-        return Signal(np.column_stack(samples), RATE_HZ, quantities, units, names)
-
-    return Recording("form", signal(command), signal(response))
-
-
-def speed_of(push, mass=0.05, damping=0.3):
-    """(n,): in fine steps."""
-    speed, found = 0.0, []
-    for force in push:
-        found.append(speed)
-        for _ in range(10):
-            speed += (force - damping * speed) / mass / RATE_HZ / 10
-    return np.array(found)
+from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, of, smooth, speed_of
 
 
 def test_a_plain_recording_stays_as_it_is():
@@ -194,115 +164,3 @@ def test_a_device_whose_memory_is_longer_than_a_stretch_answers_its_command():
     assert sure is None or sure >= ANSWER_DEVIATIONS
     assert unsure is not None
     assert unsure < ANSWER_DEVIATIONS
-
-
-def position_of(push, mass=0.05, damping=0.3, stiffness=20.0):
-    """(n,): of a body on a spring, in fine steps."""
-    place = speed = 0.0
-    found = []
-    for force in push:
-        found.append(place)
-        for _ in range(10):
-            speed += (force - damping * speed - stiffness * place) / mass / RATE_HZ / 10
-            place += speed / RATE_HZ / 10
-    return np.array(found)
-
-
-@pytest.mark.parametrize(
-    ("course", "quantity"), [(speed_of, "velocity"), (position_of, "position")], ids=["motor", "body on a spring"]
-)
-@pytest.mark.parametrize("unit", ["1", "V"])
-def test_a_response_of_which_nothing_says_what_it_is_is_taken_for_what_its_course_suggests(course, quantity, unit):
-    push = smooth(4000, 3, width=9)
-    own = "voltage" if unit == "V" else "1"
-    recording = of([("u", own, unit, push)], [("y", own, unit, course(push))])
-
-    (found,), said = plain_form((recording,))
-
-    if (quantity, unit) == ("position", "V"):  # a voltage counts as a position already
-        assert (found, said) == (recording, ())
-    else:
-        assert found.response.quantities == (quantity,)
-        assert "Nothing says what y measures" in said[0]
-
-
-def test_what_an_imposed_motion_meets_is_a_force_where_nothing_says_so():
-    place = smooth(2000, 5)
-    recording = of([("x", "position", "m", place)], [("y", "1", "1", 3 * place)])
-
-    (found,), _ = plain_form((recording,))
-
-    assert found.response.quantities == ("force",)
-
-
-def turned(recording):
-    return replace(recording, command=replace(recording.command, samples=-recording.command.samples))
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("friction", [0.0, 0.4])
-def test_a_command_that_is_counted_against_its_motion_is_turned_round(seed, friction):
-    push = smooth(2000, seed)
-    speed = speed_of(np.sign(push) * np.maximum(np.abs(push) - friction, 0.0))
-    recording = of([("u", "force", "N", push)], [("v", "velocity", "m/s", speed)])
-
-    assert plain_form((recording,)) == ((recording,), ())
-    (found,), (said,) = plain_form((turned(recording),))
-    np.testing.assert_array_equal(found.command.samples, recording.command.samples)
-    assert said.startswith("u is counted against the motion")
-
-
-@pytest.mark.parametrize("hold", [Hold.BAND_LIMITED, Hold.LINEAR])
-def test_what_was_decided_beforehand_is_turned_with_the_command(hold):
-    """It tells of a controller where the command alone cannot."""
-    push, decided = smooth(2000, 1), smooth(2000, 2)
-    recording = of([("u", "force", "N", push)], [("v", "velocity", "m/s", speed_of(push))])
-    beside = replace(recording.command, samples=decided[:, None])
-    recording = replace(turned(recording), hold=hold, excitation=replace(beside, samples=-beside.samples))
-
-    (found,), _ = plain_form((recording,))
-
-    np.testing.assert_array_equal(found.excitation.samples, beside.samples)
-    assert is_in_closed_loop(found)
-    assert not is_in_closed_loop(replace(found, excitation=found.command))
-
-
-def test_what_was_decided_beforehand_is_summed_with_the_commands():
-    first, second = smooth(2000, 1), smooth(2000, 2)
-    recording = of(
-        [("u1", "force", "N", first), ("u2", "force", "N", second)],
-        [("v", "velocity", "m/s", speed_of(first + 0.5 * second))],
-    )
-
-    (found,), _ = plain_form((replace(recording, excitation=recording.command),))
-
-    np.testing.assert_allclose(found.excitation.samples, found.command.samples)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_loop_without_time_tells_which_way_a_force_is_counted(seed):
-    """A spring with play, pulled to and fro: rising and falling branches."""
-    way = np.concatenate([np.linspace(0, 1, 300), np.linspace(1, -1, 600), np.linspace(-1, 0, 300)])
-    pulled = 20 * way + 3 * np.sign(np.gradient(way)) + 0.1 * np.random.default_rng(seed).standard_normal(1200)
-    recording = of([("u", "force", "N", pulled)], [("x", "position", "m", way)])
-    recording = replace(recording, meta={"time": "unknown"})
-
-    assert plain_form((recording,))[1] == ()
-    (found,), _ = plain_form((turned(recording),))
-    np.testing.assert_array_equal(found.command.samples, recording.command.samples)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_command_that_moves_nothing_and_a_spring_alone_are_left_as_they_are(seed):
-    push = smooth(2000, seed)
-    for moved in (smooth(2000, seed + 100), -push):
-        recording = of([("u", "force", "N", push)], [("x", "position", "m", moved)])
-        assert plain_form((recording,)) == ((recording,), ())
-
-
-def test_of_an_imposed_motion_the_measured_force_is_turned_round():
-    push = smooth(2000, 1)
-    recording = of([("v", "velocity", "m/s", speed_of(push))], [("f", "force", "N", -push)])
-
-    (found,), _ = plain_form((recording,))
-    np.testing.assert_array_equal(found.response.samples[:, 0], push)

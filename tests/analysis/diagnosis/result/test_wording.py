@@ -7,7 +7,7 @@ from analysis.diagnosis.effect_words import EFFECT_WORDS, noun_of, numbers_text,
 from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.ceiling_wording import black_box_sentence
 from analysis.diagnosis.result.findings import BlackBox
-from analysis.diagnosis.result.retuned_numbers import MovedNumber, doubtful_sentences, raised_sentence, retuned_sentence
+from analysis.diagnosis.result.retuned_numbers import MovedNumber, raised_sentence
 from analysis.diagnosis.result.wording import (
     confirmation_sentence,
     effect_sentence,
@@ -24,14 +24,18 @@ from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
 from equalizer.signals.unit_system import LINEAR
 
 PLACE = Mismatch("ax", "fx", (8.0, 16.0), 0.5, "near v = 0", 0.8, 1e-9)
+
 ERRORS = Errors(0.5, 0.36, 0.0266, 0.0265)
+
 RIVALS = (
     Rival("stribeck_friction", 0.3, True, ""),
     Rival("viscous_damping", 0.002, False, "it leaves 4.1 times the noise"),
 )
+
 DRY = NamedEffect(
     "coulomb_friction", "mechanism", "x", 0.9, 0.68, {"level": Estimate(0.211, "N", (0.20, 0.22))}, RIVALS
 )
+
 MOVED = MovedNumber("damping fx", 0.35, "N s/m", 2.1)
 
 
@@ -242,38 +246,6 @@ def test_held_out_data_that_do_not_confirm_are_said_not_to():
         "was fitted."
     )
     assert confirmation_sentence(fit, Errors(None, None, None, None)) == ""
-
-
-def test_numbers_of_the_model_that_moved_too_far_are_doubted():
-    assert retuned_sentence(()) == ""
-    assert retuned_sentence((MOVED,) * 6).endswith("(2.1 standard deviations) and 2 more.")
-    assert doubtful_sentences((MOVED,)) == ()
-    (far,) = doubtful_sentences((replace(MOVED, deviations=-3.4),))
-    assert far.startswith("The damping fx was moved by 3.4 standard deviations of its calibration: either")
-    (edge,) = doubtful_sentences((replace(MOVED, deviations=4.0),))
-    assert "of its calibration, as far as it may: either" in edge
-
-
-def test_a_model_that_was_fitted_here_has_no_calibration_to_leave():
-    assert retuned_sentence((MOVED,), fitted=True) == (
-        "Fitted once more, these numbers of the first model moved by more than was left open at first: "
-        "damping fx +0.350 N s/m."
-    )
-    assert doubtful_sentences((replace(MOVED, deviations=-3.4),), fitted=True) == ()
-    (edge,) = doubtful_sentences((replace(MOVED, deviations=4.0),), fitted=True)
-    assert "calibration" not in edge and edge.startswith("As far as they may")
-
-
-def test_many_doubtful_numbers_are_counted_in_one_sentence():
-    moved = (*(replace(MOVED, deviations=4.0) for _ in range(8)), *(replace(MOVED, deviations=-3.5) for _ in range(3)))
-    (said,) = doubtful_sentences(moved)
-    assert said.startswith("11 numbers were moved by 3 standard deviations of their calibration or more, 8 of them")
-
-
-def test_a_relative_change_is_read_as_per_cent():
-    assert MovedNumber("mass of the mode at 82 Hz", -0.021, "1", -2.1).text == (
-        "mass of the mode at 82 Hz −2.1 % (2.1 standard deviations)"
-    )
 
 
 def test_the_title_of_an_effect_stands_alone():

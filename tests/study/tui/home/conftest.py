@@ -58,6 +58,11 @@ class Bare(App[None]):
         await super()._on_message(message)
 
 
+def messages_of(app: Bare) -> list[tuple[object, ...]]:
+    """What the screen asked for: the name and the fields of each message."""
+    return [(type(each).__name__, *(getattr(each, name) for name in each.__dataclass_fields__)) for each in app.asked]
+
+
 class Sight:
     """What one reads on the screen."""
 

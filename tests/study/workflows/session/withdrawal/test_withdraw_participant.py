@@ -1,85 +1,20 @@
-"""Withdrawal erases this participant and nothing else, and goes on after an interruption at any point."""
+"""Withdrawal erases this participant and nothing else."""
 
 import json
-import os
 import shutil
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from study.cli.main import app, main
+from study.cli.main import app
 from study.errors import StudyError
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog
 from study.workflows.files.validate import validate_file
-from study.workflows.results.collect_sessions import collect_sessions
-from study.workflows.results.fold_session import fold_session
-from study.workflows.session.participant_number import participant_number
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
-from study.workflows.views.list_sessions import session_lines
-from study.workflows.views.view_session import session_view
+from tests.study.workflows.session.withdrawal.data_folder import UTC, erase, files, write_analysis
 
-CORPUS = Path(__file__).resolve().parents[3] / "frozen" / "v0_1" / "study"
-UTC = "2026-05-04T09:30:00+00:00"
 PART = ".anova.json.0123abcd.part"
-
-
-def copy_session(data: Path, name: str) -> None:
-    """The corpus's finished session under another name, with one recording."""
-    folder = data / name
-    (folder / "recordings").mkdir(parents=True)
-    for path in sorted((CORPUS / "P01_001" / "recordings").iterdir())[:1]:
-        shutil.copy(path, folder / "recordings")
-    for path in ("events.jsonl", "trials.csv", "thresholds.csv", "session.json"):
-        text = (CORPUS / "P01_001" / path).read_text()
-        (folder / path).write_text(text.replace("P01", name.partition("_")[0]).replace("_001", name[-4:]))
-
-
-def write_analysis(folder: Path, *subjects: str) -> None:
-    (folder / "figures").mkdir(parents=True)
-    header, row = (CORPUS / "P01_001" / "thresholds.csv").read_text().splitlines()[:2]
-    rows = [row.replace("P01", subject) for subject in subjects]
-    (folder / "thresholds.csv").write_text("\n".join([header, *rows, ""]))
-    (folder / "report.html").write_text(" ".join(subjects))
-    for number, subject in enumerate(subjects):
-        (folder / "figures" / f"staircases-{number}-{subject}.svg").write_text("<svg/>")
-
-
-@pytest.fixture
-def data(tmp_path) -> Path:
-    """Two sessions of P01, one of P02, and their analysis."""
-    data = tmp_path / "data"
-    for name in ("P01_001", "P01_002", "P02_001"):
-        copy_session(data, name)
-    write_analysis(data / "analysis", "P01", "P02")
-    return data
-
-
-def erase(data: Path, session: str = "P01_001") -> None:
-    withdraw(data, plan_withdrawal(SessionFolder(data / session)), UTC)
-
-
-def files(folder: Path) -> dict[str, bytes | str]:
-    """Of everything below, links as what they say."""
-    return {
-        str(path.relative_to(folder)): str(path.readlink()) if path.is_symlink() else path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_symlink() or path.is_file()
-    }
-
-
-@pytest.fixture
-def elsewhere(tmp_path) -> Iterator[Path]:
-    """A folder that no withdrawal may touch."""
-    copy_session(tmp_path / "other", "P01_002")
-    folder = tmp_path / "other" / "P01_002"
-    before = files(folder)
-    yield folder
-    assert files(folder) == before
 
 
 def test_a_link_in_the_place_of_a_session_is_named_and_left_alone(data, elsewhere):
@@ -228,105 +163,3 @@ def test_a_log_of_another_in_a_folder_that_was_the_participants_is_not_erased(da
     erase(data)
     assert (data / "P01_002" / "events.jsonl").read_bytes() == (data / "P02_001" / "events.jsonl").read_bytes()
     assert (data / "P01_003" / "mine.txt").exists()
-
-
-def test_what_an_earlier_version_left_half_erased_is_said_and_erased(data):
-    """It wrote the tombstone first, and said that nothing was left but it."""
-    left = {"format": "hapteq-tombstone", "version": 1, "session": "P01_001", "withdrawn_utc": UTC, "begun": None}
-    (data / "P01_001" / "withdrawn.json").write_text(json.dumps(left))
-    (data / "P01_001" / "events.jsonl").unlink()
-    problems = " ".join(validate_file(data / "P01_001").problems)
-    assert "Still there: recordings/, session.json, thresholds.csv, trials.csv." in problems
-    assert f"hapteq withdraw P01_001 --data {data}" in problems
-    erase(data)
-    assert validate_file(data / "P01_001").problems == ()
-
-
-class Killed(BaseException):
-    """In the place of a SIGKILL: from here on no operation is done any more."""
-
-
-class _Killer:
-    """Counts what changes a file system, and ends the program before the operation `at`."""
-
-    CHANGING = ("os.remove", "os.rmdir", "os.rename", "os.link", "os.mkdir", "os.chmod", "os.truncate", "os.symlink")
-
-    def __init__(self) -> None:
-        self.active, self.done, self.at = False, 0, 0
-
-    def __call__(self, event: str, arguments: tuple) -> None:
-        if not self.active:
-            return
-        writes = event == "open" and isinstance(arguments[2], int) and arguments[2] & (os.O_WRONLY | os.O_RDWR)
-        if writes or event in self.CHANGING:
-            self.done += 1
-            if self.done >= self.at:
-                raise Killed
-
-    @contextmanager
-    def before(self, operation: int) -> Iterator[None]:
-        self.active, self.done, self.at = True, 0, operation
-        try:
-            yield
-        finally:
-            self.active = False
-
-
-@pytest.fixture(scope="module")
-def killer() -> _Killer:
-    """An audit hook cannot be taken off; this one sleeps between tests."""
-    killer = _Killer()
-    sys.addaudithook(killer)
-    return killer
-
-
-def check_half_erased(data: Path) -> None:
-    """Nothing of P01 counts as data, and it is said how to go on."""
-    for line in session_lines(data):
-        if line.subject == "P01":
-            assert line.standing == "withdrawn"
-            assert "hapteq withdraw P01_" in line.remark
-    assert [folder.name for folder in collect_sessions(data).sessions] == ["P02_001"]
-    for name in ("P01_001", "P01_002"):
-        view = session_view(data / name)
-        assert (view.line.standing, view.thresholds, view.events) == ("withdrawn", (), ())
-        with pytest.raises(StudyError, match="was withdrawn"):
-            fold_session(SessionFolder(data / name))
-        validation = validate_file(data / name)
-        assert f"hapteq withdraw {name} --data {data}" in " ".join(validation.problems)
-        if not (data / name / "events.jsonl").exists():
-            assert {path.suffix for path in (data / name).iterdir()} <= {".json", ".lock", ".part"}
-            assert not (data / name / "session.json").exists()
-        for left in (path for path in (data / name).iterdir() if not path.name.startswith(("with", "session.lock"))):
-            assert left.name in " ".join(validation.problems)
-    assert participant_number(data, "P09", "corpus", simulated=True) == 1
-
-
-def test_killed_before_any_operation_it_goes_on_and_finishes(data, elsewhere, killer, tmp_path, monkeypatch):
-    (data / "P01_001" / "recordings" / "more").symlink_to(elsewhere)
-    monkeypatch.setattr("study.devices.clock.RealClock.utc", lambda clock: UTC)
-    whole = shutil.copytree(data, tmp_path / "whole", symlinks=True)
-    erase(whole)
-    operation, begun = 0, 0
-    while True:
-        operation += 1
-        place = shutil.copytree(data, tmp_path / f"killed-{operation}", symlinks=True)
-        try:
-            with killer.before(operation):
-                erase(place)
-            break
-        except Killed:
-            pass
-        untouched = {name: held for name, held in files(data).items() if name.startswith("P01")}
-        if (place / "P01.withdrawal.json").exists():
-            begun += 1
-            check_half_erased(place)
-        else:
-            now = files(place)
-            over = "P01_001/withdrawn.json" in now and "P01_002/withdrawn.json" in now
-            assert over or all(now.get(name) == held for name, held in untouched.items())
-        assert main(["withdraw", "P01_001", "--data", str(place), "--yes"]) == 0
-        assert files(place) == files(whole)
-        assert validate_file(place / "P01_001").problems == validate_file(place / "P01_002").problems == ()
-        shutil.rmtree(place)
-    assert begun > 15

@@ -1,134 +1,33 @@
-"""What happens around the trials: forms, demonstration, practice, catch trials, detection, limits of a sitting."""
+"""Trials of a sitting beside the staircase: practice, catch trials, detection; and the limits of a sitting."""
 
 from dataclasses import replace
 
 import pytest
 
 from protocols.definition.exposure import CatchSettings, DetectionSettings, SittingLimits
-from protocols.definition.preparation import (
-    ConsentSettings,
-    DebriefQuestion,
-    DemoSettings,
-    PracticeSettings,
-    SetupSettings,
-)
 from protocols.trial import Phase
 from study.session.facts.events import (
     DemoFinished,
     DemoPlayed,
-    DeviceChecked,
-    FormFilled,
     PauseTaken,
     RestTaken,
     SessionResumed,
     TrialSpoiled,
 )
 from study.session.facts.log_time import Moment
-from study.session.state.draw_check import LogContradiction
-from study.session.state.fold import apply, begin_session
+from study.session.state.fold import apply
 from study.session.state.machine import (
-    CheckDevice,
-    Demonstrate,
-    FillIn,
     Finish,
     Leave,
     Rest,
     limit_reached,
     next_action,
-    next_preparation,
 )
 from study.session.state.progress import progress
 from study.session.state.vibration_dose import a8_mps2
-from study.session.views.form_views import FormKind, FormReply, find_missing_fields
-from study.session.views.forms import form_of, judge_form
+from tests.study.session.sitting.preparation import UTC, prepared
 
-UTC = "2026-01-01T00:00:00.000+00:00"
 LATER = "2026-01-01T02:00:00.000+00:00"
-
-
-@pytest.fixture
-def full(small_protocol):
-    """The small protocol with everything around the trials that there is."""
-    return replace(
-        small_protocol,
-        consent=ConsentSettings(version="3", ethics_id="EK 7/26", statements=("I agree.",), exclusions=("A wound?",)),
-        setup=SetupSettings(ask=True),
-        demo=DemoSettings(level_n=1.0),
-        practice=PracticeSettings(frequencies_hz=(25.0,), right_needed=2, of_last=3, trial_limit=4),
-        debrief=(DebriefQuestion("strategy", "How?"), DebriefQuestion("felt", "Directed?", ("yes", "no"))),
-    )
-
-
-@pytest.fixture
-def begun(facts, small_text):
-    def begin(protocol, **changes):
-        return begin_session(facts.opened(protocol, small_text, **changes), protocol)
-
-    return begin
-
-
-def filled(form: str, passed: bool = True, **answers: str) -> FormFilled:
-    return FormFilled(UTC, form, "3", "EK 7/26", passed, answers)
-
-
-def prepared(state):
-    for event in (filled("consent"), filled("exclusion"), filled("setup"), DeviceChecked(UTC, True, ())):
-        state = apply(state, event)
-    return state
-
-
-def test_a_person_is_asked_for_consent_first_and_for_the_device_last(begun, full):
-    state, kinds = begun(full), []
-    for event in (filled("consent"), filled("exclusion"), filled("setup"), DeviceChecked(UTC, True, ())):
-        due = next_preparation(state)
-        kinds.append(due.form.kind if isinstance(due, FillIn) else type(due))
-        state = apply(state, event)
-    assert kinds == [FormKind.CONSENT, FormKind.EXCLUSION, FormKind.SETUP, CheckDevice]
-    assert next_preparation(state) is None
-
-
-def test_a_simulated_participant_signs_nothing(begun, full):
-    state = begun(full, observer="ideal")
-    assert next_preparation(state) is None
-    assert next_action(state).phase is Phase.TRAINING
-
-
-@pytest.mark.parametrize(("form", "reason"), [("consent", "consent was not given"), ("exclusion", "with yes")])
-def test_whoever_does_not_agree_or_may_not_take_part_feels_nothing(begun, full, form, reason):
-    state = begun(full)
-    if form == "exclusion":
-        state = apply(state, filled("consent"))
-    state = apply(state, filled(form, passed=False))
-    assert isinstance(next_preparation(state), Leave)
-    assert reason in next_preparation(state).reason
-
-
-def test_a_resumed_session_asks_again_how_one_sits_and_nothing_else(begun, full, facts):
-    state = prepared(begun(full))
-    resumed = apply(state, SessionResumed(UTC, state.opened.device, {}))
-    assert next_preparation(resumed).form.kind is FormKind.SETUP
-
-
-def test_a_refusal_by_a_slip_of_the_finger_can_be_mended_in_another_sitting(begun, full):
-    state = apply(begun(full), filled("consent", passed=False))
-    again = apply(state, SessionResumed(UTC, state.opened.device, {}))
-    assert next_preparation(again).form.kind is FormKind.CONSENT
-
-
-def test_the_demonstration_comes_once_before_the_first_trial(begun, full):
-    state = prepared(begun(full))
-    assert isinstance(next_action(state), Demonstrate)
-    state = apply(state, DemoPlayed(UTC, 25.0, 1.0, 1, 135.0, 2.0))
-    assert isinstance(next_action(state), Demonstrate)
-    state = apply(state, DemoFinished(UTC))
-    assert next_action(state).phase is Phase.TRAINING
-
-
-def test_nothing_is_filled_in_or_demonstrated_while_a_trial_is_open(begun, small_protocol, facts):
-    state = begun(small_protocol)
-    state = apply(state, facts.presented(next_action(state)))
-    with pytest.raises(LogContradiction, match="while a trial is open"):
-        apply(state, DemoFinished(UTC))
 
 
 def test_practice_stays_at_its_level_until_it_is_passed(begun, full, facts):
@@ -262,52 +161,6 @@ def test_a_hand_that_had_its_dose_rests_for_the_day(begun, small_protocol):
 def test_a_pause_changes_nothing(begun, small_protocol):
     state = begun(small_protocol)
     assert apply(state, PauseTaken(UTC, "experimenter", 12.0)) == state
-
-
-def test_the_debrief_comes_after_the_last_run(begun, full, facts):
-    state = apply(prepared(begun(full)), DemoFinished(UTC))
-    answers = iter([True, True, True, False] * 200)
-    while not state.finished:
-        action = next_action(state)
-        state = (
-            apply(state, RestTaken(UTC, state.run, state.trial, 2.0))
-            if isinstance(action, Rest)
-            else facts.one_trial(state, next(answers))
-        )
-    assert next_action(state).form.kind is FormKind.DEBRIEF
-    assert isinstance(next_action(apply(state, filled("debrief"))), Finish)
-
-
-def test_consent_is_given_by_every_statement_and_kept(full):
-    form = form_of(full, FormKind.CONSENT)
-    assert (form.version, form.ethics_id) == ("3", "EK 7/26")
-    assert judge_form(full, FormKind.CONSENT, FormReply({"statement_1": "yes"})).passed
-    assert not judge_form(full, FormKind.CONSENT, FormReply({"statement_1": "no"})).passed
-
-
-def test_answers_about_health_are_not_kept(full):
-    outcome = judge_form(full, FormKind.EXCLUSION, FormReply({"question_1": "yes"}))
-    assert not outcome.passed
-    assert outcome.kept == {}
-
-
-def test_a_set_up_that_is_not_the_protocols_is_said(full):
-    answers = {"hearing": "nothing", "hand_hidden": "no", "arm_supported": "yes", "grip": "pen grip", "hand": "right"}
-    outcome = judge_form(full, FormKind.SETUP, FormReply(answers))
-    assert outcome.passed
-    assert outcome.kept == answers
-    assert outcome.reminder == "The set-up is not the protocol's: the device can be heard, the hand can be seen."
-
-
-def test_a_form_knows_what_is_missing(full):
-    form = form_of(full, FormKind.DEBRIEF)
-    assert [field.key for field in find_missing_fields(form, FormReply({}))] == ["felt"]
-    assert [field.key for field in find_missing_fields(form, FormReply({"felt": "maybe"}))] == ["felt"]
-    assert find_missing_fields(form, FormReply({"felt": "no", "strategy": ""})) == ()
-
-
-def test_a_protocol_that_asks_nothing_has_no_forms(small_protocol):
-    assert [form_of(small_protocol, kind) for kind in FormKind] == [None] * 4
 
 
 def test_progress_grows_with_trials_and_says_nothing_of_levels(begun, small_protocol, facts):

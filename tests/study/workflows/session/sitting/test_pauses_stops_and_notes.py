@@ -1,0 +1,128 @@
+"""Pauses, stops and notes during a sitting, from the other terminal and from the participant."""
+
+from dataclasses import replace
+
+from study.session.facts.events import (
+    AnswerGiven,
+    NoteTaken,
+    PauseTaken,
+    RestTaken,
+    TrialSpoiled,
+)
+from study.session.views.form_views import FormKind
+from study.session.views.views import AfterPause
+from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
+from study.store.sessions.request_inbox import RequestInbox
+from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
+from tests.study.workflows.session.sitting.person import Person, of
+
+
+def test_a_pause_from_the_other_terminal_frees_the_hand_and_the_trial_comes_again(plan, full, seat, person, tmp_path):
+    inbox = lambda: RequestInbox(tmp_path / "data" / "P01_001")  # noqa: E731
+    person.at_question = lambda q: inbox().send(PauseAsked("experimenter")) if len(person.questions) == 3 else None
+    end = conduct_new(plan(full), "simulated", seat)
+    assert "the experimenter asked for a pause" in person.calls
+    assert [event.who for event in of(end, PauseTaken)] == ["experimenter"]
+    spoiled = of(end, TrialSpoiled)
+    assert [event.reason for event in spoiled] == ["the experimenter asked for a pause"]
+    assert not end.left
+
+
+def test_a_stop_from_the_other_terminal_ends_the_sitting_and_can_be_resumed(plan, full, seat, person, tmp_path, clock):
+    inbox = lambda: RequestInbox(tmp_path / "data" / "P01_001")  # noqa: E731
+    person.at_question = lambda q: inbox().send(StopAsked("experimenter")) if len(person.questions) == 3 else None
+    end = conduct_new(plan(full), "simulated", seat)
+    assert end.left == "the experimenter stopped the session"
+    assert len(of(end, AnswerGiven)) == 2
+    again = Person(clock)
+    resumed = conduct_resumed(end.folder, "simulated", Participant(display=again, hand=again, clock=clock))
+    assert not resumed.left
+    assert again.calls[:2] == [FormKind.SETUP, "device"]
+
+
+def test_a_stop_during_a_rest_cuts_it_short(plan, small_protocol, seat, person, tmp_path):
+    long_rest = replace(small_protocol, rests=replace(small_protocol.rests, after_run_s=600.0))
+    resting = person.rest
+
+    def rest(notice, sign_of_life):
+        RequestInbox(tmp_path / "data" / "P01_001").send(StopAsked("experimenter"))
+        return resting(notice, sign_of_life)
+
+    person.rest = rest
+    end = conduct_new(plan(long_rest), "simulated", seat)
+    assert end.left == "the experimenter stopped the session"
+    assert of(end, RestTaken) == []
+
+
+def test_a_stop_during_a_pause_ends_it(plan, small_protocol, seat, person):
+    person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
+    person.at_pause = lambda: seat.requests.send(StopAsked("experimenter"))
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert end.left == "the experimenter stopped the session"
+    assert len(of(end, PauseTaken)) == 1
+
+
+def test_a_note_is_on_the_disk_before_the_pause_is_over(plan, small_protocol, seat, person, tmp_path):
+    seen = []
+
+    def pause(notice, sign_of_life):
+        seat.requests.send(NoteAsked("participant", "my thumb is numb", adverse=True))
+        sign_of_life()
+        seen.append((tmp_path / "data" / "P01_001" / "events.jsonl").read_text())
+        return AfterPause.GO_ON
+
+    person.pause = pause
+    person.at_question = lambda q: seat.requests.send(PauseAsked("participant")) if len(person.questions) == 2 else None
+    conduct_new(plan(small_protocol), "simulated", seat)
+    assert "my thumb is numb" in seen[0]
+
+
+def test_notes_reach_the_log_whoever_writes_them(plan, small_protocol, seat, person):
+    def noted(question):
+        if len(person.questions) == 2:
+            seat.requests.send(NoteAsked("participant", "my thumb is numb", adverse=True))
+
+    person.at_question = noted
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert [(note.who, note.text, note.adverse) for note in of(end, NoteTaken)] == [
+        ("participant", "my thumb is numb", True)
+    ]
+
+
+def test_whoever_withdraws_in_a_pause_ends_the_sitting(plan, small_protocol, seat, person):
+    person.decisions = [AfterPause.WITHDRAW]
+    person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert end.withdrawn
+    assert end.left == "the participant withdrew"
+
+
+def test_a_pause_asked_for_during_a_pause_makes_no_second_one(plan, small_protocol, seat, person):
+    person.at_pause = lambda: seat.requests.send(PauseAsked("participant"))
+    person.at_question = lambda q: seat.requests.send(PauseAsked("participant")) if len(person.questions) == 3 else None
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert len(of(end, PauseTaken)) == 1
+
+
+def test_what_is_noted_during_the_goodbye_is_in_the_log(plan, small_protocol, seat, person):
+    person.goodbye = lambda notice: seat.requests.send(NoteAsked("experimenter", "a rash", adverse=True))
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert not end.left
+    assert [note.text for note in of(end, NoteTaken)] == ["a rash"]
+
+
+def test_ctrl_c_at_the_goodbye_of_a_finished_session_leaves_it_finished(plan, small_protocol, seat, person):
+    def goodbye(notice):
+        raise KeyboardInterrupt
+
+    person.goodbye = goodbye
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert not end.left
+    assert end.state.closed
+
+
+def test_leaving_from_a_pause_can_be_resumed(plan, small_protocol, seat, person):
+    person.decisions = [AfterPause.LEAVE]
+    person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert (end.left, end.withdrawn) == ("the participant left", False)
