@@ -10,9 +10,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from analysis.diagnosis.types import Mask
-from analysis.figures.picture import Picture
+from analysis.figures.picture import Picture, count_in_samples
 from analysis.figures.style import BLACK, BLUE, COLOURS, GREY, MARKERS, ORANGE, SKY, new_figure, plain_axes
-from analysis.figures.untimed import count_in_samples
 from analysis.look.channels import Channel
 from analysis.look.kinematics import KinematicPair, derivative
 from analysis.look.overview import Overview

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import matplotlib
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from analysis.wording import untimed_text
 
 
 def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> str:
@@ -61,3 +64,13 @@ def picture_svg(picture: Picture) -> str:
 def without_figure(picture: Picture) -> Picture:
     """A drawn one that can be sent from another process: its figure is empty."""
     return replace(picture, figure=Figure())
+
+
+def count_in_samples(picture: Picture) -> Picture:
+    """Of a recording without known time: all texts in samples instead of seconds and hertz. To be called before
+    drawing."""
+    for text in picture.figure.findobj(Text):
+        if isinstance(text, Text):
+            text.set_text(untimed_text(text.get_text()))
+    caption, alternative = untimed_text(picture.caption), untimed_text(picture.alternative)
+    return replace(picture, caption=caption, alternative=alternative)

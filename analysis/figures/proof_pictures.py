@@ -9,9 +9,8 @@ from matplotlib.lines import Line2D
 from analysis.evaluation.proof.calibration import Calibration
 from analysis.evaluation.proof.detection import Strip, detection_strips, shares_by_size
 from analysis.evaluation.proof.outcome import Outcome
-from analysis.figures.diagnosis_style import ratio_ticks
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes
+from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes, ratio_ticks
 
 MARKS = {"right": ("o", BLUE), "in the set": ("D", ORANGE), "missed": ("X", VERMILLION), "invisible": (".", GREY)}
 NOTHING_SAID = "no name"

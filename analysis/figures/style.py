@@ -3,6 +3,7 @@
 Palette: M. Okabe, K. Ito, Color Universal Design (2008).
 """
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
@@ -15,6 +16,10 @@ COLOURS = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY, BLACK, WINE, OLIVE, TEA
 MARKERS = ("o", "s", "D", "P", "X", "p", "h", "d", "*", "8")
 CUT_MARKER = "$\\uparrow$"
 """An arrow above the participant's own marker: the cap cut into this threshold."""
+_STEPS = ((1.5, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)), (3.0, (1.0, 2.0, 5.0)), (4.0, (1.0, 3.0)), (np.inf, (1.0,)))
+"""Tick multiples by the number of decades of an axis."""
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
@@ -35,6 +40,22 @@ def newton_ticks(axis: Axis, lowest_n: float, highest_n: float) -> None:
     levels = [level for level in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 3.0) if lowest_n <= level <= highest_n]
     axis.set_ticks(levels, labels=[f"{level:g}" for level in levels])
     axis.set_ticks([], minor=True)
+
+
+def ratio_ticks(axis: Axis, low: float, high: float) -> None:
+    """Round multiples on a logarithmic axis, as many as there is room for. Call after the scale is set."""
+    decades = np.log10(high / low)
+    steps = next(each for most, each in _STEPS if decades <= most)
+    powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    values = [step * 10.0**power for power in powers for step in steps]
+    shown = [value for value in values if low <= value <= high]
+    axis.set_ticks(shown, labels=[f"{value:.10g}" for value in shown])
+    axis.set_ticks([], minor=True)
+
+
+def power_of_ten(value: float) -> str:
+    """0.001 as "10⁻³": written out, because formulas take matplotlib a second."""
+    return "10" + f"{np.log10(value):.0f}".translate(_RAISED) if value > 0 else ""
 
 
 def say_nothing_to_draw(figure: Figure, sentence: str) -> Figure:

@@ -45,7 +45,7 @@ from analysis.wording import capitalise
 def render_diagnosis_report(
     found: Findings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
 ) -> str:
-    """HTML. pictures: of `analysis.figures.diagnosis_pictures`, for the same findings."""
+    """HTML. pictures: of `analysis.figures.diagnosis.diagnosis_pictures`, for the same findings."""
     diagnosis = found.diagnosis
     sections = [
         *_answer_sections(found),

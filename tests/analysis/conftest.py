@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.figures.diagnosis_pictures import diagnosis_pictures
+from analysis.figures.diagnosis.diagnosis_pictures import diagnosis_pictures
 from protocols.definition.apparatus import SafetySettings, TestDirections
 from protocols.definition.exposure import CatchSettings, DetectionSettings
 from protocols.definition.preparation import PracticeSettings

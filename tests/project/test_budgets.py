@@ -25,7 +25,6 @@ CATALOGUES = {
     "equalizer/effects": "one physics a file",
     "study/cli": "one command a file",
     "study/tui/screens": "one screen a file",
-    "analysis/figures": "one figure a file",
     "study/participants": "one kind of simulated participant a file",
     "study/store/formats": "one format a file",
 }

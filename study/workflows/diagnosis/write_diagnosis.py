@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from analysis.diagnosis.result.findings import Findings
-from analysis.figures.diagnosis_pictures import diagnosis_drawings
+from analysis.figures.diagnosis.diagnosis_pictures import diagnosis_drawings
 from analysis.figures.picture import Picture
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from study.local_clock import local_now

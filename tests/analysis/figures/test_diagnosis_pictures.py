@@ -9,14 +9,13 @@ from matplotlib.text import Annotation
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
-from analysis.figures.diagnosis_held_out import draw_held_out, find_excerpt
-from analysis.figures.diagnosis_mismatch_map import draw_mismatch_map, mismatch_map_pictures
-from analysis.figures.diagnosis_remainder import draw_remainder
-from analysis.figures.diagnosis_rivals import draw_rivals, list_explanations, rivals_pictures
-from analysis.figures.diagnosis_signature import draw_signature
-from analysis.figures.diagnosis_style import power_of_ten, ratio_ticks
+from analysis.figures.diagnosis.held_out import draw_held_out, find_excerpt
+from analysis.figures.diagnosis.mismatch_map import draw_mismatch_map, mismatch_map_pictures
+from analysis.figures.diagnosis.remainder import draw_remainder
+from analysis.figures.diagnosis.rivals import draw_rivals, list_explanations, rivals_pictures
+from analysis.figures.diagnosis.signature import draw_signature
 from analysis.figures.picture import picture_svg
-from analysis.figures.style import new_figure
+from analysis.figures.style import new_figure, power_of_ten, ratio_ticks
 
 
 def cell(output="ax", input_="fx", low_hz=8.0, amplitude=1.0, in_noise=5.0, p=1e-6, quantity="acceleration"):

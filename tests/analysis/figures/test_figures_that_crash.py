@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.diagnosis.search.guard import Guard
-from analysis.figures import diagnosis_pictures as module
+from analysis.figures.diagnosis import diagnosis_pictures as module
 
 
 def broken(*arguments):

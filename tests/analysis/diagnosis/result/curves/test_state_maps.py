@@ -11,7 +11,7 @@ from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismat
 from analysis.diagnosis.result.candidates import balance_errors, with_balances
 from analysis.diagnosis.result.curves.state_maps import NOT_CONFIRMED, state_maps
 from analysis.diagnosis.search.time_budget import always
-from analysis.figures.diagnosis_state_maps import state_map_pictures
+from analysis.figures.diagnosis.state_maps import state_map_pictures
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 

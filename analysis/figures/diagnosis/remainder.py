@@ -10,9 +10,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from analysis.diagnosis.result.remainder_spectrum import RemainderSpectrum
 from analysis.diagnosis.unit_wording import typeset_unit
-from analysis.figures.diagnosis_style import AFTER, RETUNED, power_of_ten
+from analysis.figures.diagnosis.stage_style import AFTER, RETUNED
 from analysis.figures.picture import Picture
-from analysis.figures.style import GREY, new_figure, plain_axes, say_nothing_to_draw
+from analysis.figures.style import GREY, new_figure, plain_axes, power_of_ten, say_nothing_to_draw
 
 _COLUMNS = 3
 _SIGNAL = Line2D([], [], color=GREY, linewidth=0.9, label="measured")

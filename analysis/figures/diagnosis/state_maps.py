@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from analysis.diagnosis.result.curves.state_maps import Loop, StateMaps, StateView
 from analysis.diagnosis.unit_wording import scale_of, share_text
-from analysis.figures.diagnosis_style import AFTER, BEFORE, MEASURED
+from analysis.figures.diagnosis.stage_style import AFTER, BEFORE, MEASURED
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes
 from analysis.wording import conjoin, typeset

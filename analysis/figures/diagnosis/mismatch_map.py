@@ -10,9 +10,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.figures.diagnosis_style import STAGES, Stage, ratio_ticks
+from analysis.figures.diagnosis.stage_style import STAGES, Stage
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, new_figure, say_nothing_to_draw
+from analysis.figures.style import BLACK, GREY, new_figure, ratio_ticks, say_nothing_to_draw
 from equalizer.signals.signal import FloatArray
 
 _LOUDEST = 300.0

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from analysis.diagnosis.result.findings import Course
 from analysis.diagnosis.unit_wording import scale_of
-from analysis.figures.diagnosis_style import AFTER, BEFORE, MEASURED, RETUNED, STAGES, Stage, ratio_ticks
+from analysis.figures.diagnosis.stage_style import AFTER, BEFORE, MEASURED, RETUNED, STAGES, Stage
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, say_nothing_to_draw
+from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, ratio_ticks, say_nothing_to_draw
 from equalizer.signals.signal import FloatArray
 
 _CYCLES = 5.0

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, RealAnswer
 from analysis.diagnosis.unit_wording import scale_of
-from analysis.figures.diagnosis_style import AFTER, MEASURED, RETUNED
+from analysis.figures.diagnosis.stage_style import AFTER, MEASURED, RETUNED
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, new_figure, plain_axes, say_nothing_to_draw
 

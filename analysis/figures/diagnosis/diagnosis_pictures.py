@@ -6,14 +6,13 @@ from functools import partial
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
 from analysis.diagnosis.search.guard import Guard, Part
-from analysis.figures.diagnosis_held_out import held_out_picture
-from analysis.figures.diagnosis_mismatch_map import driving_inputs, mismatch_map_picture
-from analysis.figures.diagnosis_remainder import remainder_picture
-from analysis.figures.diagnosis_rivals import rivals_pictures
-from analysis.figures.diagnosis_signature import signature_pictures
-from analysis.figures.diagnosis_state_maps import state_map_pictures
-from analysis.figures.picture import Picture
-from analysis.figures.untimed import count_in_samples
+from analysis.figures.diagnosis.held_out import held_out_picture
+from analysis.figures.diagnosis.mismatch_map import driving_inputs, mismatch_map_picture
+from analysis.figures.diagnosis.remainder import remainder_picture
+from analysis.figures.diagnosis.rivals import rivals_pictures
+from analysis.figures.diagnosis.signature import signature_pictures
+from analysis.figures.diagnosis.state_maps import state_map_pictures
+from analysis.figures.picture import Picture, count_in_samples
 
 
 def diagnosis_pictures(found: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:

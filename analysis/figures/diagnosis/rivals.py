@@ -13,9 +13,9 @@ from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.figures.diagnosis_style import AFTER, RETUNED, ratio_ticks
+from analysis.figures.diagnosis.stage_style import AFTER, RETUNED
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, say_nothing_to_draw
+from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, ratio_ticks, say_nothing_to_draw
 from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
