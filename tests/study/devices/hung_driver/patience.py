@@ -12,9 +12,12 @@ def alive(device, seconds: float) -> None:
         time.sleep(0.01)
 
 
-def hold(device, rigs, rig) -> None:
+def hold(device, rigs, rig, seconds: float = 2.0) -> None:
+    """Until the force has faded in, which takes 0.1 s of the loop's time."""
     device.hold(rigs.push())
-    alive(device, 0.15)
+    until_s = time.monotonic() + seconds
+    while rig.last_n[0] != pytest.approx(2.9) and time.monotonic() < until_s:
+        alive(device, 0.02)
     assert rig.last_n[0] == pytest.approx(2.9)
 
 
