@@ -209,6 +209,24 @@ class MeasurementSettings:
             "fewer cannot be felt.",
         ),
     ] = 0.02
+    late_ticks_limit: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=1,
+            description="A trial with a larger share of ticks whose work ended after the next was due, missed ones "
+            "included, is void and comes again. Default 0.02. Only of devices that do not wait for the computer.",
+        ),
+    ] = 0.02
+    longest_late_ms: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=1000,
+            description="A trial is void and comes again where a tick's work ended later than this after it was due: "
+            "the device held its last force until then. Default 10 ms: a quarter of a period at 25 Hz.",
+        ),
+    ] = 10.0
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -33,8 +33,10 @@ SAFETY_SINCE: dict[str, Untouched] = {"safety.feedback_cap_n": 1.5, "safety.plau
 
 ROVE_SINCE: dict[str, Untouched] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0}
 
+TIMING_SINCE: dict[str, Untouched] = {"measurement.late_ticks_limit": 0.02, "measurement.longest_late_ms": 10.0}
+
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
-    "study": {"trial.device_buttons": [], "trial.repeats_per_run": 3, **ROVE_SINCE, **SAFETY_SINCE},
+    "study": {"trial.device_buttons": [], "trial.repeats_per_run": 3, **ROVE_SINCE, **SAFETY_SINCE, **TIMING_SINCE},
     "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
 }
 """The same for single fields, for each kind of protocol; `segments.role` is that of every segment."""

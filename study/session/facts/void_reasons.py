@@ -5,6 +5,9 @@ SCREEN_SILENT = "the screen gave no sign of life"
 SCREEN_LATE = f"{SCREEN_SILENT}: the computer was too busy"
 PROGRAM_STALLED = "the program gave no sign of life, so the force was faded out"
 TICKS_MISSED = "of the 1 kHz ticks were missed"
+TICKS_LATE = "of the 1 kHz ticks were late or missed"
+TICK_HELD = "late was the latest 1 kHz tick"
+"""Ends of the reason, after the figure."""
 
 LOAD_PER_PROCESSOR = 0.75
 """Load average per processor above which tasks often have to wait for a processor."""
@@ -23,7 +26,7 @@ def why_screen_silent(engine_late_s: float, load_per_processor: float | None) ->
 
 def computer_too_busy(reason: str) -> bool:
     """Whether this reason says that the computer was too busy; False also if unknown."""
-    return reason in (SCREEN_LATE, PROGRAM_STALLED) or reason.endswith(TICKS_MISSED)
+    return reason in (SCREEN_LATE, PROGRAM_STALLED) or reason.endswith((TICKS_MISSED, TICKS_LATE, TICK_HELD))
 
 
 def void_for_participant(reason: str) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from protocols.definition.study_protocol import MeasurementSettings
 from protocols.trial import VoidCause
 from study.devices.device import Fault, Health
-from study.session.facts.void_reasons import TICKS_MISSED
+from study.session.facts.void_reasons import TICK_HELD, TICKS_LATE, TICKS_MISSED
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,9 +23,8 @@ def judge(health: Health, settings: MeasurementSettings, felt_whole: bool) -> Ju
     flagged."""
     if health.fault is not Fault.NONE and not felt_whole:
         return Judgement(health.fault.value, (), cause_of(health.fault))
-    if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):
-        share = 100 * health.missed_ticks / max(health.ticks, 1)
-        return Judgement(f"{share:.1f} % {TICKS_MISSED}", (), VoidCause.MISSED_TICKS)
+    if ill_timed := _ill_timed(health, settings):
+        return Judgement(ill_timed, (), VoidCause.MISSED_TICKS)
     observed = (
         (health.fault is not Fault.NONE, f"after the answer: {health.fault.value}"),
         (health.stimulus_clipped > 0, "stimulus clipped at its cap"),
@@ -35,6 +34,18 @@ def judge(health: Health, settings: MeasurementSettings, felt_whole: bool) -> Ju
         (health.sensor_clipped > 0, "accelerometer clipped"),
     )
     return Judgement("", tuple(text for seen, text in observed if seen))
+
+
+def _ill_timed(health: Health, settings: MeasurementSettings) -> str:
+    """Which limit of the loop's timing was passed; empty if none was."""
+    missed = health.missed_ticks / max(health.ticks, 1)
+    late = missed + health.late_ticks / max(health.ticks, 1)
+    latest_ms = 1000 * health.latest_s
+    if missed > settings.missed_ticks_limit:
+        return f"{missed:.1%} {TICKS_MISSED}".replace("%", " %")
+    if late > settings.late_ticks_limit:
+        return f"{late:.1%} {TICKS_LATE}".replace("%", " %")
+    return f"{latest_ms:.1f} ms {TICK_HELD}" if latest_ms > settings.longest_late_ms else ""
 
 
 def cause_of(fault: Fault) -> VoidCause:

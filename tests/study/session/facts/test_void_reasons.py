@@ -1,5 +1,7 @@
 """Which void trials the computer is to blame for, and what people read of them."""
 
+from dataclasses import replace
+
 import pytest
 
 from study.devices.device import Fault, Health
@@ -41,6 +43,27 @@ def test_what_a_busy_computer_does_to_a_trial_is_counted_as_that(small_protocol)
         assert words.endswith("This was not your fault, and the trial is repeated.")
     for reason in (SCREEN_SILENT, Fault.LOST.value, "the participant asked for it again", ""):
         assert not computer_too_busy(reason)
+
+
+@pytest.mark.parametrize(
+    ("missed", "late", "latest_s", "spoiled"),
+    [
+        (20, 0, 0.005, ""),
+        (21, 0, 0.005, "2.1 % of the 1 kHz ticks were missed"),
+        (0, 20, 0.005, ""),
+        (0, 21, 0.005, "2.1 % of the 1 kHz ticks were late or missed"),
+        (11, 10, 0.005, "2.1 % of the 1 kHz ticks were late or missed"),
+        (0, 1, 0.010, ""),
+        (0, 1, 0.0112, "11.2 ms late was the latest 1 kHz tick"),
+    ],
+)
+def test_above_a_limit_of_the_protocol_late_ticks_make_a_trial_void(small_protocol, missed, late, latest_s, spoiled):
+    health = Health(Fault.NONE, 1000, missed, 0, 0, 0, 0, 1.0, late_ticks=late, latest_s=latest_s)
+    found = judge(health, small_protocol.measurement, True)
+    assert found.spoiled == spoiled
+    assert computer_too_busy(found.spoiled) is bool(spoiled)
+    lax = replace(small_protocol.measurement, missed_ticks_limit=1.0, late_ticks_limit=1.0, longest_late_ms=1000.0)
+    assert judge(health, lax, True).spoiled == ""
 
 
 def test_a_silent_screen_is_not_the_participants_fault_either():
