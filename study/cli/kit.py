@@ -5,11 +5,12 @@ from typing import Annotated
 
 import typer
 
-from study.cli.command_groups import CommandGroups
+from study.cli.command_table import Subcommands
 from study.cli.seed import check_seed
 
 app = typer.Typer(
-    cls=CommandGroups,
+    cls=Subcommands,
+    add_completion=False,
     help="A blind test on your own device: draw what is changed, seal it, score it (docs/kit.md).",
     no_args_is_help=True,
     rich_markup_mode=None,

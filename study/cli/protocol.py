@@ -6,10 +6,16 @@ from typing import Annotated
 
 import typer
 
-from study.cli.command_groups import CommandGroups
+from study.cli.command_table import Subcommands
 from study.cli.study import DataOption
 
-app = typer.Typer(cls=CommandGroups, help="List, show and lock protocols.", no_args_is_help=True, rich_markup_mode=None)
+app = typer.Typer(
+    cls=Subcommands,
+    add_completion=False,
+    help="List, show and lock protocols.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
 
 NameArgument = Annotated[str, typer.Argument(help="A shipped protocol's name, or a file.")]
 

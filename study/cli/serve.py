@@ -10,7 +10,7 @@ import typer
 from study.errors import StudyError, WrongUseError
 from study.tui.keys.answer_keys import parse_keys
 
-PASSES_OPTIONS_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
+CONTEXT_SETTINGS = {"allow_extra_args": True, "ignore_unknown_options": True}
 """What serve does not know are options of `hapteq study`."""
 
 EVERYWHERE = ("0.0.0.0", "::", "")

@@ -24,8 +24,11 @@ def loaded_by(statement: str) -> set[str]:
 def test_help_loads_nothing_heavy():
     loaded = loaded_by(
         "from study.cli.main import main\n"
+        "from study.cli.command_table import LoadedWhenCalled\n"
         "import io, contextlib\n"
-        "with contextlib.redirect_stdout(io.StringIO()): main(['--help'])"
+        "with contextlib.redirect_stdout(io.StringIO()): main(['--help'])\n"
+        "assert 'study.cli.diagnose' not in sys.modules\n"
+        "for command in LoadedWhenCalled().values(): str(command.help)"
     )
     assert loaded.isdisjoint(HEAVY), sorted(loaded & set(HEAVY))
 
@@ -52,7 +55,7 @@ def test_a_session_begins_and_a_file_is_checked_without_statistics_and_plots():
 def test_the_process_that_draws_loads_no_arrays_no_disk_and_no_device():
     screens = sorted((ROOT / "study" / "tui" / "screens").glob("*.py"))
     names = [f"study.tui.screens.{module.stem}" for module in screens if module.stem != "__init__"]
-    apps = ("study.cli.main", "study.tui.app.app", "study.tui.app.sitting_screens", "study.tui.watch.watch_app")
+    apps = ("study.cli.study", "study.cli.resume", "study.cli.watch", "study.tui.app.app", "study.tui.app.sitting_screens", "study.tui.watch.watch_app")
     everything = ", ".join((*apps, *names))
     loaded = loaded_by(f"import {everything}")
     assert "textual" in loaded

@@ -1,0 +1,114 @@
+"""The commands of `hapteq` in their groups, each loaded when it is called.
+
+A command's file is named as the command, and so is its function in it; a command with subcommands is an `app`.
+"""
+
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+from typer.main import get_command
+
+FILES = {"import": "import_recording"}
+"""Where the name of a command is no name of a module."""
+
+COMMANDS: dict[str, dict[str, str]] = {
+    "Study": {
+        "study": "Take the study: instructions, training, staircases, report",
+        "resume": "Go on with a session where it stopped; no answer is lost",
+        "watch": "Follow, pause or stop a running session from a second terminal",
+        "stream": "Send a running session's facts as LSL markers",
+        "note": "Write a note into a session's log",
+        "sessions": "List all sessions, latest first: how far each one is",
+        "study-plan": "Who is done, which orders are needed, the next code",
+        "withdraw": "Erase a participant's sessions; a tombstone stays",
+        "serve": "Show the study in a browser of this computer",
+        "noise": "Write pink noise that hides the sound of the device",
+        "protocol": "List, show and lock protocols",
+    },
+    "Analysis": {
+        "analyze": "Write thresholds.csv, anova.json, figures and report.html",
+        "show": "Print the facts of a session, a diagnosis or a recording",
+        "validate": "Check files: recordings, models, protocols, tables, logs",
+        "rehearse": "Simulated participants take the whole study",
+        "export": "Trials as Psych-DS, BIDS or MATLAB files",
+        "power": "How many participants are needed, by simulated studies",
+        "effect": "Keep a discovered law as an effect of your own",
+    },
+    "Device": {
+        "doctor": "Check installation, device, sensor and 1 kHz timing",
+        "record": "Record the device's answer to an excitation",
+        "identify": "Fit a stable state-space model to a band, and test it",
+        "equalize": "Turn wanted accelerations into forces",
+        "contact": "A transient at a contact, turned to its normal, played",
+        "export-controller": "A model's controller as C11, for loops of your own",
+        "twin": "Write the mechanical model of the simulated omega.3",
+    },
+    "Diagnosis": {
+        "import": "Write one recording from files of others, units in SI",
+        "look": "Signals, spectra, coherence and checks, before any model",
+        "model": "Fit a first model: masses, dampers, springs, tolerances",
+        "diagnose": "Name the physics that a model lacks, tested on held-out data",
+    },
+    "Evaluation": {
+        "prove": "Diagnose concealed physics in simulated devices, and count",
+        "real": "Diagnose a folder of real recordings, on one page",
+        "reproduce": "Draw the paper's figures beside what the paper reports",
+        "kit": "Take a blind test on your own device",
+    },
+}
+"""By group: what each command does."""
+
+
+class LoadedWhenCalled(Mapping[str, Any]):
+    """Commands by name, without importing any of them before it is asked for: `--help` and `--version` need none."""
+
+    def __init__(self) -> None:
+        self.words = {name: words for group in COMMANDS.values() for name, words in group.items()}
+
+    def __getitem__(self, name: str) -> Any:
+        words = self.words[name]
+        file = FILES.get(name, name.replace("-", "_"))
+        module = import_module(f"study.cli.{file}")
+        app = getattr(module, "app", None)
+        if app is None:
+            app = typer.Typer(add_completion=False, rich_markup_mode=None)
+            settings = getattr(module, "CONTEXT_SETTINGS", None)
+            app.command(name, short_help=words, context_settings=settings)(getattr(module, file))
+        return get_command(app)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.words)
+
+    def __len__(self) -> int:
+        return len(self.words)
+
+
+class CommandTable(TyperGroup):
+    """The commands above as one command line, with its groups in `--help` and each line whole."""
+
+    @property
+    def commands(self) -> Any:
+        return LoadedWhenCalled()
+
+    @commands.setter
+    def commands(self, registered: Any) -> None:
+        """Typer hands over what was registered with it: nothing here."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(self.commands)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        for title, rows in COMMANDS.items():
+            with formatter.section(title):
+                formatter.write_dl(list(rows.items()))
+
+
+class Subcommands(TyperGroup):
+    """The list of subcommands in `--help`, with each line whole."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, each.get_short_help_str(limit=200)) for name, each in self.commands.items()])
