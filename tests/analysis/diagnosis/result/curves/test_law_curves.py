@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from analysis.figures.diagnosis_signature import draw_signature
 
 from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
@@ -11,6 +10,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.curves.law_curves import law_signature
 from analysis.diagnosis.result.curves.signature_bins import correlation_ratio
+from analysis.figures.diagnosis.signature import draw_signature
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.laws.law import law_of
