@@ -18,8 +18,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from analysis.diagnosis.diagnose import DiagnosisSettings as DiagnosisSettings
     from analysis.diagnosis.diagnose_values import diagnose_values as diagnose
+    from analysis.diagnosis.diagnosis_settings import DiagnosisSettings as DiagnosisSettings
     from analysis.diagnosis.first_model.choose_structure import choose_structure as first_structure
     from analysis.diagnosis.result.findings import Findings as Findings
     from analysis.figures.diagnosis.diagnosis_pictures import diagnosis_pictures as diagnosis_pictures
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from analysis.psychophysics.study_analysis import analyse_study as analyse_study
 
 _HOME = {
-    "DiagnosisSettings": "analysis.diagnosis.diagnose:DiagnosisSettings",
+    "DiagnosisSettings": "analysis.diagnosis.diagnosis_settings:DiagnosisSettings",
     "Findings": "analysis.diagnosis.result.findings:Findings",
     "StudyAnalysis": "analysis.psychophysics.study_analysis:StudyAnalysis",
     "analyse_study": "analysis.psychophysics.study_analysis:analyse_study",

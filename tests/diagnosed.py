@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.document import NextExperiment, Rival
 from analysis.diagnosis.result.findings import BlackBox, Findings
 from equalizer.effects.catalogue import CATALOGUE

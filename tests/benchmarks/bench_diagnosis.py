@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import StateSpace, lsim
 
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from equalizer.effects.catalogue import CATALOGUE
 from study.evaluation.challenge.draw_case import Case, draw_case
 from study.workflows.forked_map import map_forked, processor_s

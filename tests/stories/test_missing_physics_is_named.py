@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.signals.recording import Recording
 from study.store.formats.mechanical_model_file import read_mechanical_model

@@ -46,12 +46,6 @@ def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) ->
     return SearchResult(context, checked, judged, remarks, None if checked.errors is None else checked.errors[1])
 
 
-def has_law(result: SearchResult) -> bool:
-    """Whether a discovered law is among what is named."""
-    laws = laws_of(result.found.after.fitted.hypothesis)
-    return result.judgement.named and any(law is not None for law in laws)
-
-
 def _needs_law(result: SearchResult) -> bool:
     """Only whole simulations prove a law; where noise alone is left, there is none to be found."""
     context, found = result.context, result.found

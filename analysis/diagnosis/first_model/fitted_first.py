@@ -1,17 +1,15 @@
 """Fits the model that a diagnosis starts from where none was given."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from analysis.diagnosis.balance.balances import find_balances
-from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import NoMotionError
 from analysis.diagnosis.data.carried_weight import has_carried_weight
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.data.measured_motion import time_unit
-from analysis.diagnosis.first_model.model_of_balance import plain_model
+from analysis.diagnosis.first_model.model_of_balance import FirstModel, plain_model
 from analysis.diagnosis.first_model.model_structures import StructureRefused, balance_recordings, fit_structure
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from analysis.diagnosis.types import Progress, TimeBudget
@@ -35,17 +33,6 @@ UNTIMED_SAID = (
     "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "
     "The mass in the file is a floor that no force shows; damping and mass are not known."
 )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FirstModel:
-    """What a diagnosis starts from where no model was given."""
-
-    model: MechanicalModel
-    remarks: tuple[str, ...]
-    """What must be known of it."""
-    balances: tuple[Balance, ...] | None = None
-    """None = not weighed."""
 
 
 def first_model_of(

@@ -1,6 +1,7 @@
 """Makes a linear model of a force balance: one body per command."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +15,17 @@ from equalizer.signals.signal import FloatArray
 
 OPEN = 0.1
 """Standard deviation of the numbers found at least, relative."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstModel:
+    """What a diagnosis starts from where no model was given."""
+
+    model: MechanicalModel
+    remarks: tuple[str, ...]
+    """What must be known of it."""
+    balances: tuple[Balance, ...] | None = None
+    """None = not weighed."""
 
 
 def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:

@@ -1,9 +1,15 @@
 """The mismatch that a model leaves on clean recordings, by cell and by channel, which is no evidence for an effect."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from analysis.diagnosis.data.frequency_cells import Band
+from analysis.diagnosis.settings import LEARNED_TOO_MUCH
+from analysis.wording import conjoin
+
+
+class NothingLearned(ValueError):  # noqa: N818 - an answer that a user reads
+    """The clean recordings cannot be compared with those to diagnose; a sentence without a full stop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,3 +37,20 @@ class CleanFloor:
             return own
         beside = [s for (o, q, _, b), s in self.shares.items() if (o, q, b) == (output, quantity, band_hz)]
         return max(beside, default=0.0)
+
+
+def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
+    """Empty where nothing was learned."""
+    if not floor.channels:
+        return ""
+    shares = conjoin([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])
+    count = f"{floor.recordings} clean recording{'s' if floor.recordings != 1 else ''}"
+    said = (
+        f"What a device in order differs by from its re-tuned model was learned from {count}: {shares} of the "
+        f"channel's signal (the largest that was seen; in the map, times {floor.beyond:.2g}). So much counts as noise "
+        "here, more of it where in frequency more of it lies. Named is only what explains more of what is diagnosed "
+        f"than {floor.beyond:.2g} times what it explains of a clean recording."
+    )
+    if max(floor.channels) <= LEARNED_TOO_MUCH:
+        return said
+    return f"{said} That is much: what the clean recordings hold, too, cannot be found, and little faults hardly can."

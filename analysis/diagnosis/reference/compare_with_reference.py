@@ -13,14 +13,13 @@ from analysis.diagnosis.errors.choose_measure import Chosen
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.prediction_error import prediction_error
 from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
-from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.search import HUM
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
-HUM, NOISE, STEPS = "mains_hum", "sensor_noise", "force_quantization"
-LOWEST_MAINS_HZ = 45.0
+NOISE, STEPS = "sensor_noise", "force_quantization"
 FORESEEN = 0.02
 """Prediction error of a model on a clean recording, as a share, up to which it is used alone to find faults. By hand,
 as the next."""
@@ -81,9 +80,3 @@ def noise_is_from_repeats(chosen: Chosen) -> bool:
     size = np.nanstd(np.vstack([record.measured for record in chosen.measure.records]), axis=0)
     repeats = all(floor.how == "repeats" for floor in chosen.floors)
     return repeats and bool(np.all(chosen.measure.noise <= NOISY * size)) and chosen.measure.name == "free simulation"
-
-
-def hums_low(found: Explanation) -> bool:
-    """A line far below any mains is a harmonic of what drives the device."""
-    placed = found.after.fitted.hypothesis.placed_effects()
-    return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)

@@ -10,15 +10,13 @@ from analysis.diagnosis.errors.coloured_measure import ColouredMeasure, whiten_m
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.tuning import Tuning, tuning_of
 from analysis.diagnosis.errors.whitening_filter import WhiteningFilter, whitening_filter
-from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, learn_floor
 from analysis.diagnosis.localisation.mismatch_maps import cells_of
 from analysis.diagnosis.search.explain import retune_alone
 from analysis.diagnosis.search.reference_recordings import ReferenceRecordings, reference_recording
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.settings import LEARNED_TOO_MUCH
 from analysis.diagnosis.types import Mapper, Progress
-from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -26,10 +24,6 @@ from equalizer.signals.signal import FloatArray
 LEARNING = "learning from the clean recordings"
 BEGUN = 0.02
 """Share of the whole diagnosis that is done when learning ends."""
-
-
-class NothingLearned(ValueError):  # noqa: N818 - an answer that a user reads
-    """The clean recordings cannot be compared with those to diagnose; a sentence without a full stop."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,20 +155,3 @@ def count_as_noise(measure: ErrorMeasure, floor: CleanFloor) -> ErrorMeasure:
 def _size(measure: ErrorMeasure) -> FloatArray:
     """(c,): rms of the signal."""
     return np.asarray(np.nanstd(np.vstack([record.measured for record in measure.records]), axis=0))
-
-
-def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
-    """Empty where nothing was learned."""
-    if not floor.channels:
-        return ""
-    shares = conjoin([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])
-    count = f"{floor.recordings} clean recording{'s' if floor.recordings != 1 else ''}"
-    said = (
-        f"What a device in order differs by from its re-tuned model was learned from {count}: {shares} of the "
-        f"channel's signal (the largest that was seen; in the map, times {floor.beyond:.2g}). So much counts as noise "
-        "here, more of it where in frequency more of it lies. Named is only what explains more of what is diagnosed "
-        f"than {floor.beyond:.2g} times what it explains of a clean recording."
-    )
-    if max(floor.channels) <= LEARNED_TOO_MUCH:
-        return said
-    return f"{said} That is much: what the clean recordings hold, too, cannot be found, and little faults hardly can."

@@ -10,13 +10,12 @@ from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.first_model.reversed_commands import as_recorded
-from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.localisation.clean_floor import CleanFloor, learned_sentence
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, mismatch_maps, whole_mismatch
 from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
 from analysis.diagnosis.next_experiment.propose_experiment import Proposal, propose_experiment
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.reference.learn_model_error import learned_sentence
 from analysis.diagnosis.result.error_table import channel_errors, errors_of
 from analysis.diagnosis.result.findings import Course, Findings
 from analysis.diagnosis.result.looks import looks_of

@@ -20,6 +20,8 @@ from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
 
+HUM, LOWEST_MAINS_HZ = "mains_hum", 45.0
+
 
 def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
     """Backward elimination: effects that forward selection added and that are not needed are removed."""
@@ -141,3 +143,15 @@ def _judge_with_prediction(context: SearchContext, found: Explanation) -> Judgem
 def _shows_in_test_alone(found: Explanation) -> bool:
     shown = float(np.nanmax(found.retuned.score.test, initial=0.0))
     return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * found.retuned.score.worst_channel
+
+
+def hums_low(found: Explanation) -> bool:
+    """A line far below any mains is a harmonic of what drives the device."""
+    placed = found.after.fitted.hypothesis.placed_effects()
+    return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)
+
+
+def has_law(result: SearchResult) -> bool:
+    """Whether a discovered law is among what is named."""
+    claims = result.found.after.fitted.hypothesis.claims
+    return result.judgement.named and any(claim.effect.law is not None for claim in claims)

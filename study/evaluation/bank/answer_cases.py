@@ -116,7 +116,8 @@ def _time_budget(processor_s: float | None) -> Callable[[], bool]:
 
 
 def _diagnose_case(place: Path) -> dict[str, Any]:
-    from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+    from analysis.diagnosis.diagnose import diagnose
+    from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
     from analysis.diagnosis.document import diagnosis_to_json
     from study.store.formats.mechanical_model_file import read_mechanical_model
     from study.store.formats.recording_file import read_recording

@@ -9,14 +9,15 @@ import numpy as np
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.prediction_error import PredictionError, prediction_error
-from analysis.diagnosis.first_model.fitted_first import FirstModel
+from analysis.diagnosis.first_model.model_of_balance import FirstModel
 from analysis.diagnosis.first_model.plain_form import plain_form
+from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.prepare_recordings import keep_common_position, prepare
 from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, named_sentences
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
-from analysis.diagnosis.reference.learn_model_error import NothingLearned
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.settings import EXPLAINED_ERROR

@@ -10,13 +10,15 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.measured_motion import has_motion
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import Compared
-from analysis.diagnosis.first_model.fitted_first import FirstModel
-from analysis.diagnosis.reference.learn_model_error import NothingLearned
+from analysis.diagnosis.first_model.model_of_balance import FirstModel
+from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
+from equalizer.effects.law_entry import LawEntry
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, suggest_word
 from equalizer.signals.recording import Recording
@@ -30,8 +32,6 @@ from study.workflows.diagnosis.diagnosis_input import (
     read_given_model,
     read_input,
 )
-from study.workflows.diagnosis.effect_file import read_entry
-from study.workflows.diagnosis.fitted_first import first_model_of, fit_linear_model
 from study.workflows.diagnosis.spring_in_model import spring_words, with_spring
 from study.workflows.forked_map import map_forked, processor_s
 
@@ -177,9 +177,17 @@ def _settings(
         fitted=plan.model is None and not found.simulated,
         balances=balances,
         compared=plan.compare,
-        kept=tuple(read_entry(path) for path in plan.effect_files),
+        kept=_read_effects(plan.effect_files),
         discovery=plan.discovery,
     )
+
+
+def _read_effects(paths: Sequence[Path]) -> tuple[LawEntry, ...]:
+    if not paths:
+        return ()
+    from study.workflows.diagnosis.effect_file import read_entry
+
+    return tuple(read_entry(path) for path in paths)
 
 
 def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: MechanicalModel) -> None:
@@ -219,6 +227,9 @@ def _model(
         return FirstModel(read_given_model(plan.model, found), ())
     if found.simulated:
         return FirstModel(_twin(within), (TWIN_SAID,))
+    # Imported here: a given model needs no fit of a first one.
+    from study.workflows.diagnosis.fitted_first import first_model_of, fit_linear_model
+
     if clean is None:
         return first_model_of(found, plan.without, bounds, within)
     what = "fitting a linear model, as none was given"

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
-from analysis.diagnosis.diagnose import BALANCE
+from analysis.diagnosis.diagnosis_settings import BALANCE
 from analysis.diagnosis.first_model import fitted_first
-from analysis.diagnosis.first_model.fitted_first import FirstModel
+from analysis.diagnosis.first_model.model_of_balance import FirstModel
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModel

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis import diagnose_values as module
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
-from analysis.diagnosis.diagnose import DiagnosisSettings
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.prediction_error import prediction_error
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect

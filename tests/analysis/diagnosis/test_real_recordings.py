@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from analysis.diagnosis.data.force_driven import as_force_driven
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.forces.rigid_model import rigid_model
 from study.workflows.recording.import_recording import read_foreign

@@ -4,7 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from analysis.diagnosis import diagnose as engine
-from analysis.diagnosis.diagnose import DiagnosisSettings
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 
 
 def test_units_are_those_of_the_recording_as_it_was_given(diagnosed):

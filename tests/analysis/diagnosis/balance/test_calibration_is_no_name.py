@@ -14,7 +14,8 @@ SEED = 4
 @pytest.fixture(scope="module")
 def said(axes):
     """Of a linear axis whose reading is changed, with the model that was fitted to it."""
-    from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+    from analysis.diagnosis.diagnose import diagnose
+    from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 
     def of(changed, **physics):
         given = axes.recorded(axes.Physics(**physics), SEED, seconds=10.0, rate_hz=200.0, noise=1e-4)

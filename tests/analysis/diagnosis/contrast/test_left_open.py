@@ -2,12 +2,12 @@
 
 import pytest
 
-from analysis.diagnosis import diagnose as engine
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.forces.rigid_model import rigid_model
-from analysis.diagnosis.reference import learn_model_error as learn_clean_floor
+from analysis.diagnosis.localisation.clean_floor import NothingLearned
+from analysis.diagnosis.reference import learn_model_error
 from analysis.diagnosis.reference.compare_with_reference import Contrast, contrast_of
-from analysis.diagnosis.reference.learn_model_error import NothingLearned
 from analysis.diagnosis.result.contrast_findings import NOT_COMPARED, add_contrast
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 
@@ -37,8 +37,7 @@ def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_
         asked.append(given)
         raise NothingLearned("they were measured otherwise")
 
-    for asks in (engine, learn_clean_floor):
-        monkeypatch.setattr(asks, "learn_model_error", teaches_nothing)
+    monkeypatch.setattr(learn_model_error, "learn_model_error", teaches_nothing)
     clean = rig.recording(1)
     settings = DiagnosisSettings(without=rig.UNDONE, clean=(clean,))
     faulty = rig.recording(2, "coulomb_friction", 0.6)

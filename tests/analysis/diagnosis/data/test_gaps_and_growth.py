@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.growth import growth_rate, is_unstable_within
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit, fit, sensitivity
 from analysis.diagnosis.errors.tuning import tuning_of

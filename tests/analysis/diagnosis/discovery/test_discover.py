@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.discovery.add_laws import add_laws, has_law
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.discovery.add_laws import add_laws
 from analysis.diagnosis.discovery.beam import best_sums
 from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.fit_sum import Sum
@@ -19,7 +20,7 @@ from analysis.diagnosis.discovery.snap_exponents import simplify_powers
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.result.wording import summary_lines
-from analysis.diagnosis.search.search import SearchResult
+from analysis.diagnosis.search.search import SearchResult, has_law
 from analysis.diagnosis.search.verdict import judge
 from analysis.diagnosis.settings import LAW_PLACEBO
 from equalizer.effects.catalogue import CATALOGUE

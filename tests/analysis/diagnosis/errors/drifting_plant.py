@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording, Segment

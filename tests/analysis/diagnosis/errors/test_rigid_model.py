@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import MechanicalModelError

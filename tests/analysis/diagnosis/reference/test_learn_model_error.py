@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
-from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned, learned_sentence
 from analysis.diagnosis.reference.learn_model_error import (
-    NothingLearned,
     learn_model_error,
-    learned_sentence,
     require_alike,
 )
 from equalizer.effects.catalogue import CATALOGUE

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.search.explain import is_worthwhile
 from analysis.diagnosis.search.search import ONLY_REFINES
 from analysis.diagnosis.settings import ADDED_GAIN, INTERVAL_SHARE

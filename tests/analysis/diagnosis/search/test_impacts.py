@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.document import diagnosis_from_json, diagnosis_to_json
 from analysis.diagnosis.errors.band_power import BandPower
 from analysis.diagnosis.errors.choose_measure import measure_of

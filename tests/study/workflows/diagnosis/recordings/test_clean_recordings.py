@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.diagnosis.reference.learn_model_error import NothingLearned
+from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from study.errors import StudyError
 from study.store.disk.json_document import read_json
 from study.store.formats.recording_file import write_recording

@@ -1,0 +1,138 @@
+"""The search by simulation: which effects to try, beside which measure, and what is made of the search."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from analysis.diagnosis.balance.judge_laws import Balance
+from analysis.diagnosis.confirm.confirm_laws import (
+    require_enough_gain,
+    unname_doubtful_effects,
+)
+from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
+from analysis.diagnosis.data.measured_motion import time_unit
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
+from analysis.diagnosis.search.impacts import explain_impacts
+from analysis.diagnosis.search.search import HUM, SearchResult, has_law, hums_low, search_effects
+from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.types import Mapper, Progress
+from equalizer.effects.catalogue import CATALOGUE
+from equalizer.effects.effect import Effect
+from equalizer.effects.law_entry import kept_effects
+from equalizer.effects.placing import place_of_effect
+from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
+from equalizer.signals.recording import Recording
+
+TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
+"""Laws of the command that a force balance tests: what it does not name is absent."""
+GAINS = ("force_gain", "sensor_gain")
+"""A model fitted to the recordings contains these: only against a calibrated one can a gain be wrong."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchOutcome:
+    result: SearchResult
+    floor: CleanFloor
+    """What was learned from clean recordings; empty without any."""
+
+
+def search_context_of(
+    recording: Recording, look: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
+) -> SearchContext:
+    """The shared state of the search. recording: as given; where forces are compared, the measure's own differ."""
+    measure = look.chosen.measure
+    model = with_units_of(look.model, recording.command.units, recording.response.units, time_unit(recording))
+    tuning = tuning_of(model, recording.command.channels)
+    return SearchContext(measure.shorten(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
+
+
+def search_by_simulation(
+    recordings: Sequence[Recording],
+    look: FittingMeasure,
+    settings: DiagnosisSettings,
+    map_: Mapper,
+    progress: Progress,
+    balances: Sequence[Balance],
+) -> SearchOutcome:
+    """The result of the search by simulation. balances: where they name a law of the motion, nothing else is tried;
+    where they name none, only effects of actuator and sensor are."""
+    chosen, context = look.chosen, search_context_of(recordings[0], look, settings, map_)
+    catalogue = _catalogue(settings, recordings[0], context.barred)
+    may_be_named = [effect for effect in catalogue if effect.name not in context.barred]
+    if balances:
+        named = any(balance.named for balance in balances)
+        imposed = bool(recordings[0].meta.get("imposed"))
+        catalogue = [] if named else [e for e in catalogue if _beside_motion(e.name, place_of_effect(e), imposed)]
+        may_be_named = []
+    if settings.clean:
+        observable = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
+        found = _search_beside_learned_error(
+            recordings, look.model, (context, catalogue, observable), settings, progress
+        )
+    else:
+        found = _search(context, catalogue, settings, progress)
+        if hums_low(found.result.found):
+            catalogue = [effect for effect in catalogue if effect.name != HUM]
+            found = _search(context, catalogue, settings, progress)
+    if balances and found.result.judgement.named:
+        repeats = all(floor.how == "repeats" for floor in chosen.floors)
+        found = replace(found, result=unname_doubtful_effects(require_enough_gain(found.result, repeats)))
+    seen = found.result
+    left = seen.judgement.verdict in ("unexplained", "partly_explained") and not has_law(seen)
+    if left and not seen.context.certain and settings.time_left():
+        progress("looking for play that rattles", 0.9)
+        rattled = explain_impacts(seen.context, seen.found, chosen.floors, may_be_named)
+        if rattled is not None:
+            return replace(found, result=SearchResult(seen.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
+    return found
+
+
+def _search_beside_learned_error(
+    recordings: Sequence[Recording],
+    model: MechanicalModel,
+    given: tuple[SearchContext, Sequence[Effect], Sequence[Effect]],
+    settings: DiagnosisSettings,
+    progress: Progress,
+) -> SearchOutcome:
+    """The search with what the model lacks on the clean recordings counted as noise. given: the shared state, the
+    effects to try, and those that sensor faults may be named of. Raises NothingLearned."""
+    from analysis.diagnosis.reference.learn_model_error import learn_model_error
+    from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
+    from analysis.diagnosis.reference.search_beside_reference import search_beside_reference
+
+    context, catalogue, observable = given
+    learned = learn_model_error(settings.clean, model, recordings, context.map_, progress)
+    context = replace(context, certain=find_sensor_faults(recordings, settings.clean, observable))
+    found = search_beside_reference(context, learned, catalogue, progress, settings.time_left)
+    return SearchOutcome(found, learned.floor)
+
+
+def _search(
+    context: SearchContext, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
+) -> SearchOutcome:
+    def beyond(seen: SearchResult) -> SearchResult:
+        if not settings.discovery or settings.fitted:
+            return seen
+        from analysis.diagnosis.discovery.add_laws import add_laws
+
+        return add_laws(seen, progress, settings.time_left)
+
+    return SearchOutcome(search_effects(context, catalogue, progress, settings.time_left, beyond), CleanFloor())
+
+
+def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozenset[str]) -> list[Effect]:
+    """The effects to try; with barred effects that others refine, as rivals."""
+    left_out = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
+    known = (*CATALOGUE, *kept_effects(settings.kept, recording))
+    catalogue = [effect for effect in known if effect.name not in left_out]
+    refined = {name for effect in catalogue for name in effect.simpler}
+    return catalogue + [effect for effect in CATALOGUE if effect.name in refined & barred]
+
+
+def _beside_motion(name: str, place: str, imposed: bool) -> bool:
+    """Whether an effect of the actuator or sensor cannot be seen by a force balance."""
+    tested = name == "body_on_actuator" or (name in TESTED_BY_BALANCE and not imposed)
+    return place in ("actuator", "sensor") and not tested
