@@ -16,7 +16,7 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.loading import load_protocol
 from tests.machine_pauses import PauseMeter
 
-# The same examples each time: what fails, fails for everybody. `--hypothesis-profile explore` draws new ones.
+# The same examples each time: what fails, fails on every machine. `--hypothesis-profile explore` draws new ones.
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("explore", derandomize=False)
 settings.load_profile("repeatable")

@@ -29,7 +29,7 @@ class Run:
     readings_m: FloatArray
     """(n, 3): what its encoders said, lies and all. Rows of late ticks are of no meaning."""
     late: FloatArray
-    """(n,), bool: ticks that nobody attended."""
+    """(n,), bool: ticks without a sign of life."""
     over: bool
     release_at: int = NEVER
     """When the stimulus' own release was asked for."""
@@ -218,6 +218,6 @@ def _too_long(run: Run, norms: FloatArray, release: int) -> list[str]:
         "release": released_by,
         "lie": run.told_by,
     }
-    # A loop that nobody attends holds its force: what is due is done at the next tick.
+    # A loop without signs of life holds its force: what is due is done at the next tick.
     asleep = int(run.late.sum()) if run.late.any() else 0
     return [f"late: a force after the {name}" for name, end in last.items() if norms[min(end + asleep, NEVER) :].any()]

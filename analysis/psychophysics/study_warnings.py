@@ -22,7 +22,7 @@ without any exceeds it by chance in about one of 250 runs."""
 MANY_LAPSES = 0.1
 """Lapse rate on catch trials that is worth a look; the published staircase is meant for attentive people."""
 FELT_BY_ALL_HZ = 15.0
-"""Up to here everybody is expected to feel the direction at full level, so that an error there is a lapse."""
+"""Up to here all participants are expected to feel the direction at full level, so that an error there is a lapse."""
 REPEAT_SD_DB = 2.4
 """Standard deviation of the difference of two runs with the same true threshold: sqrt(2) times 1.7 dB, the spread of
 500 simulated runs under the published rule (Weibull slope 2, 2 % lapses)."""

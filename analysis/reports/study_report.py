@@ -126,7 +126,7 @@ def _side_sections(analysis: StudyAnalysis) -> list[Section]:
     """Detection, catch trials, practice: each only where it was taken."""
     sections = []
     if analysis.detection:
-        felt = "Which of two intervals held a vibration, at whatever direction: the level from which it is felt at all."
+        felt = "Which of two intervals held a vibration, in any direction: the level from which it is felt at all."
         tables = (detection_table(analysis), detection_run_table(analysis))
         sections.append(Section("Is the vibration felt at all?", paragraphs=(felt,), tables=tables))
     if analysis.catches:

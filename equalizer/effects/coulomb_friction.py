@@ -1,4 +1,4 @@
-"""Coulomb friction: a constant force against the motion, which holds at rest whatever is pushed with less."""
+"""Coulomb friction: a constant force against the motion, which holds at rest against any smaller force."""
 
 import numpy as np
 

@@ -143,8 +143,8 @@ class MechanicalModel(Summarised):
 def with_units_of(
     model: MechanicalModel, commands: Sequence[str], responses: Sequence[str], time: str = "s"
 ) -> MechanicalModel:
-    """The model with the units of its recordings: where its input and output convert nothing, its numbers are in them,
-    whatever they are. commands, responses: their units."""
+    """The model with the units of its recordings: where its input and output convert nothing, its numbers are in them
+    as they are. commands, responses: their units."""
     plain = all(np.isin(np.abs(matrix), (0.0, 1.0)).all() for matrix in (model.input, model.output))
     found = system_of(commands, responses, time)
     if model.units is not None or not plain or found.rotational is not None:

@@ -69,15 +69,15 @@ class SpringSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class SafetySettings:
-    """Limits that the safety layer keeps at every tick, whatever the rest of the program does."""
+    """Limits that the safety layer keeps at every tick, independent of the rest of the program."""
 
     stimulus_cap_n: Annotated[
         float,
         Field(
             gt=0,
             le=3.0,
-            description="Norm of the stimulus force, spring and damper not counted; 3 N at the most, whatever a "
-            "protocol says. Together with them the command may be larger: see total_cap_n.",
+            description="Norm of the stimulus force, spring and damper not counted; 3 N at the most in any "
+            "protocol. Together with them the command may be larger: see total_cap_n.",
         ),
     ]
     total_cap_n: Annotated[
@@ -86,7 +86,7 @@ class SafetySettings:
             gt=0,
             le=6.0,
             description="Norm of the whole command: stimulus, spring and damper. This is what a hand may feel; "
-            "6 N at the most, whatever a protocol says. Direction is kept at the cap.",
+            "6 N at the most in any protocol. Direction is kept at the cap.",
         ),
     ]
     feedback_cap_n: Annotated[

@@ -16,8 +16,8 @@ RoveDb = Annotated[
         ge=0,
         le=20,
         description="Width of the range, level_n in its middle, from which each amplitude is drawn evenly in dB, "
-        "whatever the direction. At one fixed level, labels and feedback teach how strong each direction feels: with a "
-        "range of r dB, a difference of d dB between the directions tells at most 50 + 50 d / r % of the trials. "
+        "for all directions alike. At one fixed level, labels and feedback teach how strong each direction feels: with "
+        "a range of r dB, a difference of d dB between the directions tells at most 50 + 50 d / r % of the trials. "
         "Default 0: one fixed level, as in protocols of before there was a range.",
     ),
 ]

@@ -24,7 +24,7 @@ def watch(
         str, typer.Argument(help="Session folder, or its name in the data folder. Default: the one that changed last.")
     ] = "",
     data: DataOption = Path("data"),
-    plain: Annotated[bool, typer.Option("--plain", help="A line for whatever happens; alarms ring.")] = False,
+    plain: Annotated[bool, typer.Option("--plain", help="A line for each event; alarms ring.")] = False,
     once: Annotated[bool, typer.Option("--once", help="How it stands now, and leave.")] = False,
     stop: Annotated[bool, typer.Option("--stop", help="Force off at once; the sitting ends.")] = False,
     pause: Annotated[bool, typer.Option("--pause", help="Hands free at once; the participant goes on.")] = False,

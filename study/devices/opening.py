@@ -1,4 +1,4 @@
-"""The one door to a device: whatever comes out of it stands behind the safety layer.
+"""The one door to a device: every device that comes out of it stands behind the safety layer.
 
 The heavy parts (numba above all) are imported when a device is opened, so that the command line starts at once.
 """
@@ -22,7 +22,7 @@ REAL = tuple(MODELS)
 """Devices that move: they need the vendor's library, and real time."""
 
 STRONGEST_N = max(model.max_force_n for model in MODELS.values())
-"""What the strongest of them can give: more is a mistake, whatever it was meant for."""
+"""What the strongest of them can give: more is a mistake in any use."""
 
 DEVICES = (SIMULATED, *REAL)
 """What a study or a recording may be made on."""
@@ -35,7 +35,7 @@ SIMULATIONS = (SIMULATED, FRICTIONLESS)
 
 
 REPLAY = "replay:"
-"""Before the path of a recording: its handle moves as it once did, whatever is asked of it."""
+"""Before the path of a recording: its handle moves as it once did, independent of the force asked for."""
 
 
 def needs_real_time(name: str) -> bool:

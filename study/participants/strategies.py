@@ -42,7 +42,7 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Scripted:
-    """Answers right or wrong by run and trial number only, whatever direction was drawn: after an interruption the
+    """Answers right or wrong by run and trial number only, for any direction drawn: after an interruption the
     levels must equal those of an uninterrupted session."""
 
     name: str

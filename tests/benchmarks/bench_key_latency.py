@@ -68,7 +68,7 @@ Peer().run()
 
 
 class Pty:
-    """A terminal that somebody reads all the time."""
+    """A terminal that is read all the time."""
 
     def __init__(self, command: list[str], pass_fds: tuple[int, ...] = ()) -> None:
         self.end, slave = pty.openpty()

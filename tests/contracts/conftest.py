@@ -1,4 +1,4 @@
-"""Seats for the display contract: a display, and whoever sits before it.
+"""Seats for the display contract: a display, and the participant before it.
 
 Another kind of display joins by one more factory in SEATS. A seat takes what the person will do beforehand, in order,
 in keys ("1", "q", "enter") where all displays have the same, else in words of its own (`fill`, `withdraw`).
@@ -27,7 +27,7 @@ class Seat(Protocol):
     display: Display
     clock: Clock
     person: bool
-    """False: keys reach nobody, and the participant does as it was made to."""
+    """False: keys reach no participant, who does as it was made to."""
 
     def press(self, *keys: str) -> None: ...
 

@@ -1,4 +1,4 @@
-"""What every device keeps to, whatever stands behind the safety layer."""
+"""What every device keeps to, behind the same safety layer."""
 
 import contextlib
 from dataclasses import replace
@@ -115,7 +115,7 @@ def test_without_signs_of_life_the_force_is_off(device, clock, rigs):
     assert device.fault() is Fault.NONE
 
 
-def test_a_stimulus_that_nobody_answers_is_let_go(device, clock, rigs):
+def test_a_stimulus_without_an_answer_is_released(device, clock, rigs):
     device.hold(rigs.sine(1.0))
     feel(device, clock, rigs.LIMITS.longest_hold_s + 0.5)
     assert device.release().health.fault is Fault.HELD_TOO_LONG

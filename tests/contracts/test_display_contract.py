@@ -1,4 +1,4 @@
-"""What every display keeps to, whoever sits before it. Seats are in conftest.py."""
+"""What every display keeps to, with a person or a simulated participant before it. Seats are in conftest.py."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -98,7 +98,7 @@ def test_what_must_be_read_returns_when_it_was(seat, call, value):
     ("call", "value"),
     [("feedback", True), ("trouble", "Something."), ("goodbye", Goodbye(finished=False, answers=3, reason="left"))],
 )
-def test_what_is_only_said_holds_nobody_up(seat, call, value):
+def test_a_message_without_a_question_returns_at_once(seat, call, value):
     seat.press("enter")
     assert getattr(seat.display, call)(value) is None
 
@@ -125,7 +125,7 @@ def test_an_answer_is_one_or_two_and_stamped_between_question_and_reply(seat):
 
 @pytest.mark.parametrize("task", Task)
 @pytest.mark.parametrize("key", ["1", "2"])
-def test_the_key_is_the_answer_whatever_is_asked(persons_seat, task, key):
+def test_the_pressed_key_is_the_answer_to_every_question(persons_seat, task, key):
     persons_seat.press(key)
     reply = persons_seat.display.ask(replace(QUESTION, task=task), Signs())
     assert isinstance(reply, Answered)
@@ -197,7 +197,7 @@ ENDED = {
 
 @pytest.mark.parametrize("wait", ENDED)
 @pytest.mark.parametrize("after", [0, 2])
-def test_whatever_ends_a_wait_ends_it_at_once(seat, wait, after):
+def test_each_reason_ends_a_wait_at_once(seat, wait, after):
     signs, started_s = Signs(over_after=after), seat.clock.now_s()
     reply = ENDED[wait](seat.display, signs)
     assert signs.count == after + 1
@@ -213,7 +213,7 @@ def test_the_demonstration_ends_when_its_wait_is_over(seat):
     assert seat.display.choose_demo(MENU, Signs(over_after=0)) == DemoDone()
 
 
-def test_a_handle_in_its_place_keeps_nobody_waiting(seat):
+def test_a_handle_in_its_place_ends_the_wait_at_once(seat):
     assert seat.display.await_handle(lambda: HandleView(True, "", (0.0, 0.0), 5.0), Signs()) is None
 
 
@@ -225,7 +225,7 @@ def test_the_handle_is_looked_at_until_it_is_back(seat):
     assert next(views, None) is None
 
 
-def test_a_pause_ends_when_somebody_goes_on(seat):
+def test_a_pause_ends_with_the_choice_to_go_on(seat):
     seat.press("enter")
     assert seat.display.pause(PAUSE, lambda: True) is AfterPause.GO_ON
 

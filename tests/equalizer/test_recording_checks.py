@@ -79,7 +79,7 @@ def test_an_impossible_segment_is_named_by_its_number(recording, segment, proble
     assert the_problem(replace(recording, segments=(segment,))).startswith(f"segment 1 {problem}")
 
 
-def test_overlapping_segments_are_named_whatever_their_order(recording):
+def test_overlapping_segments_are_named_in_any_order(recording):
     segments = (Segment(50, 90, "sine"), Segment(10, 51, "sweep"))
     assert the_problem(replace(recording, segments=segments)) == (
         "segments 2 and 1 overlap (one stops at 51, the other starts at 50)"

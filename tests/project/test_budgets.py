@@ -124,7 +124,7 @@ def test_a_small_file_is_no_part_of_a_single_neighbour():
     assert SMALL_BESIDE_THEIR_IMPORTER - small == set(), "no longer small and alone: take it from the list"
 
 
-def test_nobody_takes_a_soup_of_keywords():
+def test_no_function_takes_arbitrary_keyword_arguments():
     soup = [f"{path.name}:{f.name}" for path in SOURCES for f in functions(path) if f.args.kwarg is not None]
     assert soup == []
 

@@ -11,8 +11,9 @@ from study.cli.main import app
 from study.store.formats.identified_model_file import write_identified_model
 
 DOCS = Path(__file__).parents[2] / "docs"
-VAGUE = re.compile(r"\b(whoever|nobody|somebody|anybody)\b", re.IGNORECASE)
-"""Words for people whose part (participant, experimenter, person at the handle) has to be said."""
+VAGUE = re.compile(r"(\b|_)(whoever|whatever|nobody|somebody|anybody|everybody)(\b|_)", re.IGNORECASE)
+"""Words for people whose part (participant, experimenter, person at the handle) has to be said, and for things that can
+be named."""
 
 
 def test_people_are_named_by_their_part():
@@ -20,6 +21,13 @@ def test_people_are_named_by_their_part():
     written = [*DOCS.rglob("*.md"), *DOCS.rglob("*.json"), root / "README.md", *(root / "protocols").glob("*.toml")]
     found = [f"{path.name}: {match.group()}" for path in written for match in VAGUE.finditer(path.read_text("utf-8"))]
     assert found == []
+
+
+def test_code_and_tests_name_people_and_things():
+    root = DOCS.parent
+    folders = ("protocols", "equalizer", "analysis", "study", "tests")
+    code = [path for folder in folders for path in (root / folder).rglob("*.py") if path != Path(__file__)]
+    assert [path.name for path in code if VAGUE.search(path.read_text("utf-8"))] == []
 
 
 def test_help_names_people_by_their_part():

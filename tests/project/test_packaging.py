@@ -1,4 +1,4 @@
-"""What is installed on somebody's machine, and what happens beside a stranger's files."""
+"""What is installed on a user's machine, and what happens beside files of other programs."""
 
 import subprocess
 import sys

@@ -96,7 +96,7 @@ class Terminal:
         self.process.wait()
 
     def hang_up(self) -> None:
-        """Close the terminal's window: the program gets a hang-up and has nobody to write to."""
+        """Close the terminal's window: the program gets a hang-up and has no reader."""
         os.close(self._master)
         self._master = -1
 

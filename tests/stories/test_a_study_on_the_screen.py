@@ -85,7 +85,7 @@ def at_the_screen(tmp_path, small_file):
 
 
 class SaysTheSame(SimulatedDisplay):
-    """Is right where somebody else was right. A trial that was drawn again after the kill may have had the other
+    """Is right where another participant was right. A trial that was drawn again after the kill may have had the other
     direction, so the same key would not be the same answer."""
 
     def __init__(self, given: list[bool], clock: VirtualClock) -> None:

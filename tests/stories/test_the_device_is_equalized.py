@@ -89,7 +89,7 @@ def test_the_linear_device_is_flat_and_uncoupled(hand):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hand", [False, True], ids=["alone", "in a hand"])
-def test_whatever_the_noise(hand):
+def test_flatness_and_coupling_hold_for_any_noise(hand):
     found = [equalized(hand, seed) for seed in range(2, 8)]
     flatness = sorted(each.flatness_db for each in found)
     coupling = sorted(each.coupling_db for each in found)

@@ -89,7 +89,7 @@ def measure_of(
 
 
 def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> Chosen:
-    """The force that the model needs along the measured motion, up to a frequency, whatever the rule says; see
+    """The force that the model needs along the measured motion, up to a frequency, without asking the rule; see
     `has_motion`."""
     records = observed_parts(recordings, model.outputs)
     known = place_effects(model, recordings[0].command.channels, recordings[0].response.channels)

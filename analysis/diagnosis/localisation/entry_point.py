@@ -1,4 +1,4 @@
-"""Finds through which component a mismatch enters: a force at an axis, whatever its cause, moves all channels in
+"""Finds through which component a mismatch enters: a force at an axis, of any cause, moves all channels in
 proportions that the model knows; an error of one sensor shows in that channel alone.
 
 The score is the mean logarithm of the power that an entry leaves unexplained, line by line. A share of the power summed

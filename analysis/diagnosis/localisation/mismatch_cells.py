@@ -73,7 +73,7 @@ class MismatchCell:
     part: int = 0
     """Number of the recordings' part in which it lies."""
     beyond_noise: bool = False
-    """Significant beyond noise and margin, whatever the model's error elsewhere."""
+    """Significant beyond noise and margin, independent of the model's error elsewhere."""
 
     @property
     def share(self) -> float:

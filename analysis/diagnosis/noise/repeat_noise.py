@@ -1,6 +1,6 @@
 """Noise from the differences between repeated periods.
 
-Noise is as strong whatever is driven; a device that varies or rattles differs the more, the more it is driven. So the
+Noise is as strong with any drive; a device that varies or rattles differs the more, the more it is driven. So the
 quietest segments count, and where even they differ by more than what is heard at rest, the rest does.
 """
 

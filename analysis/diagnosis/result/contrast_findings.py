@@ -23,9 +23,9 @@ from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 MOST = 6
 BESIDE = (
-    "The recordings were compared with the clean ones by a model that was fitted to both at once and holds whatever "
-    "laws they ask for: a fault is what the clean ones lack. It counts beyond {:.3g} times what it would gain between "
-    "stretches of either."
+    "The recordings were compared with the clean ones by a model that was fitted to both at once and holds all "
+    "laws that they ask for: a fault is what the clean ones lack. It counts beyond {:.3g} times what it would gain "
+    "between stretches of either."
 )
 NOT_COMPARED = (
     "The recordings could not be compared with the clean ones: too little was recorded without gaps, one of them "

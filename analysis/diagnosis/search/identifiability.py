@@ -3,8 +3,8 @@
 Intervals are linearised first. Where an effect has one such number and its interval holds none, but not by far, its
 profile decides: beside numbers that act alike, and where a law is bent, the linearised interval is too wide. The
 deviance between the fit without an effect and the fit with it needs no slope. Summed over stretches longer than the
-errors remember, its mean over its own spread is half of the number over its standard error, whatever the residuals'
-variance and colour (Vuong, Econometrica 57:307, 1989; for a quadratic deviance).
+errors remember, its mean over its own spread is half of the number over its standard error, for any
+variance and colour of the residuals (Vuong, Econometrica 57:307, 1989; for a quadratic deviance).
 """
 
 from collections.abc import Iterator

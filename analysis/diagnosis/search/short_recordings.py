@@ -72,7 +72,7 @@ class ShortRecordings:
             if isinstance(value := getattr(evidence, field.name), np.ndarray) and len(value) == n and value.ndim
         }
         used: FloatArray = fit.astype(np.float64)
-        # The noise is per channel, whatever its length happens to be.
+        # The noise is per channel, independent of its length.
         return replace(
             evidence, **{**cut, "used": used, "noise": evidence.noise, "position_noise": evidence.position_noise}
         )

@@ -64,7 +64,7 @@ def _hold_light_axes(per_newton: FloatArray, velocity: FloatArray, commands: Flo
 
     Where the commands could move an axis within a step by more than it ever moves, its mass is none: the floor of a
     model without one, or of a recording without time. Friction would then be at rest everywhere, and would balance
-    whatever is missing. So the motion is taken as it was measured, and the axis rests only where that does.
+    all that is missing. So the motion is taken as it was measured, and the axis rests only where that does.
     """
     force, speed = (np.sqrt(np.mean(each**2, axis=0)) for each in (commands, velocity))
     light = (per_newton[2] * step_s * force > speed) & (speed > 0)

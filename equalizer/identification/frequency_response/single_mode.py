@@ -12,7 +12,7 @@ def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[Fl
     """Natural frequency (draws,) in Hz and damping ratio (draws,); NaN where no resonance fits.
 
     entries (draws, lines, entries): G = (a parabola in s per entry) / (s² + c1 s + c0) in least squares; the parabola
-    takes in whatever lies further off. Started by re-weighted linear equations (Sanathanan and Koerner), which noise
+    takes in all that lies further off. Started by re-weighted linear equations (Sanathanan and Koerner), which noise
     biases towards more or less damping; finished by Gauss and Newton's steps on the fit itself, which it does not
     (variable projection, after Kaufman). frequency_hz: (lines,), at least six.
     """

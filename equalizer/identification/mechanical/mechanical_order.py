@@ -92,7 +92,7 @@ def _grow_structure(
     limits: "_Limits",
     tried: list[OrderTried],
 ) -> tuple[RefinedFit[Structure], str]:
-    """Add to a structure whatever improves it enough in this band; returns the fit, and why it stopped there."""
+    """Add to a structure all that improves it enough in this band; returns the fit, and why it stopped there."""
     while best.error >= REACHED:
         for what, larger in _larger_structures(groups, best, band_hz, limits):
             better = improves_enough(best, larger)

@@ -47,7 +47,7 @@ def fit_rigid_model(
     if np.linalg.cond(response).max() > WORST_CONDITION:
         raise ValueError("the response at a line does not move all axes, so that it has no inverse")
     m, s = response.shape[1], 2j * np.pi * frequency_hz
-    # A held command acts half a sample late on average, whatever the device.
+    # A held command acts half a sample late on average, on any device.
     late = np.exp(-s * (delay_s + 0.5 / sample_rate_hz))[:, None, None]
     inverse = np.linalg.inv(response / late)
     weight = 1 / np.linalg.norm(inverse, axis=(1, 2))

@@ -20,7 +20,7 @@ class Convergence:
     """(lines,): largest singular value of I - beta G Gm⁻¹; of the worst response where several were given."""
     beta: float
     safe_beta: float
-    """Below it every error shrinks at every line, whatever its direction; 0 where no gain does that. At most 2."""
+    """Below it every error shrinks at every line, in any direction; 0 where no gain does that. At most 2."""
 
     @property
     def converges(self) -> bool:

@@ -16,7 +16,7 @@ FRESH_S = 0.05
 """A sample that is older is none: fifty ticks, and longer than a busy computer leaves a thread waiting."""
 
 ZEROING_S = 0.5
-"""At rest, when it is opened: gravity, and whatever the bias has drifted since the calibration."""
+"""At rest, when it is opened: gravity, and the drift of the bias since the calibration."""
 
 AT_ONCE = 4096
 """Bytes: 0.1 s at 2 kHz."""

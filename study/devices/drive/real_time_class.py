@@ -56,7 +56,7 @@ class Granted:
 
 class _Users:
     """Switch interval, memory lock and timer belong to the whole program: the first user changes them, the last to end
-    gives them back, in whatever order they end."""
+    gives them back, in any order of their ends."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

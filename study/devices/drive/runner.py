@@ -159,7 +159,7 @@ class CompiledRunner:
                 self._seen = Seen(self._arrays[-1].copy(), self._rig.buttons())
                 if not self._governor.moving:
                     break
-        except Exception as error:  # noqa: BLE001 - whatever it is: the force goes off, and the next call says why
+        except Exception as error:  # noqa: BLE001 - any error: the force goes off, and the next call says why
             self.give_up(error)
 
     def drop(self, fault: Fault) -> None:

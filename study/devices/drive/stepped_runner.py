@@ -101,7 +101,7 @@ class SteppedRunner:
             for _ in range(ticks):
                 if self._tick() or self._gone.is_set():
                     break
-        except Exception as error:  # noqa: BLE001 - whatever a driver throws: the force goes off, the next call says why
+        except Exception as error:  # noqa: BLE001 - any error of a driver: the force goes off, the next call says why
             self.give_up(error)
         except BaseException:  # Ctrl-C in the middle of a tick
             self._silence(Fault.STALLED)
@@ -174,7 +174,7 @@ class SteppedRunner:
             self._deciding = False
 
     def _once_more(self) -> None:
-        """The caller gave up while this thread was in the driver: whatever it wrote is taken back."""
+        """The caller gave up while this thread was in the driver: what it wrote is taken back."""
         self.force_off = False
         try:
             self._rig.write(np.zeros(3))

@@ -1,5 +1,5 @@
 """From a name to a device that is open, calibrated, armed with its watchdog, and takes forces: or an error that says
-what is missing. Whatever fails on the way, what was opened is stopped and closed again.
+what is missing. Where a step fails, what was opened is stopped and closed again.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""A device of the vendor as a rig: readings, forces, and whatever makes it let go.
+"""A device of the vendor as a rig: readings, forces, and all that makes it let go.
 
 Beyond what the safety layer does, a force above the cap or no number never leaves this file, and the library is told
 the cap as well. Anything odd ends in an error: the safety layer then writes zero, and the watchdog sees to the rest.

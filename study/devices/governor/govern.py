@@ -1,7 +1,7 @@
 """The heart of the safety layer: one tick decides one force, and nothing else in the program decides any.
 
 The order within a tick: hear what was asked, judge the reading (`plausibility`), aim (stimulus, and `feedback`), limit,
-and confine once more whatever came out. The last step trusts none of the others: a force is never written that is above
+and confine the result once more. The last step trusts none of the others: a force is never written that is above
 the cap or not a number. The machine code on disk is kept in step with all these files: see `compiling`."""
 
 import math

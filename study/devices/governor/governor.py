@@ -95,7 +95,7 @@ class Governor:
         self.state[cells.RELEASE_ASKED] = 1.0
 
     def ask_let_go(self) -> None:
-        """Fade out within `release_s`, whatever is played."""
+        """Fade out within `release_s`, from any stimulus."""
         self.state[cells.LET_GO_ASKED] = 1.0
 
     def ask_stop(self) -> None:

@@ -1,6 +1,6 @@
 """The facts of a session, one JSON line each in `events.jsonl`.
 
-A fact is what the program cannot recompute: what was opened, presented, answered, measured. Whatever follows from
+A fact is what the program cannot recompute: what was opened, presented, answered, measured. What follows from
 facts (levels, reversals, thresholds) is folded from them; where it is written too, it is there as a check.
 """
 

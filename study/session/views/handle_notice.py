@@ -16,7 +16,7 @@ def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> s
 
 
 def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
-    """For whatever moves the handle by itself."""
+    """For a device that moves the handle by itself."""
     return (
         f"No person may hold the handle: '{device}' is going to move by itself {_duration_words(total_s)}, pushed with "
         f"up to {peak_n:g} N and held at its place by a weak spring. Keep hands away and the workspace free; Ctrl-C "

@@ -71,7 +71,7 @@ def _check_dataset(name: str, dataset: Any, limit: SizeLimit) -> None:
 
 
 def _check_pieces(name: str, dataset: Any, chunk_bytes: int) -> None:
-    """HDF5 unpacks a compressed chunk completely, whatever its declared size: large ones are checked by
+    """HDF5 unpacks a compressed chunk completely, at any declared size: large ones are checked by
     decompressing."""
 
     large: list[tuple[int, ...]] = []

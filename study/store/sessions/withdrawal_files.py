@@ -1,7 +1,7 @@
 """Records of a withdrawal: first the intent, then a tombstone for each session.
 
 The intent is one file in the data folder. While it exists, erasing is unfinished, and no session of the participant
-counts as data, whatever remains of it.
+counts as data, with all that remains of it.
 """
 
 from collections.abc import Mapping

@@ -59,7 +59,7 @@ class ScreenLink:
         return self._taken <= self._let_go_up_to
 
     def reply(self, patience_s: float) -> Reply | None:
-        """The next reply, whatever its number; None after the timeout. Raises KeyboardInterrupt if the screen is
+        """The next reply, of any number; None after the timeout. Raises KeyboardInterrupt if the screen is
         gone."""
         if self.ended:
             raise KeyboardInterrupt
@@ -94,7 +94,7 @@ class ScreenLink:
                 self._gone()
 
     def _take(self, message: ToEngine) -> None:
-        # Whatever comes was sent by a living screen; only heartbeats come all the time.
+        # Each message was sent by a living screen; only heartbeats come all the time.
         self._heard_s = time.monotonic()
         match message:
             case Heartbeat():

@@ -98,7 +98,7 @@ class Relay:
 
 @dataclass(frozen=True, slots=True)
 class LetGo:
-    """Ctrl-C: force off at once, whatever the engine is doing. What it is doing ends; a session can be resumed."""
+    """Ctrl-C: force off at once, in any state of the engine. What it is doing ends; a session can be resumed."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,7 +74,7 @@ def feed(descriptor: int, session_path: str) -> None:
 
     connection = Connection(descriptor)
     clock, follower = RealClock(), follow(Path(session_path))
-    # Whatever can be read here means the end: a word to close, or a parent that is gone.
+    # Anything that can be read here means the end: a word to close, or a parent that is gone.
     while not connection.poll(LOOK_EVERY_S):
         try:
             view = follower.look(clock.utc())

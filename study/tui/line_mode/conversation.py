@@ -30,7 +30,7 @@ class WaitOver(Enum):
 
     INPUT_ENDED = "the input ended"
     CUT_SHORT = "the stimulus ended early"
-    """By whatever the sign of life heard."""
+    """By the request that the sign of life heard."""
     TIME_LIMIT = "no answer within the time limit"
 
 

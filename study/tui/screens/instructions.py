@@ -24,7 +24,7 @@ class InstructionsScreen(Screen[None]):
 
 - This page says what happens in a trial and how to answer. Arrow keys scroll it.
 - **Enter** begins.
-- Ask the experimenter whatever is unclear; nothing moves before you go on.
+- Ask the experimenter if anything is unclear; nothing moves before you go on.
 - **Ctrl+C** leaves.
 """
     DEFAULT_CSS = """

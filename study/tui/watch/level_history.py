@@ -26,7 +26,7 @@ _FIRST = {WRONG: 1, RIGHT: 0, PEAK: 2, VALLEY: 2, NEXT: 3}
 
 
 class LevelHistory(Widget):
-    """Fills whatever room it gets."""
+    """Fills all the room that it gets."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)

@@ -61,7 +61,7 @@ def session_log_markdown() -> Iterable[str]:
     yield (
         "When a session is closed, `seal.json` is written once: number of lines, bytes, the last checksum, and the "
         "SHA-256 of these bytes. It tells a log whose end was cut off from one that was interrupted. Notes that are "
-        "added after the end are covered by `seal-2.json` and so on. Whatever reads a session checks all of it, and "
+        "added after the end are covered by `seal-2.json` and so on. Each reader of a session checks all of it, and "
         "`hapteq validate` names the line. A session that is damaged is left out of an analysis, with the reason."
     )
     yield (
@@ -165,7 +165,7 @@ SCHEMAS: tuple[Schema, ...] = (
     Schema(
         "request.json",
         "one file in a session's `requests/`: what is asked of it from beside, removed when it is taken; a name that "
-        "begins with `stop` is a stop, whatever the file holds",
+        "begins with `stop` is a stop, with any content",
         request_schema,
     ),
 )

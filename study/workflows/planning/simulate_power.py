@@ -66,7 +66,7 @@ def simulate_power(
         for future in futures:
             future.cancel()
         raise
-    # In the order of the plan, whatever finished first: sums of the same numbers are then the same to the bit.
+    # In the order of the plan, not of finishing: sums of the same numbers are then the same to the bit.
     points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
     payload = {"plan": _plan_facts(plan), "points": [asdict(point) for point in points]}
     write_json(out / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)

@@ -47,7 +47,7 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
     with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
         # Yesterday's stop must not end today's sitting; from now on requests are heard. Nor does yesterday's live state
-        # say anything of today, whatever its time is.
+        # say anything of today, at any time of its own.
         RequestInbox(folder.path).clear()
         remove_live(folder.path)
         try:

@@ -44,7 +44,7 @@ def _unheard(folder: SessionFolder, request: Request, inbox: RequestInbox, name:
             "If the handle moves: hand off, and switch the device off.",
             saved="The stop waits for the session and is the first thing that it will hear.",
         )
-    # A pause that comes minutes later would surprise everybody.
+    # A pause that comes minutes later would surprise participant and experimenter.
     if not inbox.take_back(name):
         return True
     raise StudyError(

@@ -19,6 +19,6 @@ def repeating(seed: int) -> Recording:
     )
 
 
-def test_recordings_are_called_by_their_names_whatever_is_in_these():
+def test_recordings_are_called_by_their_names_with_any_characters():
     remarks = prepare((repeating(1), repeating(2)), ("pull 1.5 N", "pull 2.5 N"), plain=False).remarks
     assert [remark.split(":")[0] for remark in remarks] == ["pull 1.5 N", "pull 2.5 N"]

@@ -20,7 +20,7 @@ def asking(protocol):
 
 @pytest.fixture
 def felt(simulate, asking):
-    """One detection run of somebody who feels true_n in 79.4 % of the trials."""
+    """One detection run of a participant who feels true_n in 79.4 % of the trials."""
 
     def run(true_n, generator, **columns):
         rule = staircase_rule(asking, Phase.DETECTION)
@@ -29,7 +29,7 @@ def felt(simulate, asking):
     return run
 
 
-def test_the_threshold_of_somebody_who_feels_is_recovered(felt, asking):
+def test_the_detection_threshold_of_a_simulated_participant_is_recovered(felt, asking):
     generator = np.random.default_rng(5)
     trials = [trial for run in range(60) for trial in felt(0.2, generator, run=run)]
     rows = detection_thresholds(trials, asking)
@@ -40,7 +40,7 @@ def test_the_threshold_of_somebody_who_feels_is_recovered(felt, asking):
     assert mean_db == pytest.approx(20 * np.log10(0.2), abs=0.8)
 
 
-def test_somebody_who_feels_nothing_is_cut_by_the_cap(felt, asking):
+def test_a_participant_who_feels_nothing_is_cut_by_the_cap(felt, asking):
     generator = np.random.default_rng(5)
     rows = detection_thresholds([t for run in range(20) for t in felt(float("inf"), generator, run=run)], asking)
     assert sum(row.censored for row in rows) >= 19

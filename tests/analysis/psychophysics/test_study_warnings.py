@@ -71,7 +71,7 @@ def test_a_run_that_the_trial_limit_stopped_is_never_dropped_in_silence(simulate
 
 
 def test_a_liking_for_one_answer_is_named(able, protocol):
-    # The same answers, right whenever direction 1 was shown: somebody who nearly always says 1.
+    # The same answers, right whenever direction 1 was shown: a participant who nearly always says 1.
     leaning = [
         replace(trial, direction_shown=1 if trial.correct else 2, answer=1) if trial.run == 1 else trial
         for trial in able
@@ -148,7 +148,7 @@ def test_a_vibration_that_is_felt_before_its_direction_is_as_it_should_be(able, 
     assert warnings(with_detection(able, 0.05), full_protocol) == ()
 
 
-def test_somebody_who_feels_nothing_is_named(able, full_protocol, with_detection):
+def test_a_participant_who_feels_nothing_is_named(able, full_protocol, with_detection):
     bound, chance, _ = warnings(with_detection(able, float("inf")), full_protocol)
     assert bound == "1 detection threshold is cut by the cap: s01 at 35 Hz."
     assert chance.startswith("Detection not shown to be better than chance: s01 at 35 Hz (")

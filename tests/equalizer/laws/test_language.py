@@ -71,7 +71,7 @@ def by_numpy(tree: Node, numbers: list[float]) -> np.ndarray:
 
 
 def law_with(tree: Node, numbers: list[float]) -> Law:
-    """With every number used, whatever the tree has."""
+    """With every number used, for any tree."""
     for place in range(3):
         tree = Apply("+", (tree, Apply("*", (Number(0.0), Free(place)))))
     return Law(format_formula(tree), tuple(numbers), (), "force", "x")

@@ -82,7 +82,7 @@ def test_the_primary_contrast_is_between_two_frequencies_that_are_played(small_t
         load_protocol(f"{small_text}\n{table.format('[45.0, 1.0]')}", "mine.toml")
 
 
-def test_tables_that_nobody_writes_leave_an_old_fingerprint_alone(small_protocol):
+def test_absent_tables_leave_an_old_fingerprint_alone(small_protocol):
     """The fingerprint of this very protocol before any of these tables existed."""
     assert protocol_hash(small_protocol) == "3dbd332b83f609b7a013ed32f20036f1da9285a990ec04a93c54899674a16b9a"
 

@@ -97,7 +97,7 @@ def test_a_random_order_depends_on_the_seed_alone():
 
 
 @pytest.mark.parametrize("frequencies", [FIVE, FIVE[:4]])
-def test_williams_orders_are_balanced_over_participants_whatever_their_seeds(frequencies):
+def test_williams_orders_are_balanced_over_participants_for_any_seeds(frequencies):
     participants = 2 * len(frequencies)
     orders = [frequency_order(WILLIAMS, frequencies, seed, seed) for seed in range(participants)]
     positions = Counter((position, value) for order in orders for position, value in enumerate(order))

@@ -1,4 +1,4 @@
-"""Whatever is wrong: a named error, an exit code, what to do; never a traceback.
+"""Each kind of wrong input: a named error, an exit code, what to do; never a traceback.
 
 In this process where that tells the same: an error without a name would leave `main` and fail the test. In a process of
 its own where streams, environment or limits are at stake, and once for each kind of refusal."""

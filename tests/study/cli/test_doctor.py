@@ -1,4 +1,4 @@
-"""`hapteq doctor` as somebody before a study day and as a script uses it."""
+"""`hapteq doctor` as an experimenter before a study day and as a script uses it."""
 
 import json
 from importlib.metadata import packages_distributions

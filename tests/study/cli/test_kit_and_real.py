@@ -1,6 +1,6 @@
 """`hapteq kit` and `hapteq real` on what is not what it should be: a sentence, an exit code, and nothing written.
 
-Nothing is diagnosed here. An error that nobody named would leave `main` as it is, and fail the test.
+Nothing is diagnosed here. An error without a name would leave `main` as it is, and fail the test.
 """
 
 import hashlib
@@ -145,7 +145,7 @@ def test_a_place_that_may_not_be_written_to_is_said(place: Path, typed: str) -> 
     rights = "-dac_override,-dac_read_search"
     superuser = os.geteuid() == 0
     if superuser and not shutil.which("setpriv"):
-        pytest.skip("whoever runs this may write anywhere, and there is no setpriv to give that up")
+        pytest.skip("the user who runs this may write anywhere, and there is no setpriv to give that up")
     given_up = ["setpriv", f"--inh-caps={rights}", f"--bounding-set={rights}"] if superuser else []
     closed = (place / "empty", place)
     for folder in closed:

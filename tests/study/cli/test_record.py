@@ -18,14 +18,14 @@ class ATerminal(io.StringIO):
         return True
 
 
-def test_without_a_terminal_it_is_said_and_nobody_is_waited_for(monkeypatch, capsys):
+def test_without_a_terminal_it_says_so_and_does_not_wait(monkeypatch, capsys):
     monkeypatch.setattr("sys.stdin", io.StringIO(""))
     announce(NOTICE)
     said = capsys.readouterr()
     assert (said.out, said.err) == ("", f"{NOTICE}\n")
 
 
-def test_at_a_terminal_somebody_has_to_press_enter(monkeypatch, capsys):
+def test_at_a_terminal_enter_has_to_be_pressed(monkeypatch, capsys):
     keys = ATerminal("\nnot read")
     monkeypatch.setattr("sys.stdin", keys)
     announce(NOTICE)

@@ -104,7 +104,7 @@ def test_the_help_names_every_observer(run):
     assert all(name in said for name in OBSERVERS)
 
 
-def test_a_damaged_protocol_text_keeps_nobody_out(run, data, small_file):
+def test_a_session_begins_beside_a_damaged_protocol_text(run, data, small_file):
     log = data / "P01_001" / "events.jsonl"
     log.write_text(log.read_text().replace("start_n = 1.0", "start_n = = 1.0", 1))
     code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)

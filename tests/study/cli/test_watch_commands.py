@@ -33,7 +33,7 @@ def data(tmp_path_factory):
 
 @pytest.fixture
 def running(data):
-    """Somebody holds the log and takes what is asked."""
+    """A session holds the log and takes what is asked."""
     log, over, heard = EventLog.reopen(data / "S1_001" / LOG_NAME), threading.Event(), []
 
     def take() -> None:

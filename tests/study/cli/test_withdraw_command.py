@@ -7,7 +7,7 @@ import pytest
 pytestmark = pytest.mark.usefixtures("validated_here", "sketched")
 
 
-def test_withdrawal_erases_all_sessions_of_the_participant_and_nobody_elses(run, data, small_file):
+def test_withdrawal_erases_all_sessions_of_the_participant_and_no_others(run, data, small_file):
     for subject in ("P01", "P02"):
         who = ("--observer", "ideal", "--subject", subject)
         assert run("study", "--protocol", small_file, *who, "--data", data)[0] == 0

@@ -118,7 +118,7 @@ def test_that_no_hand_is_on_the_handle_does_not_raise_the_ceiling_by_itself():
         open_device("simulated", replace(STRONG, limits=replace(STRONG.limits, total_cap_n=6.0)), VirtualClock(), 1)
 
 
-def test_with_a_hand_nobody_can_say_so():
+def test_a_higher_ceiling_with_a_hand_is_refused():
     settings = replace(SETTINGS, beyond_hand_ceiling=True)
     with pytest.raises(DeviceError, match="beyond_hand_ceiling is set while a hand is on the handle"):
         open_device("simulated", settings, VirtualClock(), 1)

@@ -55,7 +55,7 @@ def test_measured_means_rise_with_frequency_up_to_35_hz(measured_n):
     assert means[4] == pytest.approx(means[3], rel=0.15)
 
 
-def test_some_are_pinned_at_the_cap_at_35_hz_and_nobody_is_at_5_hz(measured_n):
+def test_some_thresholds_are_at_the_cap_at_35_hz_and_none_at_5_hz(measured_n):
     pinned = (measured_n > 2.4).mean(axis=0)
     assert 0.1 < pinned[3] < 0.5
     assert pinned[0] == 0.0

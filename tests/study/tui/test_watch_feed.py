@@ -48,7 +48,7 @@ def gone(pid: int) -> bool:
         os.kill(pid, 0)
     except ProcessLookupError:
         return True
-    # A killed child of ours stays as a zombie until somebody asks for it.
+    # A killed child of ours stays as a zombie until it is waited for.
     return Path(f"/proc/{pid}/stat").read_text().split(")")[1].split()[0] == "Z"
 
 

@@ -2,7 +2,7 @@
 
 The measured motion stays. A mechanism with an additional force F(x, v, a) would have needed u + F for the same motion,
 and a drive with the characteristic g would have needed u' with g(u') = u. Both are what a controller that imposes the
-motion would command, and exact whatever else the device does.
+motion would command, and exact for any other behaviour of the device.
 
 Written for the challenge only: no code is shared with the effects that a diagnosis compares.
 """

@@ -130,7 +130,7 @@ def test_a_second_is_too_short_where_it_holds_few_samples_and_enough_where_it_ho
     require_something([recording(samples=800)], ["a"])
 
 
-def test_a_rate_at_which_nobody_can_see_the_model_move_is_refused():
+def test_a_rate_too_slow_for_the_model_is_refused():
     said = refusal(require_model_of, model(stiffness=100.0), [recording(rate_hz=0.5)])
     assert "the model swings at" in said
     assert "a rate of 0.5 Hz; the recording must state its rate in hertz" in said

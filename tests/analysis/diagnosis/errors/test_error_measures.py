@@ -52,7 +52,7 @@ def test_a_plant_that_drifts_freely_is_simulated_in_windows(drifting: Recording)
 
 
 def test_a_window_holds_many_readings_per_number_of_its_state_at_any_rate(drifting: Recording) -> None:
-    """Of a window of a single reading, the fitted state would leave nothing, whatever the model."""
+    """Of a window of a single reading, the fitted state would leave nothing, with any model."""
     slow = replace(
         drifting,
         command=replace(drifting.command, sample_rate_hz=1.0),

@@ -45,7 +45,7 @@ def named(found):
     return [effect.effect for effect in found.diagnosis.effects]
 
 
-def test_what_a_sound_device_differs_by_is_named_only_where_nobody_knows_that_it_is_sound(diagnosed, clean, found_in):
+def test_what_an_intact_device_differs_by_is_named_only_without_clean_recordings(diagnosed, clean, found_in):
     same = diagnosed.recorded(1, (LAG,), seed=4)
     assert named(found_in(same)) == ["amplifier_lag"]
     known = found_in(same, clean)

@@ -6,7 +6,7 @@ from analysis.diagnosis.result.named_effects import probabilities, probability_o
 from analysis.diagnosis.settings import ELSEWHERE_LEAST, ELSEWHERE_MOST
 
 
-def test_nobody_is_likely_among_nobody():
+def test_of_no_candidates_none_has_a_probability():
     assert probabilities((), 1.0) == ()
 
 

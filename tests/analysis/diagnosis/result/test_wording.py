@@ -80,7 +80,7 @@ def test_a_signature_of_the_catalogue_ends_the_sentence_that_names_it(effect):
     assert effect.signature[:1].islower()
 
 
-def test_an_effect_that_nobody_has_words_for_is_called_by_its_own_name():
+def test_an_effect_without_words_is_called_by_its_own_name():
     effect = NamedEffect("odd_thing", "mechanism", None, 1.0, 1.0, {"size": Estimate(0.5, "N")})
     assert effect_sentence(effect) == "Odd thing on all drives, 0.500 N."
 

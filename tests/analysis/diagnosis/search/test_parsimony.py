@@ -14,7 +14,7 @@ def first_of(*fitted_candidates):
     return plainest_first(ranked)[0].fitted.hypothesis.claims[-1].effect.name
 
 
-def test_nobody_is_preferred_of_nobody():
+def test_of_no_candidates_none_is_preferred():
     assert plainest_first(()) == ()
 
 

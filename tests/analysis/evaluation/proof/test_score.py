@@ -140,7 +140,7 @@ def test_probabilities_that_mean_what_they_say_have_no_error():
     honest = [outcome(answer=said("explained", named("coulomb_friction", probability=0.75)))] * 30
     honest += [outcome(answer=said("explained", named("cogging", probability=0.75)))] * 10
     mixed = [honest[k] for k in np.random.default_rng(1).permutation(40)]
-    assert calibration(mixed).error == pytest.approx(0.0, abs=1e-12)  # whatever order they tie in
+    assert calibration(mixed).error == pytest.approx(0.0, abs=1e-12)  # in any order of the ties
     boasting = calibration([WRONG] * 20)
     assert boasting.error == pytest.approx(0.6)
     assert len(boasting.bins) == 10

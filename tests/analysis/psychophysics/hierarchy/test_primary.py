@@ -37,7 +37,7 @@ def test_a_contrast_towards_the_cap_is_not_lost():
 
 
 @pytest.mark.parametrize("family", list(Family))
-def test_medians_are_recovered_whatever_the_shape_of_the_curves(family):
+def test_medians_are_recovered_for_each_shape_of_the_curves(family):
     crowd = Crowd((5.0, 35.0), (0.5, 1.6), family=family, lapse=0.03)
     errors = [fit_hierarchy(s.answers).means_db - s.true_db.mean(axis=0) for s in studies(crowd, 5)]
     assert np.abs(np.mean(errors, axis=0)).max() < 0.8

@@ -40,7 +40,7 @@ def test_the_early_error_is_that_of_forces_that_begin_300_ms_before(start, probl
     assert start.early_error(normal) == pytest.approx(band_error(wanted, played, 1000.0, (5.0, 35.0)), rel=1e-6)
 
 
-def test_a_start_that_nobody_knew_of_costs_something_and_not_much(start):
+def test_an_unknown_initial_state_costs_little_and_not_nothing(start):
     for normal in NORMALS:
         assert start.early_error(normal) < start.error(normal) < 0.05
     assert max(start.error(normal) for normal in NORMALS) <= start.worst_error < 0.05

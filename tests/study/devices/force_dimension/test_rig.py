@@ -256,7 +256,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_whatever_happens_at_whatever_time_the_cap_holds_and_the_end_is_braked(stepped_stub, rigs, seed):
+def test_after_random_faults_at_random_times_the_cap_holds_and_the_end_is_braked(stepped_stub, rigs, seed):
     random = np.random.default_rng(seed)
     clock = VirtualClock()
     with contextlib.closing(SafeDevice(stepped_stub.rig(), rigs.SETTINGS, clock)) as device:

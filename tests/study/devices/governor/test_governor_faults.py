@@ -120,7 +120,7 @@ def test_without_a_sign_of_life_the_force_fades_to_zero(bench, rigs):
     assert rigs.violations(forces, rigs.LIMITS) == []
 
 
-def test_the_longest_hold_ends_a_stimulus_that_nobody_answers(rigs):
+def test_the_longest_hold_ends_a_stimulus_without_an_answer(rigs):
     limits = replace(rigs.LIMITS, longest_hold_s=1.0)
     bench = Bench(rigs, replace(rigs.SETTINGS, limits=limits))
     forces = bench.hold(rigs.sine(2.0), 2000)

@@ -219,7 +219,7 @@ def late_hold(lying, damping: float, late: np.ndarray, speed_m_per_s: float):
 
 
 def test_ninety_late_ticks_do_not_multiply_the_damping(lying):
-    """0.3 m/s at 2 N s/m are 0.6 N, however many ticks nobody attended."""
+    """0.3 m/s at 2 N s/m are 0.6 N, however many ticks had no sign of life."""
     late = np.zeros(500)
     late[300:390] = 1.0
     played = lying.play(late_hold(lying, 2.0, late, 0.3))

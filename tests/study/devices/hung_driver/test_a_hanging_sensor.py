@@ -32,7 +32,7 @@ def test_a_sensor_that_hangs_loses_the_force_although_the_program_is_alive(devic
         device.hold(rigs.push())
 
 
-def test_whoever_only_asks_for_faults_finds_the_hanging_loop_too(device, rigs, rig, hang):
+def test_asking_for_faults_alone_finds_the_hanging_loop_too(device, rigs, rig, hang):
     hold(device, rigs, rig)
     rig.before_sensing = hang.wait
     time.sleep(0.15)
@@ -136,7 +136,7 @@ def test_nothing_begins_while_the_loop_is_being_closed(device, rigs, rig):
     assert rig.written_n == []
 
 
-def test_a_driver_that_hangs_with_its_lock_hangs_nobody_else(device, rigs, rig, hang):
+def test_a_driver_that_hangs_with_its_lock_blocks_no_other_caller(device, rigs, rig, hang):
     hold(device, rigs, rig)
     lock = threading.Lock()
 

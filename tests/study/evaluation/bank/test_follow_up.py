@@ -99,7 +99,7 @@ def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_pl
     folder, outcome, _ = started(tmp_path / "bank", False)
     asked = []
     monkeypatch.setattr("study.evaluation.bank.follow_up.ask_engine", lambda again, names, *_: asked.extend(names))
-    with pytest.raises(StudyError, match="answer.json"):  # nobody answered
+    with pytest.raises(StudyError, match="answer.json"):  # without an answer
         follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
     (name,) = asked
     assert (folder.path / NEXT / "open" / name / FURTHER).exists()

@@ -35,7 +35,7 @@ def test_a_part_of_a_bank_is_a_fair_sample_of_it(bank):
     assert first == Counter(kind for kind, _ in TURN)
 
 
-def test_the_same_number_is_drawn_alike_whatever_comes_after(bank):
+def test_a_case_is_drawn_alike_in_banks_of_any_length(bank):
     assert [draw(50_000, number) for number in range(7)] == bank[:7]
     assert draw(50_001, 3) != bank[3]
 

@@ -92,7 +92,7 @@ def test_where_nothing_changed_the_answer_is_kept(answered: RealPlan) -> None:
 
 
 @pytest.mark.parametrize("name", ["run.npz", "run.toml", "axis.model.toml", "later.npz", "later.toml"])
-def test_whatever_file_changed_the_old_answer_is_not_taken_for_new(answered: RealPlan, name: str) -> None:
+def test_an_old_answer_is_not_reused_after_a_change_of_any_file(answered: RealPlan, name: str) -> None:
     path = answered.folder / "axis" / name
     path.write_bytes(path.read_bytes() + b"\n")
     error = refusal(answered)
@@ -157,7 +157,7 @@ def test_moved_away_it_is_answered_anew(answered: RealPlan) -> None:
     assert kept(answered).is_file()
 
 
-def test_a_model_that_nobody_has_is_no_parent(folder: Path) -> None:
+def test_an_unknown_model_is_no_parent(folder: Path) -> None:
     (folder / "axis" / "axis.model.toml").unlink()
     (one,) = read_real_folder(folder).recordings
     assert [path.name for path in one.parents] == ["run.npz", "run.toml"]

@@ -83,14 +83,14 @@ def played(offset: float) -> dict[str, np.ndarray]:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """One recording with a wrong zero, one folder that nobody can read, one whose file is broken."""
+    """One recording with a wrong zero, one folder that no map reads, one whose file is broken."""
     whole = tmp_path / "recordings"
-    for name in ("axis", "nobody_knows", "torn"):
+    for name in ("axis", "without_map", "torn"):
         (whole / name).mkdir(parents=True)
     np.savez(whole / "axis" / "run.npz", **played(OFFSET))
     (whole / "axis" / "run.toml").write_text(MAP)
     (whole / "axis" / "axis.model.toml").write_text(MODEL)
-    (whole / "nobody_knows" / "notes.txt").write_text("nothing")
+    (whole / "without_map" / "notes.txt").write_text("nothing")
     (whole / "torn" / "run.npz").write_bytes(b"no archive")
     (whole / "torn" / "run.toml").write_text(MAP.replace("axis.model.toml", ""))
     return whole
@@ -109,9 +109,9 @@ def test_one_recording_is_answered_and_the_others_are_said(folder: Path, tmp_pat
     assert axis.numbers[0].name == "mass" and axis.numbers[0].holds_nominal
     assert axis.objections == ("It is simulated.",)
     assert torn.verdict == "refused" and "run.npz" in torn.answer
-    assert [trouble.where for trouble in done.results.troubles] == ["nobody_knows"]
+    assert [trouble.where for trouble in done.results.troubles] == ["without_map"]
     page = done.page.read_text()
-    assert "It is simulated." in page and "nobody_knows" in page
+    assert "It is simulated." in page and "without_map" in page
     assert done.table.read_text().splitlines()[1].startswith(f"axis,run,{axis.verdict},sensor_offset")
     assert (tmp_path / "out" / "figures" / "held-out-axis-run.svg").is_file()
     assert any("sensor_offset" in line for line in real_lines(done))
@@ -205,7 +205,7 @@ def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
         read_real_folder(tmp_path / "nowhere")
 
 
-def test_a_model_that_nobody_has_is_refused_with_those_that_are_there(tmp_path: Path) -> None:
+def test_an_unknown_model_is_refused_with_the_names_of_known_ones(tmp_path: Path) -> None:
     with pytest.raises(StudyError) as refusal:
         model_for("haptic_padle", tmp_path)
     assert "haptic_paddle" in refusal.value.happened

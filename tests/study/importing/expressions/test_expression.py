@@ -91,7 +91,7 @@ def test_arithmetic_over_arrays(text, expected):
         ("nothing", "no nothing"),
     ],
 )
-def test_whatever_else_is_refused_by_name(text, sentence):
+def test_other_expressions_are_refused_by_name(text, sentence):
     with pytest.raises(ImportProblemError) as refused:
         value(text)
     assert sentence in str(refused.value)

@@ -44,7 +44,7 @@ def test_a_simulated_participant_signs_nothing(begun, full):
 
 
 @pytest.mark.parametrize(("form", "reason"), [("consent", "consent was not given"), ("exclusion", "with yes")])
-def test_whoever_does_not_agree_or_may_not_take_part_feels_nothing(begun, full, form, reason):
+def test_without_consent_or_with_an_exclusion_no_stimulus_comes(begun, full, form, reason):
     state = begun(full)
     if form == "exclusion":
         state = apply(state, filled("consent"))

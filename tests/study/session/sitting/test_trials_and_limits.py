@@ -101,7 +101,7 @@ def test_in_a_detection_run_the_interval_is_the_answer(begun, small_protocol, fa
     assert len(seen) == 4
 
 
-def test_the_dose_counts_whatever_shook_the_hand(begun, small_protocol, facts):
+def test_the_dose_counts_every_vibration_at_the_hand(begun, small_protocol, facts):
     state = begun(small_protocol)
     action = next_action(state)
     state = apply(apply(state, facts.presented(action)), facts.answered(action, correct=True))
@@ -117,7 +117,7 @@ def test_the_dose_counts_whatever_shook_the_hand(begun, small_protocol, facts):
     assert a8_mps2(state.sitting.dose) < 1.0
 
 
-def test_a_stimulus_that_nobody_measured_is_told_apart(begun, small_protocol, facts):
+def test_a_stimulus_without_a_measurement_is_marked_in_the_dose(begun, small_protocol, facts):
     state = begun(small_protocol)
     action = next_action(state)
     state = apply(state, facts.presented(action))

@@ -11,7 +11,7 @@ def shipped(name: str):
     return load_protocol(files("protocols").joinpath(f"{name}.toml").read_text("utf-8"), name)
 
 
-def test_without_a_hand_nobody_may_hold_the_handle():
+def test_without_a_hand_the_notice_asks_to_keep_hands_off():
     said = handle_notice(shipped("sweep_band"), "omega.3", 298.0)
     assert said.startswith("No person may hold the handle: 'omega.3' is going to move by itself for about 5 min")
     assert "up to 3 N" in said

@@ -134,7 +134,7 @@ def test_an_alarm_that_lasts_keeps_its_time(story):
     assert first.alarms[0].since == still.alarms[0].since == at(14)
 
 
-def test_the_end_of_a_sitting_is_news_for_a_minute_and_stays_for_whoever_saw_it(story):
+def test_the_end_of_a_sitting_is_news_for_a_minute_and_stays_in_an_open_view(story):
     story.answer(True).tell(SessionInterrupted(at(20), "the device was lost"))
     saw = story.view(later=12.0)
     assert [a.sentence for a in saw.alarms] == ["The sitting ended: the device was lost."]
@@ -169,7 +169,7 @@ def _stamped_sitting(story, monotonic_s: float):
 
 
 def test_a_clock_set_back_below_the_sittings_begin_silences_no_alarm(story):
-    """The live state and what was noted are of this sitting, whatever their times say."""
+    """The live state and what was noted are of this sitting, at any time that they state."""
     story.open_trial()
     back = story.live(monotonic_s=50.0, fault="the device stopped answering")
     view = watch_view(story.watched, LiveInfo(replace(back, utc=at(-3600.0)), None), at(-3599.0))

@@ -63,6 +63,6 @@ def test_a_place_that_cannot_be_written_to_is_refused_before_any_work(tmp_path):
     (tmp_path / "closed").mkdir()
     (tmp_path / "closed").chmod(0o555)
     if os.access(tmp_path / "closed", os.W_OK):
-        pytest.skip("whoever runs this may write anywhere")
+        pytest.skip("the user who runs this may write anywhere")
     with pytest.raises(CannotWriteError, match="was not written"):
         require_new_folder(tmp_path / "closed" / "out")

@@ -1,4 +1,4 @@
-"""What is recorded is for the account that recorded it, whatever the umask says."""
+"""What is recorded is for the account that recorded it, with any umask."""
 
 import os
 import shutil

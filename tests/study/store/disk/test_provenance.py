@@ -56,7 +56,7 @@ def test_file_names_that_are_not_utf8_do_not_stop_what_is_written(tmp_path):
     assert read_json(tmp_path / "a.json", "some", 1)["about"] == "caf?"
 
 
-def test_copies_are_found_again_whatever_their_names_are(tmp_path):
+def test_copies_are_found_again_under_any_name(tmp_path):
     outs = [tmp_path / "out" / name for name in ("plain", "line\u2028end", os.fsdecode(b"caf\xe9"))]
     (tmp_path / "data").mkdir()
     for out in outs:

@@ -95,7 +95,7 @@ def test_a_log_has_one_writer_even_when_the_lock_file_is_gone(written):
 
 
 def test_a_log_that_cannot_be_opened_for_writing_is_said_so(tmp_path):
-    """A folder in its place: refused by the system for everybody, root included."""
+    """A folder in its place: refused by the system for every user, root included."""
     (tmp_path / "events.jsonl").mkdir()
     with pytest.raises(StudyError, match="cannot be written to.*Is a directory") as error:
         EventLog.reopen(tmp_path / "events.jsonl")

@@ -60,7 +60,7 @@ def test_a_stop_wins_over_a_flood(inbox):
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"\xff\x00", b'{"format": "hapteq-request", "version": 9}'])
-def test_a_stop_is_a_stop_whatever_its_file_holds(inbox, folder, content):
+def test_a_stop_is_a_stop_with_any_content_of_its_file(inbox, folder, content):
     (folder / "stop").write_bytes(content)
     assert inbox.take() == (STOP,)
     assert inbox.take() == ()
@@ -83,7 +83,7 @@ def test_yesterdays_stop_does_not_end_todays_sitting_and_its_notes_are_not_lost(
         b"[1, 2]",
         b"[" * 50_000,
         b'{"format": "hapteq-request", "version": 1, "request": "erase", "who": "experimenter"}',
-        b'{"format": "hapteq-request", "version": 1, "request": "pause", "who": "somebody"}',
+        b'{"format": "hapteq-request", "version": 1, "request": "pause", "who": "a stranger"}',
         b'{"format": "hapteq-request", "version": 1, "request": "pause"}',
         b'{"format": "hapteq-request", "version": 1, "request": "note", "who": "program", "text": 3, "adverse": false}',
         b'{"format": "hapteq-request", "version": 2, "request": "pause", "who": "experimenter"}',
@@ -117,7 +117,7 @@ def test_without_its_folder_nothing_was_asked(tmp_path):
     RequestInbox(tmp_path / "gone").clear()
 
 
-def test_whoever_sends_makes_the_folder(tmp_path):
+def test_sending_a_request_makes_the_folder(tmp_path):
     RequestInbox(tmp_path).send(STOP)
     assert RequestInbox(tmp_path).take() == (STOP,)
 
@@ -130,7 +130,7 @@ def test_a_request_that_cannot_be_written_says_what_else_to_do(tmp_path):
     assert "switch the device off" in told.value.do_now
 
 
-def test_a_request_that_nobody_took_can_be_taken_back(inbox):
+def test_an_unread_request_can_be_taken_back(inbox):
     name = inbox.send(STOP)
     assert inbox.take_back(name)
     assert inbox.take() == ()
@@ -176,7 +176,7 @@ def test_an_empty_inbox_costs_next_to_nothing(inbox):
 
 
 def test_an_inbox_that_is_a_link_is_neither_read_nor_emptied(tmp_path):
-    """Whoever looks into it at the start of a sitting removes what is there."""
+    """The session that looks into it at the start of a sitting removes what is there."""
     elsewhere, session = tmp_path / "elsewhere", tmp_path / "P01_001"
     elsewhere.mkdir()
     session.mkdir()

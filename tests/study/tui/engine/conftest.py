@@ -61,7 +61,7 @@ class ScriptedScreen:
         return message
 
     def wait_for(self, wanted: Callable[[FromEngine], bool], reply: bool = True) -> Any:
-        """Answers whatever comes before what is wanted."""
+        """Answers all that comes before what is wanted."""
         while not wanted(message := self.next()):
             assert not isinstance(message, Failed | Finished), message
             if reply and isinstance(message, Ask):

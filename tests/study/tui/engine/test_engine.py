@@ -120,7 +120,7 @@ def test_a_reply_to_what_is_over_is_ignored(begun, session):
     assert '"answer":1' in answers[-1]
 
 
-def test_without_a_heartbeat_the_trial_is_void_and_waits_for_somebody(begun, session):
+def test_without_a_heartbeat_the_trial_is_void_and_waits_for_a_screen(begun, session):
     trial = third_trial(begun)
     begun.suspend()
     began_s = time.monotonic()

@@ -114,7 +114,7 @@ def question(display: RemoteDisplay):
 
 
 @pytest.mark.parametrize("wait", [question, play, wait_for_handle])
-def test_a_silent_screen_ends_whatever_may_shake_a_hand(screen, wait):
+def test_a_silent_screen_ends_every_force_at_the_hand(screen, wait):
     screen.fall_silent()
     began_s = time.monotonic()
     reply = wait(screen.display)
@@ -170,7 +170,7 @@ def test_a_handle_that_is_held_still_for_a_moment_is_no_news(screen):
     assert not screen.pipe.poll(0.1)
 
 
-def test_a_handle_that_nobody_can_see_is_shown_after_a_while(screen):
+def test_an_unmeasured_handle_position_is_shown_after_a_while(screen):
     view = HandleView(False, "The device does not say where its handle is.", (0.0, 0.0), 5.0)
     screen.soon(Reply(1, Unanswered("asked for a pause", leave=False, pause=True)), delay_s=1.4)
     assert screen.display.await_handle(lambda: view, alive).pause

@@ -77,7 +77,7 @@ def test_the_time_limit_ends_the_question(typed):
     assert ask(typed, question) == TIME_OVER
 
 
-def test_the_device_gets_signs_of_life_while_nobody_answers(typed):
+def test_the_device_gets_signs_of_life_while_an_answer_is_awaited(typed):
     signs = []
 
     def sign_of_life() -> bool:
@@ -112,7 +112,7 @@ def test_practice_on_a_simulation_is_called_practice(typed):
     assert "Welcome back: 12 answers are on disk" in text
 
 
-def test_after_a_void_trial_nothing_is_played_until_somebody_is_there(typed):
+def test_after_a_void_trial_nothing_is_played_before_a_key_press(typed):
     typed.type("")
     typed.display.await_return("the stimulus was held too long")
     assert "The last trial does not count. It is void: the stimulus was held too long." in typed.out.getvalue()
@@ -168,7 +168,7 @@ def test_the_end_of_a_practice_is_told_and_read(typed, passed, words):
 
 
 @pytest.mark.parametrize("call", ["welcome", "practice_over", "await_return"])
-def test_whoever_waits_for_enter_can_leave(typed, call):
+def test_a_wait_for_enter_can_be_left(typed, call):
     values = {
         "welcome": Welcome("Title", PICTURE, 5, 0, "a device", felt=True, resumed_after=0),
         "practice_over": PracticeResult(True, 4, 5),

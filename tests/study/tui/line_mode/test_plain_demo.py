@@ -88,7 +88,7 @@ def test_the_demonstration_can_be_left_and_ends_with_the_input(typed):
         choose(typed)
 
 
-def test_whatever_ends_the_wait_ends_the_menu(typed):
+def test_each_end_of_the_wait_ends_the_menu(typed):
     assert typed.display.choose_demo(MENU, lambda: False) == DemoDone()
 
 

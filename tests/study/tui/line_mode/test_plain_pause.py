@@ -35,7 +35,7 @@ def test_a_rest_ends_at_once_where_the_sign_of_life_says_so(unhurried):
     assert "Press Enter" not in unhurried.said
 
 
-def test_a_rest_whose_end_nobody_confirms_can_still_be_ended(typed):
+def test_a_rest_without_a_confirmed_end_can_still_be_ended(typed):
     signs = []
     typed.display.rest(RestNotice(0.0, 1), lambda: signs.append(1) is None and len(signs) < 4)
     assert len(signs) == 4
@@ -91,7 +91,7 @@ def test_notes_and_adverse_events_reach_the_session(typed_in):
     assert "Nothing was written." in typed.said
 
 
-def test_without_anybody_to_take_them_no_notes_are_offered(typed):
+def test_without_a_reader_no_notes_are_offered(typed):
     typed.type("n", "")
     typed.display.pause(PAUSE, lambda: True)
     assert "note" not in typed.said

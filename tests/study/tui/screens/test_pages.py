@@ -196,7 +196,7 @@ def test_a_pause_can_be_asked_for_in_a_demonstration(read):
     ],
     ids=["playing", "handle"],
 )
-def test_whatever_is_waited_for_can_be_paused(read, screen, key, reply):
+def test_every_wait_can_be_paused(read, screen, key, reply):
     assert read(screen(), "1", "enter", key)[0] == [reply]
 
 

@@ -26,7 +26,7 @@ def test_enter_goes_on(paused):
     assert paused("enter")[0] == [AfterPause.GO_ON]
 
 
-def test_leaving_is_the_second_choice_and_the_first_for_whoever_asked_to_leave(paused):
+def test_leaving_is_the_second_choice_and_the_first_after_a_request_to_leave(paused):
     assert paused("down", "enter")[0] == [AfterPause.LEAVE]
     assert paused("enter", leaving=True)[0] == [AfterPause.LEAVE]
 
@@ -82,7 +82,7 @@ def test_a_note_too_long_for_the_log_says_by_how_much(on_stage):
     assert on_stage(NoteScreen(), story) == []
 
 
-def test_a_note_of_nobody_asks_who_writes_it(on_stage):
+def test_a_note_without_an_author_asks_who_writes_it(on_stage):
     async def story(stage):
         await stage.press(*"abc", "ctrl+s")
         assert "Please choose who writes this." in stage.words

@@ -101,7 +101,7 @@ def test_a_note_can_be_left_and_an_empty_one_is_none(seated):
     assert seated(story).asked == []
 
 
-def test_a_note_being_typed_does_not_keep_anybody_from_stopping(seated):
+def test_a_stop_can_be_asked_for_while_a_note_is_typed(seated):
     async def story(seat):
         await seat.press("n", *"abc", "f8")
         assert seat.asked == [STOP]

@@ -30,7 +30,7 @@ GOOD = Terminal("utf-8", "xterm-256color", 80, 24)
     [
         ("numpy>=1.0", True, "(needs >=1.0)"),
         ("numpy>=999", False, "(needs >=999)"),
-        ("no-such-package-of-anybody>=1", False, "not installed"),
+        ("no-such-package-of-no-author>=1", False, "not installed"),
     ],
 )
 def test_a_package_is_held_against_what_is_needed(requirement, fine, value):
@@ -41,7 +41,7 @@ def test_a_package_is_held_against_what_is_needed(requirement, fine, value):
 
 
 def test_packages_for_tests_are_not_asked_for(distribution):
-    distribution("hapteq", requires=["numpy>=1", 'pytest-of-nobody>=1; extra == "test"'])
+    distribution("hapteq", requires=["numpy>=1", 'pytest-of-no-author>=1; extra == "test"'])
     assert [finding.name for finding in check_packages()] == ["hapteq", "Python", "numpy"]
     assert all(finding.fine for finding in check_packages())
 
@@ -52,7 +52,7 @@ def test_a_python_that_is_too_old_is_found(distribution):
 
 
 def test_a_checkout_without_installation_says_what_to_do(monkeypatch):
-    monkeypatch.setattr(module, "HAPTEQ", "hapteq-of-nobody")
+    monkeypatch.setattr(module, "HAPTEQ", "hapteq-of-no-author")
     (finding,) = check_packages()
     assert finding.value == "not installed, so what it needs is not known"
     assert finding.advice == "Run `make study` in its folder once: that installs hapteq and what it needs."

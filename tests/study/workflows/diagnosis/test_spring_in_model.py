@@ -14,7 +14,7 @@ def two_bodies() -> MechanicalModel:
     return MechanicalModel("two", "acceleration", one, one, 50 * one, np.array([[2.0], [0.0]]), np.array([[0.0, 1.0]]))
 
 
-def test_it_holds_what_is_driven_whatever_the_commands_unit(two_bodies):
+def test_the_spring_holds_the_driven_body_for_any_unit_of_the_command(two_bodies):
     held = with_spring(two_bodies, 137.0)
     np.testing.assert_array_equal(held.stiffness, [[187.0, 0.0], [0.0, 50.0]])
     np.testing.assert_array_equal(with_spring(held, -137.0).stiffness, two_bodies.stiffness)

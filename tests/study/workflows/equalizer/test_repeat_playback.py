@@ -75,7 +75,7 @@ def true_error(played, wanted, rows=2000) -> float:
 
 
 def unheard(play: int, share: float) -> None:
-    """Progress that nobody looks at."""
+    """Progress that is not shown."""
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -23,7 +23,7 @@ ORDER = RepeatOrder(repeats=4, device="simulated")
 
 
 def unheard(play: int, share: float) -> None:
-    """Progress that nobody looks at."""
+    """Progress that is not shown."""
 
 
 def table(level=1.8, rows=2000) -> Trajectory:

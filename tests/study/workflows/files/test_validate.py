@@ -87,7 +87,7 @@ def test_the_shipped_protocols_are_sound(name):
     assert f"protocol '{name}'" in sound(SHIPPED / f"{name}.toml")
 
 
-def test_a_table_is_known_by_its_header_whatever_its_name(tmp_path):
+def test_a_table_is_known_by_its_header_under_any_name(tmp_path):
     assert sound(written(tmp_path / "a.txt", "time_s,fx,fy,fz\n0,1,2,3\n0.001,1,2,3\n")) == (
         "forces, 0.002 s at 1000 Hz (N)"
     )

@@ -103,7 +103,7 @@ def test_a_broken_sensor_does_not_keep_the_device_moving_for_ever(tmp_path, devi
     assert about["tries"] == MOST_TRIES
 
 
-def test_a_protocol_may_keep_the_amplitude_whatever_clips(tmp_path, device_that_clips_at):
+def test_a_protocol_may_keep_the_amplitude_when_samples_clip(tmp_path, device_that_clips_at):
     stubborn = replace(PROTOCOL, lower_on_clip=False)
     done = record_on(device_that_clips_at(5.0), plan(tmp_path / "r.h5", stubborn), lambda _: None)
     recording = read_recording(tmp_path / "r.h5")
@@ -170,7 +170,7 @@ def test_before_a_real_device_moves_it_is_said_who_may_hold_the_handle(tmp_path,
     assert progress != []
 
 
-def test_a_real_device_does_not_move_for_somebody_who_says_no(tmp_path, device_that_clips_at):
+def test_a_real_device_does_not_move_after_the_answer_no(tmp_path, device_that_clips_at):
     def no(notice: str) -> None:
         raise KeyboardInterrupt
 
@@ -214,7 +214,7 @@ def test_the_written_stiffness_is_the_springs_also_without_one(tmp_path):
 
 @pytest.mark.parametrize("name", ["sweep", "sweep_band", "sweep_study", "sweep_hand", "multisine"])
 def test_shipped_recordings_are_played_as_they_are_asked_for_in_seconds(tmp_path, name):
-    """No cap, no sensor and no slew limit is in their way, and nobody waits for a simulated device."""
+    """No cap, no sensor and no slew limit is in their way, and a simulated device waits for no answer."""
     shipped = load_protocol(files("protocols").joinpath(f"{name}.toml").read_text("utf-8"), name)
     asked, started_s = plan(tmp_path / "r.h5", shipped), time.process_time()
     written = record_device(asked, lambda _: None)

@@ -28,7 +28,7 @@ gap_s = 0.2
 
 @pytest.fixture(scope="module")
 def taken(tmp_path_factory, sitter_of, small_text):
-    """One finished session and its results; copied by whoever changes it."""
+    """One finished session and its results; copied by tests that change it."""
     text = small_text + BESIDE
     sitter = sitter_of(tmp_path_factory.mktemp("beside") / "data", load_protocol(text, "beside.toml"), text)
     sitter.observer = "ideal"
@@ -84,7 +84,7 @@ def test_a_changed_detection_table_is_found(session):
 def test_a_detection_table_of_an_earlier_analysis_does_not_stay(sitter, tmp_path):
     out = tmp_path / "out"
     out.mkdir()
-    (out / "detection.csv").write_text("of somebody who withdrew since")
+    (out / "detection.csv").write_text("of a participant who withdrew since")
     analyze_data(sitter.whole().folder.path, out)
     assert not (out / "detection.csv").exists()
 

@@ -28,7 +28,7 @@ def number(sitter):
     return begin
 
 
-def test_everybody_gets_a_number_and_keeps_it(number):
+def test_each_participant_gets_a_number_and_keeps_it(number):
     assert [number(s) for s in ("P01", "P02", "P01", "P03", "P02")] == [0, 1, 0, 2, 1]
 
 
@@ -49,7 +49,7 @@ def test_a_withdrawn_participant_keeps_the_number(number, sitter):
     assert number("P03") == 2
 
 
-def test_a_damaged_older_session_does_not_keep_anybody_out(number, sitter):
+def test_a_damaged_older_session_keeps_no_participant_out(number, sitter):
     assert number("P01") == 0
     log = sitter.data / "P01_001" / "events.jsonl"
     log.write_text("not a log\n")

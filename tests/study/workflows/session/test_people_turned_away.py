@@ -241,7 +241,7 @@ def check_the_rows(visit, asking, seed: int, passes: int):
 
 
 @pytest.mark.parametrize("seed", [3, 14])
-def test_every_row_of_the_williams_square_is_filled_equally_whoever_refuses(visit, asking, seed):
+def test_every_row_of_the_williams_square_is_filled_equally_with_any_refusals(visit, asking, seed):
     check_the_rows(visit, asking, seed, passes=3)
 
 

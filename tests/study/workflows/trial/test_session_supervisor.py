@@ -1,4 +1,4 @@
-"""Whoever looks after everything while somebody waits: signs of life, requests, buttons, the live state."""
+"""The supervisor while a participant waits: signs of life, requests, buttons, the live state."""
 
 import contextlib
 
@@ -98,7 +98,7 @@ def test_an_answer_that_comes_with_a_pause_counts_and_the_pause_is_kept(supervis
     assert supervisor.pause_asked == "experimenter"
 
 
-def test_notes_wait_until_somebody_takes_them(supervisor, requests):
+def test_notes_wait_until_they_are_taken(supervisor, requests):
     requests.send(NoteAsked("experimenter", "a door slammed"))
     supervisor.begin("trial")
     assert supervisor.glance()
@@ -140,7 +140,7 @@ def test_the_live_state_is_told_in_real_time_a_few_times_a_second(rigs):
     assert told[0].offset_mm == pytest.approx(5.0, abs=0.01)
 
 
-def test_nobody_watches_in_virtual_time(device, clock, requests):
+def test_in_virtual_time_no_live_state_is_told(device, clock, requests):
     told = []
     supervisor = SessionSupervisor(device, clock, requests, told.append)
     supervisor.begin("trial")

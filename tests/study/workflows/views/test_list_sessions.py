@@ -1,4 +1,4 @@
-"""What a data folder looks like from outside: a line per session, whatever lies there."""
+"""What a data folder looks like from outside: a line per session, for all that may lie there."""
 
 import json
 import shutil
@@ -15,7 +15,7 @@ from study.workflows.views.list_sessions import home_view, session_lines
 
 @pytest.fixture(scope="module")
 def taken(tmp_path_factory, small_text) -> Path:
-    """A data folder with a finished session; copied by whoever changes it."""
+    """A data folder with a finished session; copied by tests that change it."""
     from study.cli.main import main
 
     folder = tmp_path_factory.mktemp("taken")
@@ -60,7 +60,7 @@ def test_an_unfinished_session_says_how_far_it_is(unfinished):
     assert line.runs_done < line.runs == 3
 
 
-def test_a_session_that_somebody_writes_is_running_and_is_not_disturbed(unfinished):
+def test_a_session_that_is_being_written_is_running_and_is_not_disturbed(unfinished):
     log = EventLog.reopen(unfinished / "P01_001" / "events.jsonl")
     try:
         assert only(unfinished).standing == "running"

@@ -138,7 +138,7 @@ def test_a_folder_that_is_not_there_is_a_view_too(tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_whatever_happens_to_the_bytes_of_a_log_it_can_be_looked_at(session, seed):
+def test_a_log_with_damaged_bytes_can_be_viewed(session, seed):
     import numpy as np
 
     log = session / "events.jsonl"

@@ -162,7 +162,7 @@ def test_a_killed_session_is_not_running_and_one_that_writes_is(sitter):
     assert is_log_locked(folder.log) is False
 
 
-def test_whether_somebody_writes_a_missing_log_is_not_known(tmp_path):
+def test_whether_a_missing_log_is_being_written_is_unknown(tmp_path):
     assert is_log_locked(tmp_path / "events.jsonl") is None
 
 

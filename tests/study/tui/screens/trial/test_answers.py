@@ -62,7 +62,7 @@ def test_what_comes_after_a_repeat_is_said_as_the_sessions_rules_have_it(asked, 
     assert said in words
 
 
-def test_a_question_has_one_reply_whatever_is_pressed_after_it(asked):
+def test_a_question_has_one_reply_and_ignores_later_keys(asked):
     replies, words = asked("1", "2", "p", "r", "1")
     assert len(replies) == 1
     assert "1 taken" in words and "2 taken" not in words

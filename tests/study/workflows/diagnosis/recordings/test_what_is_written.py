@@ -92,7 +92,7 @@ def test_a_folder_that_is_taken_is_refused_before_any_work(files, findings, tmp_
     assert not hasattr(engine, "model")
 
 
-def test_an_effect_that_nobody_knows_is_wrong_use_with_a_suggestion(files, findings, tmp_path):
+def test_an_unknown_effect_is_wrong_use_with_a_suggestion(files, findings, tmp_path):
     with pytest.raises(WrongUseError) as refused:
         diagnose_recordings(plan(files, tmp_path / "out", without=("backlsh",)), quiet, Scripted(findings))
     assert refused.value.title == "There is no effect 'backlsh' to do without"

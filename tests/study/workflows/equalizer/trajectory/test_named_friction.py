@@ -33,7 +33,7 @@ def test_named_friction_is_compensated_and_what_is_linear_is_not(plan, tmp_path)
     assert "Compensated: coulomb_friction." in summary_lines(done)
 
 
-def test_whatever_a_diagnosis_names_is_accepted_and_compensated_or_said(plan, tmp_path):
+def test_each_effect_that_a_diagnosis_names_is_compensated_or_reported(plan, tmp_path):
     named = tuple(
         ModelEffect(
             effect.name,

@@ -56,7 +56,7 @@ def commanded(sound, folder, seed, count):
 
 
 @pytest.mark.timeout(300)
-def test_commands_end_with_a_code_of_theirs_whatever_the_file(sound, tmp_path):
+def test_commands_end_with_a_code_of_theirs_for_each_damaged_file(sound, tmp_path):
     codes = commanded(sound, tmp_path, SEED, len(sound))
     assert sum(codes.values()) >= len(sound) / 2
     assert codes[1] > 0

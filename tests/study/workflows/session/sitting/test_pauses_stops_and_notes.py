@@ -77,7 +77,7 @@ def test_a_note_is_on_the_disk_before_the_pause_is_over(plan, small_protocol, se
     assert "my thumb is numb" in seen[0]
 
 
-def test_notes_reach_the_log_whoever_writes_them(plan, small_protocol, seat, person):
+def test_notes_of_participant_and_experimenter_reach_the_log(plan, small_protocol, seat, person):
     def noted(question):
         if len(person.questions) == 2:
             seat.requests.send(NoteAsked("participant", "my thumb is numb", adverse=True))
@@ -89,7 +89,7 @@ def test_notes_reach_the_log_whoever_writes_them(plan, small_protocol, seat, per
     ]
 
 
-def test_whoever_withdraws_in_a_pause_ends_the_sitting(plan, small_protocol, seat, person):
+def test_a_withdrawal_in_a_pause_ends_the_sitting(plan, small_protocol, seat, person):
     person.decisions = [AfterPause.WITHDRAW]
     person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
     end = conduct_new(plan(small_protocol), "simulated", seat)

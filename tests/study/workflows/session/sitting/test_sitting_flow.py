@@ -40,7 +40,7 @@ def test_a_whole_sitting_from_consent_to_debrief(plan, full, seat, person):
     assert all(event.answers == {} for event in of(end, FormFilled) if event.form == "exclusion")
 
 
-def test_nobody_can_see_which_trial_is_a_catch_trial(plan, full, seat, person):
+def test_the_question_does_not_show_which_trial_is_a_catch_trial(plan, full, seat, person):
     conduct_new(plan(full), "simulated", seat)
     assert Phase.CATCH not in {question.phase for question in person.questions}
 
@@ -92,7 +92,7 @@ def test_practice_says_how_it_went(plan, full, seat, person):
     assert (results[0].right, results[0].of) == (2, 2)
 
 
-def test_the_same_seed_and_answers_give_the_same_trials_whoever_sits_there(plan, small_protocol, seat, tmp_path):
+def test_the_same_seed_and_answers_give_the_same_trials_for_any_participant(plan, small_protocol, seat, tmp_path):
     """A person with forms and checks, and a simulated participant without: equal draws, equal levels."""
     person = conduct_new(plan(small_protocol), "simulated", seat)
     clock = VirtualClock()

@@ -116,16 +116,18 @@ def test_copies_that_name_the_participant_are_named(data, tmp_path):
     copied = shutil.copytree(data / "P01_001", data / "P01_001 (copy)")
     (data / "todo.txt").write_text("call P01_002 again")
     (data / "P010_001.txt").write_text("P010_001 is another participant")
-    for out in ("out", "nobody"):
+    for out in ("out", "other_study"):
         write_analysis(tmp_path / out, "P01" if out == "out" else "P02")
-    (data / "written_elsewhere.txt").write_text(f"{tmp_path / 'out'}\n{tmp_path / 'nobody'}\n{tmp_path / 'gone'}\n")
+    (data / "written_elsewhere.txt").write_text(
+        f"{tmp_path / 'out'}\n{tmp_path / 'other_study'}\n{tmp_path / 'gone'}\n"
+    )
     done = CliRunner().invoke(app, ["withdraw", "P01_001", "--data", str(data), "--yes"])
     assert done.exit_code == 0, done.output
     assert "P01_001 (copy) holds a log of P01 under another name" in done.output
     assert "Not to be erased: todo.txt names P01." in done.output
     assert "P010" not in done.output
     assert f"Written with --out, and not erased: {tmp_path / 'out'}" in done.output
-    assert str(tmp_path / "nobody") not in done.output
+    assert str(tmp_path / "other_study") not in done.output
     assert str(tmp_path / "gone") not in done.output
     assert (copied / "events.jsonl").exists()
 
