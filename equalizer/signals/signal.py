@@ -73,12 +73,6 @@ class Signal:
             channels=tuple(self.channels[k] for k in kept),
         )
 
-    def rotate(self, rotation: FloatArray) -> Self:
-        """Each sample v becomes rotation @ v. rotation: (channels, channels), orthogonal."""
-        if not (isinstance(self.quantity, str) and isinstance(self.unit, str)):
-            raise ValueError(f"channels of different quantities cannot be rotated into each other: {self.quantity}")
-        return replace(self, samples=self.samples @ np.asarray(rotation, dtype=np.float64).T)
-
 
 def _fold_equal_words(name: str, words: str | tuple[str, ...], channels: int) -> str | tuple[str, ...]:
     if isinstance(words, str):

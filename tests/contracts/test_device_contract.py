@@ -90,7 +90,7 @@ def test_a_held_stimulus_is_played_until_it_is_released(device, clock, rigs):
     assert played.health.peak_command_n <= rigs.LIMITS.total_cap_n
 
 
-def test_true_acceleration_is_told_by_simulated_devices_only(device, rigs):
+def test_true_acceleration_is_reported_by_simulated_devices_only(device, rigs):
     played = device.play(rigs.sine(1.0).loop)
     assert (played.truth is not None) == device.info.simulated
     assert played.truth is None or np.isfinite(played.truth.samples).all()

@@ -136,7 +136,7 @@ def test_the_pressed_key_is_the_answer_to_every_question(persons_seat, task, key
     ("key", "leave", "asked", "pause"),
     [("q", True, False, False), ("r", False, True, False), ("p", False, True, True)],
 )
-def test_leaving_repeating_and_pausing_are_told_apart(persons_seat, key, leave, asked, pause):
+def test_leaving_repeating_and_pausing_are_distinguished(persons_seat, key, leave, asked, pause):
     persons_seat.press(key)
     reply = persons_seat.display.ask(QUESTION, Signs())
     assert isinstance(reply, Unanswered)
@@ -225,7 +225,7 @@ def test_the_handle_is_looked_at_until_it_is_back(seat):
     assert next(views, None) is None
 
 
-def test_a_pause_ends_with_the_choice_to_go_on(seat):
+def test_a_pause_ends_with_the_choice_to_continue(seat):
     seat.press("enter")
     assert seat.display.pause(PAUSE, lambda: True) is AfterPause.GO_ON
 

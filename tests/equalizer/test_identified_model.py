@@ -27,7 +27,7 @@ def test_order_and_spectral_radius(model):
     assert model.spectral_radius == pytest.approx(np.hypot(0.9, 0.1))
 
 
-def test_an_unstable_model_can_be_built_and_says_so(model):
+def test_an_unstable_model_can_be_built_and_reports_it(model):
     assert replace(model, A=np.eye(2) * 1.01).spectral_radius == pytest.approx(1.01)
 
 

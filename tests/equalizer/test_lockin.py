@@ -17,7 +17,7 @@ def test_amplitude_and_phase_come_back_also_without_whole_periods(n):
     assert phasors(x, RATE_HZ, 15.0)[0] == pytest.approx([2.0 - 1.0j, 0.5j], abs=1e-9)
 
 
-def test_harmonics_are_told_apart():
+def test_harmonics_are_distinguished():
     x = (sinusoid(1000, 5.0, 1.0) + sinusoid(1000, 15.0, 0.2j))[:, None]
     assert phasors(x, RATE_HZ, 5.0, harmonics=3)[:, 0] == pytest.approx([1.0, 0.0, 0.2j], abs=1e-9)
 

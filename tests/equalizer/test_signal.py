@@ -28,11 +28,6 @@ def test_a_list_of_the_wrong_length_is_refused():
         signal(unit=("m", "m", "rad"))
 
 
-def test_different_quantities_are_not_rotated_into_each_other():
-    with pytest.raises(ValueError, match="channels of different quantities cannot be rotated"):
-        signal(quantity=("position", "angle"), unit=("m", "rad")).rotate(np.eye(2))
-
-
 def test_samples_cannot_be_changed_and_do_not_follow_their_source():
     source = np.zeros((3, 2))
     made = Signal(source, 1000.0, "force", "N", ("fx", "fy"))

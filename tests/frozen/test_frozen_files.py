@@ -61,7 +61,7 @@ def test_its_trials_and_thresholds_come_out_as_they_did_then(study, tmp_path):
     assert now["threshold_n"] == old["threshold_n"]
 
 
-def test_its_interrupted_session_goes_on_to_the_end(study):
+def test_its_interrupted_session_continues_to_the_end(study):
     """It stopped between an answer and its measurement."""
     before = (study / "P04_001" / "events.jsonl").read_bytes()
     done = run("resume", "P04_001", "--data", study, "--json")

@@ -82,7 +82,7 @@ def test_the_search_finds_tests_and_what_puts_them_off():
     known = existing()
     assert "test_the_search_finds_tests_and_what_puts_them_off" in known
     assert "test_no_such_test" not in known
-    assert is_put_off(known["test_ten_million_ticks_of_lying_encoders"])
+    assert is_put_off(known["test_ten_million_ticks_of_false_readings_never_exceed_the_force_limits"])
     assert is_put_off(["pytest.mark.skipif(not RECORDINGS.exists(), reason='absent')"])
     assert not is_put_off(["pytest.mark.skipif(not sys.platform.startswith('linux'), reason='of Linux')"])
 

@@ -96,7 +96,7 @@ def test_pasted_answers_answer_one_trial_and_leaving_keeps_them(study, small_fil
 
 
 @pytest.mark.timeout(120)
-def test_ctrl_c_lets_go_and_says_how_to_go_on(study, small_file):
+def test_ctrl_c_lets_go_and_says_how_to_continue(study, small_file):
     terminal = begin(study, small_file)
     terminal.wait_for(r"1 or 2\?")
     terminal.type("1\n")

@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 
 @pytest.mark.timeout(200)
-def test_the_same_command_goes_on(small_file, tmp_path):
+def test_the_same_command_continues(small_file, tmp_path):
     command = (
         "rehearse",
         "--protocol",

@@ -2,7 +2,7 @@
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import fdtrc, ndtr
+from scipy.special import fdtrc
 
 from equalizer.signals.signal import FloatArray
 
@@ -35,8 +35,3 @@ def excess(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[float,
     p_value = float(fdtrc(2 * len(power), max(freedom, 1.0), min(ratio, _LARGEST)))
     limit = 2 * float(np.sqrt(np.sum(noise**2) + 2 * np.sum(noise) ** 2 / max(freedom, 1.0)))
     return float(np.sum(power - noise)), limit, p_value
-
-
-def two_sided(score: float) -> float:
-    """p-value of a normal score."""
-    return float(2 * ndtr(-abs(score)))

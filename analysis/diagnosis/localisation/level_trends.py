@@ -10,14 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.data.frequency_cells import Band
-from analysis.diagnosis.data.line_statistics import two_sided
 from analysis.diagnosis.localisation.distortion import Distortion, Kind
 from analysis.diagnosis.settings import DISTORTION_P, STEADY_DB
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
-
-_SCATTER_DB = 4.343
-"""Standard deviation of the power on a single line, where distortion is random over lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +30,6 @@ class LevelTrend:
     """p-value of no distortion: the smallest over levels, corrected for their number."""
     db_per_doubling: float | None
     """Slope of the relative size with the level; None where seen at no level, or with one level only."""
-    slope_p_value: float | None
-    """p-value of a slope of 0."""
     from_nothing: bool
     """It was not seen at the lowest level: the slope is a lower bound."""
 
@@ -72,33 +66,29 @@ def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distorti
     relative_db = 20 * np.log10(np.maximum(sizes, _TINY) / np.maximum(signals, _TINY))
     p_value = min(1.0, min(cell.p_value for cell in cells) * len(cells))
     seen = np.array([cell.p_value < DISTORTION_P for cell in cells])
-    slope, slope_p = _slope_with_limits(levels, relative_db, np.array([cell.lines for cell in cells]), seen)
+    slope = _slope_with_limits(levels, relative_db, np.array([cell.lines for cell in cells]), seen)
     if key[4]:
         band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
         key = (*key[:3], band, *key[4:])
-    return LevelTrend(*key, float(relative_db[-1]), p_value, slope, slope_p, bool(seen.any() and not seen[0]))
+    return LevelTrend(*key, float(relative_db[-1]), p_value, slope, bool(seen.any() and not seen[0]))
 
 
-def _slope_with_limits(
-    levels: FloatArray, relative_db: FloatArray, lines: FloatArray, seen: Mask
-) -> tuple[float | None, float | None]:
-    """Slope and p-value. Where nothing was seen at a level, the limit of what would have been bounds the slope: from
+def _slope_with_limits(levels: FloatArray, relative_db: FloatArray, lines: FloatArray, seen: Mask) -> float | None:
+    """Slope. Where nothing was seen at a level, the limit of what would have been bounds the slope: from
     below where that is the lowest level, from above where it is the highest."""
     if not seen.any() or not (levels > 0).all() or len(set(levels)) < 2:
-        return None, None
+        return None
     bounded = _slope(np.log2(levels), relative_db, lines)
-    rises, falls = bounded[0] > STEADY_DB and not seen[0], bounded[0] < -STEADY_DB and not seen[-1]
+    rises, falls = bounded > STEADY_DB and not seen[0], bounded < -STEADY_DB and not seen[-1]
     if seen.all() or rises or falls:
         return bounded
-    return _slope(np.log2(levels[seen]), relative_db[seen], lines[seen]) if len(set(levels[seen])) > 1 else (None, None)
+    return _slope(np.log2(levels[seen]), relative_db[seen], lines[seen]) if len(set(levels[seen])) > 1 else None
 
 
-def _slope(doublings: FloatArray, relative_db: FloatArray, lines: FloatArray) -> tuple[float, float]:
-    """Weighted by lines; the error from the scatter of random distortion over them."""
+def _slope(doublings: FloatArray, relative_db: FloatArray, lines: FloatArray) -> float:
+    """dB per doubling of the level, weighted by lines."""
     centred = doublings - np.average(doublings, weights=lines)
-    information = float(np.sum(lines * centred**2))
-    slope = float(np.sum(lines * centred * relative_db)) / information
-    return slope, two_sided(slope * np.sqrt(information) / _SCATTER_DB)
+    return float(np.sum(lines * centred * relative_db)) / float(np.sum(lines * centred**2))
 
 
 _TINY = 1e-300

@@ -49,11 +49,6 @@ class _Layout:
         return np.array([column * (len(self.bands) + _GAP), row * (len(self.channels) + _GAP)])
 
 
-def mismatch_map_pictures(maps: Maps, unit: str = "N") -> tuple[Picture, ...]:
-    """unit: of the command. One per driving input, the one with most mismatch first and the others folded."""
-    return tuple(mismatch_map_picture(maps, number, unit) for number in range(len(driving_inputs(maps))))
-
-
 def driving_inputs(maps: Maps) -> tuple[str, ...]:
     """The one with most mismatch first."""
     inputs = {cell.input for cells in maps.values() for cell in cells}
@@ -61,7 +56,7 @@ def driving_inputs(maps: Maps) -> tuple[str, ...]:
 
 
 def mismatch_map_picture(maps: Maps, number: int, unit: str) -> Picture:
-    """number: of the driving input."""
+    """number: of the driving input in `driving_inputs`; all but the first are folded. unit: of the command."""
     input_ = driving_inputs(maps)[number]
     return Picture(
         name=f"mismatch-map-{number + 1}",

@@ -8,10 +8,6 @@ vector sum of three axes; a stimulus along one direction has its whole sum in th
 import math
 from dataclasses import dataclass, replace
 
-ACTION_VALUE_MPS2 = 2.5
-LIMIT_VALUE_MPS2 = 5.0
-"""Of A(8), directive 2002/44/EC, article 3."""
-
 WORKING_DAY_S = 8 * 3600.0
 """Reference duration of A(8)."""
 
@@ -79,18 +75,6 @@ def total(*doses: Dose) -> Dose:
 def a8_mps2(dose: Dose) -> float:
     """Daily exposure A(8): the constant weighted rms acceleration (m/s^2) over eight hours with the same dose."""
     return math.sqrt(dose.squared_s / WORKING_DAY_S)
-
-
-def amplitude_that_fits_mps2(dose: Dose, a8_limit_mps2: float, frequency_hz: float, seconds: float) -> float:
-    """Largest peak amplitude (m/s^2) which, played for `seconds` more, keeps A(8) within the limit; 0 where nothing is
-    left.
-
-    Raises ValueError unless seconds is above 0.
-    """
-    if seconds <= 0:
-        raise ValueError(f"seconds is {seconds:g}; it must be above 0")
-    left = a8_limit_mps2**2 * WORKING_DAY_S - dose.squared_s
-    return math.sqrt(2 * max(0.0, left) / seconds) / hand_arm_weight(frequency_hz)
 
 
 def _frequency_weighted_rms(frequency_hz: float, amplitude_mps2: float) -> float:

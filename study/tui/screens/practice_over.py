@@ -12,9 +12,6 @@ from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
-ENOUGH = "That is enough to go on."
-HARD = "Some vibrations are hard to tell for everyone. The study goes on all the same."
-
 
 class PracticeOverScreen(Screen[None]):
     HELP = """\

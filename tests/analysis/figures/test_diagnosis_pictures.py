@@ -10,7 +10,7 @@ from matplotlib.text import Annotation
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
 from analysis.figures.diagnosis.held_out import draw_held_out, find_excerpt
-from analysis.figures.diagnosis.mismatch_map import draw_mismatch_map, mismatch_map_pictures
+from analysis.figures.diagnosis.mismatch_map import draw_mismatch_map, mismatch_map_picture
 from analysis.figures.diagnosis.remainder import draw_remainder
 from analysis.figures.diagnosis.rivals import draw_rivals, list_explanations, rivals_pictures
 from analysis.figures.diagnosis.signature import draw_signature
@@ -28,7 +28,7 @@ def written(figure):
     return [text.get_text() for axes in figure.axes for text in axes.texts]
 
 
-def test_a_diagnosis_has_every_picture_and_each_is_told_in_words(friction_pictures):
+def test_a_diagnosis_has_every_picture_and_each_is_reported_in_words(friction_pictures):
     names = [picture.name for picture in friction_pictures]
     assert names == ["mismatch-map-1", "state-map", "state-loops", "signature-1", "rivals-1", "held-out", "remainder"]
     assert all(picture.alternative and picture.caption for picture in friction_pictures)
@@ -110,18 +110,19 @@ def test_what_is_significant_is_framed_and_what_is_more_than_noise_has_its_numbe
 
 def test_many_levels_are_drawn_in_groups_of_which_the_worst_is_shown():
     cells = tuple(cell(amplitude=float(level), in_noise=float(level)) for level in range(1, 9))
-    (picture,) = mismatch_map_pictures({"before": cells})
+    picture = mismatch_map_picture({"before": cells}, 0, "N")
     assert "8 levels are drawn in 4 groups" in picture.caption
     assert cells_written(picture.figure.axes[0]) == ["2", "4", "6", "8"]
 
 
 def test_each_input_has_a_map_and_all_but_the_worst_are_folded():
-    pictures = mismatch_map_pictures({"before": (cell(), cell(input_="fy", in_noise=50.0))})
+    maps = {"before": (cell(), cell(input_="fy", in_noise=50.0))}
+    pictures = [mismatch_map_picture(maps, number, "N") for number in range(2)]
     assert [(picture.title[-2:], picture.folded) for picture in pictures] == [("fy", False), ("fx", True)]
     assert "1 of 1 cells differ significantly; the worst is ax at 8 to 16 Hz" in pictures[0].alternative
 
 
-def test_channels_of_one_name_are_told_apart_by_their_quantity():
+def test_channels_of_one_name_are_distinguished_by_their_quantity():
     axes = draw_mismatch_map({"before": (cell("x"), cell("x", quantity="position"))}, "fx", "N").axes[0]
     assert [label.get_text() for label in axes.get_yticklabels()] == ["x (acceleration)", "x (position)"]
 
@@ -207,7 +208,7 @@ def test_the_one_that_was_chosen_stands_on_top_even_where_another_has_less_error
     assert [each.words for each in tried] == ["a dead band of the force", "dry friction"]
 
 
-def test_a_round_that_brought_nothing_is_folded_and_says_so(friction_found):
+def test_a_round_that_brought_nothing_is_folded_and_reports_it(friction_found):
     explanation = replace(friction_found.explanation, steps=())
     (picture,) = rivals_pictures(explanation, ("x",))
     assert picture.folded

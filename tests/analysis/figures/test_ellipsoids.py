@@ -48,7 +48,7 @@ def test_two_directions_share_a_panel_and_differ_in_dash():
     assert figure.axes[0].get_title() == "15 Hz\nmean squares"
 
 
-def test_many_frequencies_go_on_in_further_lines():
+def test_many_frequencies_continue_in_further_lines():
     figure = draw_ellipsoids([result(float(f), 5.0) for f in range(5, 45, 5)])
     assert len(figure.axes) == 24
     assert sum(bool(axes.get_title()) for axes in figure.axes) == 16

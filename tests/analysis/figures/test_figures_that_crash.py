@@ -10,7 +10,7 @@ def broken(*arguments):
     raise ValueError("operands could not be broadcast together")
 
 
-def test_the_others_are_drawn_and_the_crash_is_said(friction_found, friction_pictures, monkeypatch):
+def test_the_others_are_drawn_and_the_crash_is_reported(friction_found, friction_pictures, monkeypatch):
     monkeypatch.setattr(module, "held_out_picture", broken)
     guard = Guard(on=True)
     drawn = module.diagnosis_pictures(friction_found, guard)

@@ -56,7 +56,7 @@ def test_a_place_where_it_comes_to_rest_is_not_cut_off():
     assert count_clipped_samples(rounded) == count_clipped_samples(-rounded) == 0
 
 
-def test_a_clipped_sensor_is_wrong_and_a_limited_command_is_said(recording):
+def test_a_clipped_sensor_is_wrong_and_a_limited_command_is_reported(recording):
     samples = signals()["noise"]
     found = check_clipping(channels_of(recording(np.clip(samples, -1, 1), np.clip(samples, -2, 9))))
     assert [(check.level, check.name) for check in found] == [("notice", "clipping"), ("wrong", "clipping")]

@@ -57,12 +57,12 @@ def test_a_pause_between_parts_is_no_gap(recording):
     assert levels(check_clock(stamped(recording, time_s), [(0, 2500), (2500, N)])) == {"fine"}
 
 
-def test_unknown_time_is_said(recording):
+def test_unknown_time_is_reported(recording):
     numbered = replace(recording(np.ones(N), np.ones(N)), meta={"time": "unknown"})
     assert levels(check_clock(numbered, [(0, N)])) == {"notice"}
 
 
-def test_what_an_import_evened_out_is_said(recording):
+def test_what_an_import_evened_out_is_reported(recording):
     notes = ["a: resampled from uneven stamps (about 952 Hz) to 952 Hz, linear."]
     found = check_clock(recording(np.ones(N), np.ones(N), meta={"import": {"notes": notes}}), [(0, N)])
     assert [check.level for check in found] == ["notice"]

@@ -27,7 +27,7 @@ def test_many_missing_samples_are_wrong_and_none_are_fine(recording, random):
     assert check_missing_samples(channels_of(recording(random(2), response)), 1000.0)[0].level == "wrong"
 
 
-def test_a_constant_response_is_wrong_and_a_constant_command_is_said(recording, random):
+def test_a_constant_response_is_wrong_and_a_constant_command_is_reported(recording, random):
     found = check_constant_channels(channels_of(recording(np.column_stack([random(1), np.zeros(N)]), np.full(N, 2.5))))
     assert [(check.level, check.seen) for check in found] == [
         ("notice", "command 'f2' is 0 N throughout."), ("wrong", "response 'a1' is 2.5 m/s^2 throughout."),
@@ -45,7 +45,7 @@ def test_a_copy_of_a_channel_is_found(recording, random, factor, words):
     assert words in check.seen
 
 
-def test_a_copy_stored_in_single_precision_is_one_and_a_noisy_sensor_is_none(recording, random):
+def test_a_copy_in_single_precision_is_found_and_a_noisy_sensor_is_not(recording, random):
     single = random(1).astype(np.float32).astype(float)
     assert (
         check_copied_channels(channels_of(recording(random(2), np.column_stack([random(1), single]))))[0].level

@@ -54,7 +54,7 @@ def test_a_factor_of_two_units_is_named(recording, motion, factor, words):
     assert words in check.do
 
 
-def test_a_late_speed_is_said_in_milliseconds(recording, motion):
+def test_a_late_speed_is_reported_in_milliseconds(recording, motion):
     force, place, speed, _ = motion
     late = (delayed(speed, 2.0), "velocity", "m/s")
     (check,) = kinematic_checks(pairs_of(recording(force, late, position=place)), RATE_HZ)

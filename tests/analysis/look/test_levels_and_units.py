@@ -25,7 +25,7 @@ def test_an_answer_in_proportion_is_fine(recording, two_levels):
     assert check.level == "fine"
 
 
-def test_an_answer_that_falls_behind_is_said_by_how_much(recording, two_levels):
+def test_an_answer_that_falls_behind_is_reported_by_how_much(recording, two_levels):
     answer = np.concatenate([two_levels[:10_000], 0.5 * two_levels[10_000:]])
     (check,) = levels_of(recording(two_levels, answer, segments=TWO))
     assert check.level == "notice"
@@ -62,7 +62,7 @@ def test_an_accelerometer_in_g_is_recognised_by_gravity(recording, noise, rest, 
     assert [check.level for check in found] == [level]
 
 
-def test_offsets_are_said_and_gravity_is_known(recording, noise):
+def test_offsets_are_reported_and_gravity_is_known(recording, noise):
     found = check_offsets(channels_of(recording(noise() - noise().mean() + 2.0, 9.81 + noise(seed=2))))
     assert [check.level for check in found] == ["notice", "fine"]
     assert "command 'f1' stands 2 N beside zero" in found[0].seen

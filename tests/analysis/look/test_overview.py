@@ -7,7 +7,7 @@ from analysis.look.overview import overview
 from equalizer.signals.recording import Recording, Segment
 
 
-def test_a_sound_recording_has_nothing_wrong(sound):
+def test_an_intact_recording_has_no_findings(sound):
     found = overview("sound", sound)
     assert not [check for check in found.checks if check.level == "wrong"]
     assert [check.seen for check in found.checks if check.level == "notice"] == [

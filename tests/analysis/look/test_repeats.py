@@ -38,7 +38,7 @@ def test_what_does_not_repeat_has_no_period(command):
     assert find_period(command[:, None]) == 0
 
 
-def test_an_undeclared_period_is_said_with_the_noise_between_repeats(recording):
+def test_an_undeclared_period_is_reported_with_the_noise_between_repeats(recording):
     command, rng = tiled(500, 8), np.random.default_rng(2)
     response = 3 * command + 0.3 * rng.standard_normal(len(command))
     found = recording(command, response)
@@ -73,7 +73,7 @@ def test_a_feedback_does_not_hide_that_the_excitation_repeats(recording):
     assert find_repeats(recording(command, command, excitation=decided), [(0, 4000)]).found == 500
 
 
-def test_where_nothing_repeats_that_is_said(recording):
+def test_where_nothing_repeats_that_is_reported(recording):
     command = np.random.default_rng(1).standard_normal(3000)
     found = recording(command, command)
     (check,) = repeat_checks(found, find_repeats(found, [(0, 3000)]))

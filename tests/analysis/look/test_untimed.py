@@ -37,7 +37,7 @@ def test_an_untimed_recording_is_described_in_samples():
     assert [text for text in said({"time": "unknown"}) if TIMED.search(text)] == []
 
 
-def test_a_timed_one_keeps_its_seconds():
+def test_a_recording_with_known_time_keeps_its_seconds():
     assert any(TIMED.search(text) for text in said({}))
 
 

@@ -55,7 +55,7 @@ def test_void_and_open_presentations_count_for_nothing(catch):
     assert catch_tallies([*trials, void]) == catch_tallies(trials)
 
 
-def test_participants_and_frequencies_are_told_apart(catch):
+def test_participants_and_frequencies_are_distinguished(catch):
     rows = catch_tallies(
         [
             *catch(0.0, subject="b", frequency_hz=45.0),

@@ -92,7 +92,7 @@ def test_pairs_agree_with_scipy_and_intervals_with_statsmodels():
     assert [half_width(interval) for interval in ours.intervals] == pytest.approx(theirs.halfwidths, rel=1e-3)
 
 
-def test_equal_groups_have_half_the_honest_difference():
+def test_equal_groups_have_half_of_tukeys_honest_difference():
     half = comparison_half_widths([10] * 5, mean_square_within=4.0, critical_range=4.0184)
     assert half == pytest.approx([0.6354 * 2.0] * 5, rel=1e-4)
 

@@ -33,7 +33,7 @@ def test_rows_with_gaps_are_left_out():
         ([(3.0, 3.0, 3.0), (2.0, 2.0, 2.0)], "no ranks to compare"),
     ],
 )
-def test_too_little_data_is_said_in_a_sentence(values, note):
+def test_too_little_data_is_reported_in_a_sentence(values, note):
     result = friedman(values)
     assert result.p is None
     assert note in result.notes[0]

@@ -41,7 +41,7 @@ def practice(answered):
         ("101", 2, 2, False, False),
     ],
 )
-def test_a_practice_run_is_told_passed_or_not(practising, practice, answers, right, of_last, passed, over):
+def test_a_practice_run_is_reported_as_passed_or_not(practising, practice, answers, right, of_last, passed, over):
     (row,) = practice_runs(practice(answers), practising)
     assert (row.trials, row.right, row.right_of_last) == (len(answers), right, of_last)
     assert (row.passed, row.over) == (passed, over)

@@ -84,7 +84,7 @@ def test_a_participant_with_a_gap_is_left_out_by_name():
         ([(0.1, 0.1), (0.1, 0.1)], "All participants change alike"),
     ],
 )
-def test_too_little_data_is_said_in_a_sentence(values, note):
+def test_too_little_data_is_reported_in_a_sentence(values, note):
     result = analysed(values)
     assert (result.f, result.p, result.epsilon) == (None, None, None)
     assert note in result.notes[-1]

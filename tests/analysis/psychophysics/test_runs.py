@@ -12,7 +12,7 @@ def rows(simulate):
     return simulate(1.0, np.random.default_rng(3))
 
 
-def test_a_run_is_rebuilt_from_its_answers_alone(rows, rule):
+def test_a_run_is_rebuilt_from_its_answers(rows, rule):
     (run,) = recompute_runs(rows, rule)
     assert run.complete
     assert run.state.reversals == 13

@@ -24,7 +24,7 @@ def test_a_clean_study_has_no_warning(able, protocol):
     assert warnings(able, protocol) == ()
 
 
-def test_no_trial_is_said(protocol):
+def test_no_trial_is_reported(protocol):
     assert warnings([], protocol) == ("No test trial is there, so there is no threshold of direction.",)
 
 
@@ -55,7 +55,7 @@ def test_thresholds_that_the_cap_cut_are_named(simulate_study, protocol):
         (3, "There are only 3 participants: means and tests say little about people in general."),
     ],
 )
-def test_few_participants_are_said(simulate_study, protocol, subjects, sentence):
+def test_few_participants_are_reported(simulate_study, protocol, subjects, sentence):
     assert sentence in warnings(simulate_study(subjects=subjects, true_n=(0.4,) * 5), protocol)
 
 
@@ -70,7 +70,7 @@ def test_a_run_that_the_trial_limit_stopped_is_never_dropped_in_silence(simulate
     assert "4 are missing because of the trial limit" in analysis.table.coverage
 
 
-def test_a_liking_for_one_answer_is_named(able, protocol):
+def test_a_response_bias_is_named(able, protocol):
     # The same answers, right whenever direction 1 was shown: a participant who nearly always says 1.
     leaning = [
         replace(trial, direction_shown=1 if trial.correct else 2, answer=1) if trial.run == 1 else trial
@@ -167,7 +167,7 @@ def both(values):
     return one_way_anova(columns), repeated_measures([str(i) for i in range(len(values))], values)
 
 
-def test_the_two_analyses_are_told_apart_in_numbers():
+def test_the_two_analyses_are_distinguished_in_numbers():
     anova, within = both(DRUGS)
     text = design_difference(anova, within)
     assert f"F(3, 12) = {anova.f:.2f}" in text
@@ -179,5 +179,5 @@ def test_the_two_analyses_are_told_apart_in_numbers():
 @pytest.mark.parametrize(
     ("values", "word"), [(DRUGS[:1], "neither"), ((*DRUGS[:1], (1.0, None, 2.0, 3.0)), "only one")]
 )
-def test_what_cannot_be_compared_is_said(values, word):
+def test_what_cannot_be_compared_is_reported(values, word):
     assert f"Of the two, {word} can be computed" in design_difference(*both(values))

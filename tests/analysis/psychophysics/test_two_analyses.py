@@ -18,7 +18,7 @@ def analysis(simulate_study, protocol):
     return analyse_study(simulate_study(), protocol)
 
 
-def test_what_the_cap_hides_is_said(analysis):
+def test_what_the_cap_hides_is_reported(analysis):
     by_model, by_means = analysis.primary.contrasts[3], analysis.mean_contrasts[3]
     assert by_model.difference_db > by_means.difference_db + 3.0
     assert "are apart: at " in analysis.compared
@@ -35,7 +35,7 @@ def test_numbers_simulated_with_the_published_rule_are_said_of_no_other(analysis
         assert "covers 3 %" not in said and "0.4 %" not in said
 
 
-def test_a_missing_lower_bound_is_said_on_the_page_and_in_the_terminal(analysis):
+def test_a_missing_lower_bound_is_reported_on_the_page_and_in_the_terminal(analysis):
     *low, high = analysis.primary.medians
     assert high.above_cap
     primary = replace(analysis.primary, medians=(*low, replace(high, lower_db=None)))
@@ -58,7 +58,7 @@ def test_one_participant_leaves_the_published_analysis_alone(simulate_study, pro
     assert comparison_text(None, (), alone.comparisons, alone.table, SIMULATED_RULE) == alone.compared
 
 
-def test_what_was_declared_and_what_was_not_is_said():
+def test_what_was_declared_and_what_was_not_is_reported():
     assert "declares no primary analysis" in declaration_text(AnalysisSettings())
     said = declaration_text(AnalysisSettings("hierarchical", (45.0, 5.0), 10))
     assert "hierarchical model" in said and "45 Hz minus 5 Hz" in said and "participants: 10" in said

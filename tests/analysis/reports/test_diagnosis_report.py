@@ -156,7 +156,7 @@ def test_a_number_without_an_interval_has_a_dash(friction_found):
     assert table.rows == (("level", "0.200 N", "–"),)
 
 
-def test_a_long_list_of_places_is_cut_and_says_so():
+def test_a_long_list_of_places_is_cut_and_reports_it():
     table = mismatch_table("Places", (PLACE,) * 15)
     assert len(table.rows) == 12
     assert table.notes[0] == "And 3 smaller places."

@@ -128,7 +128,7 @@ def test_people_need_no_banner(words, simulate_study):
     assert 'class="banner"' not in words(simulate_study(subjects=1, felt=True))
 
 
-def test_nothing_usable_is_said(report):
+def test_nothing_usable_is_reported(report):
     html = report([])
     parsed(html)
     assert "There is no run to analyse." in html

@@ -134,7 +134,7 @@ ALLOWED = [
 
 
 @pytest.mark.parametrize(("old", "new", "allowed"), ALLOWED)
-def test_what_is_allowed_is_said(threshold_text, old, new, allowed):
+def test_what_is_allowed_is_reported(threshold_text, old, new, allowed):
     assert allowed in refused(changed(threshold_text, old, new)).allowed
 
 
@@ -181,13 +181,13 @@ def test_all_problems_are_listed_and_numbered(threshold_text):
     ]
 
 
-def test_broken_toml_is_told_with_its_line(threshold_text):
+def test_broken_toml_is_reported_with_its_line(threshold_text):
     error = refused("name = 'x'\nkind study\n")
     assert "is not TOML" in error.problem
     assert "line 2" in error.problem
 
 
-def test_a_text_that_ends_too_early_is_told_with_its_last_line():
+def test_a_text_that_ends_too_early_is_reported_with_its_last_line():
     assert "(at line 2, the end of the text)" in refused("name = 'x'\nkind = ").problem
 
 
@@ -218,7 +218,7 @@ def test_recordings_are_refused_with_the_segment_counted_from_one(old, new, key,
     assert problem in error.problem
 
 
-def test_what_a_recording_allows_is_said():
+def test_what_a_recording_allows_is_reported():
     assert refused(changed(RECORDING, 'kind = "sine"', 'kind = "sin"')).allowed == '"multisine" or "sine" or "sweep"'
     assert refused(changed(RECORDING, "amplitude_n = 1.0", "amplitude_n = 2.5")).allowed == (
         "above 0 and at most 2.0 N, the cap"

@@ -157,7 +157,7 @@ def compiled(tmp_path_factory) -> None:
 
 @pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("size_kib", [8, 30])
-def test_a_disk_that_fills_up_says_how_many_answers_are_safe_and_the_session_goes_on(tmp_path, small_file, size_kib):
+def test_a_disk_that_fills_up_says_how_many_answers_are_safe_and_the_session_continues(tmp_path, small_file, size_kib):
     """A limit on the size of one file stands for a full disk: with 8 KiB recordings fail first, with 30 KiB the log."""
     script = (
         "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "

@@ -92,7 +92,7 @@ def test_a_recording_away_from_the_centre_says_where(run, tmp_path):
     assert recording.position.samples.mean(axis=0) == pytest.approx([0.0, 0.03, -0.02], abs=2e-3)
 
 
-def test_the_version_is_said(run):
+def test_the_version_is_reported(run):
     code, out, _ = run("--version")
     assert code == 0
     assert out.startswith("hapteq ")

@@ -111,7 +111,7 @@ def test_a_real_device_is_found_with_library_firmware_calibration_and_watchdog(r
         ("read_fails", 2, "Answers", "Check its power and its cable"),
     ],
 )
-def test_what_is_missing_is_said_with_its_cure(run, stub, tmp_path, switch, value, wrong, cure):
+def test_what_is_missing_is_reported_with_its_cure(run, stub, tmp_path, switch, value, wrong, cure):
     stub.set(switch, value)
     code, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0)
     assert (code, verdicts(out)[wrong]) == (3, "WRONG")

@@ -121,7 +121,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("typed", CASES)
-def test_what_is_wrong_is_said_and_nothing_is_written(
+def test_what_is_wrong_is_reported_and_nothing_is_written(
     place: Path, capsys: pytest.CaptureFixture[str], typed: str
 ) -> None:
     before, (code, sentence) = everything_in(place), CASES[typed]
@@ -140,7 +140,7 @@ def test_what_is_wrong_is_said_and_nothing_is_written(
         f"kit score labels.csv {SCORE}",
     ],
 )
-def test_a_place_that_may_not_be_written_to_is_said(place: Path, typed: str) -> None:
+def test_a_place_that_may_not_be_written_to_is_reported(place: Path, typed: str) -> None:
     """The superuser, whom no mode of a folder stops, works without that right."""
     rights = "-dac_override,-dac_read_search"
     superuser = os.geteuid() == 0

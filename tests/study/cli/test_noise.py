@@ -7,7 +7,7 @@ from scipy.io import wavfile
 from study.cli.main import main
 
 
-def test_a_sound_is_written_and_its_use_is_said(tmp_path, capsys):
+def test_a_sound_is_written_and_its_use_is_reported(tmp_path, capsys):
     out = tmp_path / "noise.wav"
     assert main(["noise", str(out), "--minutes", "0.05"]) == 0
     said = capsys.readouterr()

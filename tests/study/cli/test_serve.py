@@ -66,7 +66,7 @@ def test_what_cannot_be_served_is_refused_before_a_browser_is_opened(arguments, 
     assert "Traceback" not in done.stderr
 
 
-def test_without_the_package_the_command_that_installs_it_is_said():
+def test_without_the_package_the_command_that_installs_it_is_reported():
     done = hapteq("serve", before="sys.modules['textual_serve'] = None")
     assert done.returncode == 1
     assert "textual-serve is not installed." in done.stderr
@@ -86,7 +86,7 @@ def port():
         return free.getsockname()[1]
 
 
-def test_a_port_that_is_taken_is_told(port):
+def test_a_port_that_is_taken_is_reported(port):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", port))
         taken.listen()

@@ -74,7 +74,7 @@ def test_an_idle_rig_is_read_by_the_loop_and_written_nothing(rigs, device, rig):
     assert len(rigs.written(rig.mass)) == 0
 
 
-def test_what_is_no_number_is_no_reading_of_its_own(device, rig):
+def test_a_reading_that_is_not_finite_is_discarded(device, rig):
     rig.instead_of_sensing = reading(_4=math.nan, _9=1.0)
     look = device.look()
     assert look.position_m == (0.0, 0.0, 0.0)
@@ -203,7 +203,7 @@ def fail():
     raise OSError("usb")
 
 
-def test_buttons_that_fail_are_a_rig_that_fails(rigs, rig):
+def test_failing_buttons_count_as_a_failing_rig(rigs, rig):
     clock = VirtualClock()
     rig.buttons = fail
     with contextlib.closing(SafeDevice(rig, rigs.SETTINGS, clock)) as device:
@@ -228,7 +228,7 @@ class StillClock(RealClock):
         return self.seconds
 
 
-def test_who_asks_while_another_waits_gets_the_same_reading():
+def test_concurrent_requests_get_the_same_reading():
     clock, served = StillClock(), []
     glances = Glances(clock, wake=lambda: None)
     askers = [threading.Thread(target=lambda: served.append(glances.ask())) for _ in range(2)]

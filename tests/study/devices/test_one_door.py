@@ -86,12 +86,12 @@ def callers(name: str) -> set[str]:
 
 
 @pytest.mark.parametrize("name", NAMED_IN)
-def test_nothing_but_the_door_and_its_safety_layer_names_what_leads_to_a_force(name):
+def test_only_the_opening_and_the_safety_layer_name_what_drives_a_device(name):
     assert namers(name, ROOT) == NAMED_IN[name]
 
 
 @pytest.mark.parametrize("name", CALLED_IN)
-def test_nothing_but_the_safety_layer_reaches_a_rig(name):
+def test_only_the_safety_layer_calls_a_rig(name):
     assert callers(name) == CALLED_IN[name]
 
 
@@ -104,7 +104,7 @@ def test_nothing_but_the_safety_layer_reaches_a_rig(name):
         "def build():\n    from x import SafeDevice\n    return SafeDevice",
     ],
 )
-def test_the_search_for_names_would_find_one(tmp_path, around):
+def test_the_search_for_names_finds_a_planted_one(tmp_path, around):
     (tmp_path / "study").mkdir()
     (tmp_path / "study" / "around.py").write_text(around)
     assert namers("SafeDevice", tmp_path) == {"study/around.py"}
@@ -141,7 +141,7 @@ def modules_behind_the_door(tree: Path) -> set[str]:
     return names - {f"study.devices.{public}" for public in ("opening", "device", "clock")}
 
 
-def test_what_is_public_passes_the_contract(tree):
+def test_public_modules_pass_the_import_contract(tree):
     answer = contract(tree)
     assert "1 kept, 0 broken" in answer.stdout, answer.stdout + answer.stderr
 

@@ -46,7 +46,7 @@ def test_another_name_is_refused_with_the_names_that_work(name):
 
 @pytest.mark.parametrize("name", ["stimulus_cap_n", "total_cap_n", "slew_n_per_s", "watchdog_s", "release_s"])
 @pytest.mark.parametrize("value", [math.nan, -1.0, 0.0, math.inf])
-def test_a_limit_that_is_no_limit_is_refused(name, value):
+def test_a_limit_that_is_not_positive_and_finite_is_refused(name, value):
     with pytest.raises(DeviceError, match=f"limits are not safe.*{name} is .*at most"):
         open_device("simulated", limited(**{name: value}), VirtualClock(), seed=1)
 
@@ -56,7 +56,7 @@ BOUNDS = [field.name for field in fields(PlausibilitySettings)]
 
 @pytest.mark.parametrize("name", ["feedback_cap_n", *BOUNDS])
 @pytest.mark.parametrize("value", [math.nan, -1.0, math.inf])
-def test_a_bound_of_what_a_position_may_be_that_is_no_bound_is_refused(name, value):
+def test_a_position_bound_that_is_negative_or_not_finite_is_refused(name, value):
     bounds = None if name == "feedback_cap_n" else unchecked_bounds(name, value)
     settings = limited(feedback_cap_n=value) if bounds is None else limited(plausibility=bounds)
     with pytest.raises(DeviceError, match=f"limits are not safe.*{name} is .*at most"):
@@ -70,7 +70,7 @@ def unchecked_bounds(name: str, value: float) -> SimpleNamespace:
 
 @pytest.mark.parametrize("name", ["sample_rate_hz", "effective_mass_kg"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, 0.0, 1e6])
-def test_a_device_that_says_nonsense_of_itself_is_refused(rigs, name, value):
+def test_a_device_with_impossible_properties_is_refused(rigs, name, value):
     """The spring's stiffness is made from its mass, every duration from its rate."""
     rig = replace(rigs.compiled_rig(), info=replace(rigs.INFO, **{name: value}))
     with pytest.raises(DeviceError, match=f"what it says of itself cannot be.*{name} is"):
@@ -96,7 +96,7 @@ def test_with_a_hand_on_the_handle_nothing_goes_beyond_the_ceiling(settings):
         open_device("simulated", settings, VirtualClock(), seed=1)
 
 
-def test_a_place_that_is_no_place_is_named():
+def test_a_place_that_is_not_finite_is_refused_by_name():
     with pytest.raises(DeviceError, match="place"):
         open_device("simulated", replace(SETTINGS, place_m=(0.0, math.nan, 0.0)), VirtualClock(), seed=1)
 
@@ -104,7 +104,7 @@ def test_a_place_that_is_no_place_is_named():
 STRONG = replace(limited(stimulus_cap_n=8.0, total_cap_n=12.0), hand_on_handle=False)
 
 
-def test_without_a_hand_the_ceiling_is_what_the_device_can_do_for_those_who_say_so():
+def test_without_a_hand_the_ceiling_can_be_raised_to_the_device_limit():
     open_device("simulated", replace(STRONG, beyond_hand_ceiling=True), VirtualClock(), 1).close()
     stronger = replace(limited(total_cap_n=12.5), hand_on_handle=False, beyond_hand_ceiling=True)
     with pytest.raises(DeviceError, match=r"total_cap_n is 12\.5; it must be above 0 and at most 12"):
@@ -135,7 +135,7 @@ def test_the_device_without_friction_says_so_and_is_offered_nowhere():
     device.close()
 
 
-def test_the_door_is_light_until_something_is_opened():
+def test_importing_the_opening_loads_no_driver():
     code = "import sys, study.devices.opening; print(sorted({'numba', 'scipy'} & set(sys.modules)))"
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"

@@ -19,7 +19,7 @@ def test_samples_stay_as_they_are_and_units_become_si(files):
     assert (found.command.quantity, found.response.unit, found.response.channels) == ("force", "m/s^2", ("ax",))
 
 
-def test_nothing_is_said_where_nothing_was_done(files):
+def test_nothing_is_reported_where_nothing_was_done(files):
     assert built(map_text(), files()).notes == ()
 
 

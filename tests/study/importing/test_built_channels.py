@@ -87,7 +87,7 @@ def test_files_that_a_map_does_not_know_or_misses_are_named(files):
     )
 
 
-def test_a_channel_without_a_unit_keeps_its_numbers_and_says_so(files):
+def test_a_channel_without_a_unit_keeps_its_numbers_and_reports_it(files):
     text = map_text().replace('unit = "N"', "").replace('unit = "g"', 'quantity = "position"')
     found = built(text, files())
     assert (found.recording.command.unit, found.recording.response.unit) == ("1", "1")
@@ -98,7 +98,7 @@ def test_a_channel_without_a_unit_keeps_its_numbers_and_says_so(files):
     )
 
 
-def test_the_unit_of_a_computed_channel_is_said(files):
+def test_the_unit_of_a_computed_channel_is_reported(files):
     end = '[[computed]]\nrole = "position"\nname = "x"\nvalue = "integral(integral(ax))"\nunit = "in"\n'
     found = built(map_text(end=end), files())
     assert found.notes == ("Computed: position 'x' = integral(integral(ax)), in in.",)

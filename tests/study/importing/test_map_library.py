@@ -51,7 +51,7 @@ def test_a_map_in_the_folder_goes_before_ours(tmp_path):
     ]  # fmt: skip
 
 
-def test_a_map_in_the_folder_that_is_wrong_is_said_and_not_passed_over(tmp_path):
+def test_a_map_in_the_folder_that_is_wrong_is_reported_and_not_passed_over(tmp_path):
     (tmp_path / "own.toml").write_text(OWN.replace("unit", "uint"))
     with pytest.raises(UnusableFileError, match="did you mean unit"):
         find_map(tmp_path)

@@ -78,7 +78,7 @@ def test_uneven_stamps_need_a_rate_and_a_way(files):
     )
 
 
-def test_what_was_resampled_is_said_with_its_way_and_its_band(files):
+def test_what_was_resampled_is_reported_with_its_way_and_its_band(files):
     stairs = np.repeat(U[: N // 8], 8)
     wave = np.sin(2 * np.pi * 0.02 * UNEVEN)
     text = map_text(

@@ -134,7 +134,7 @@ def test_every_step_of_the_paddle_goes_ten_degrees_with_a_torque_that_starts_it(
         assert torque[begun] == pytest.approx(part["kp_n_m_per_deg"] * 10, rel=0.35)
 
 
-def test_what_the_import_of_the_rack_did_is_said(imported, shared):
+def test_what_the_import_of_the_rack_did_is_reported(imported, shared):
     found = imported("rack_drive", "rack_drive")
     assert found.notes == (
         "Clock 'drive' is moved by 0 ms to that of 'daq', as the map states.",

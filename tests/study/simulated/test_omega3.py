@@ -51,7 +51,7 @@ def test_mirrored_test_directions_meet_the_same_mass_and_friction_in_the_upright
         assert direction @ mass @ direction == pytest.approx(other @ mass @ other)
 
 
-def test_a_hand_adds_its_mass_and_is_told_apart(bench):
+def test_a_hand_adds_its_mass_and_is_distinguished(bench):
     bare, held = (build_omega3(1, hand) for hand in (False, True))
     assert bare.info.effective_mass_kg == held.info.effective_mass_kg
     slow = [abs(bench.phasor(rig, 15.0, [0, 1, 0])[1]) for rig in (bare, held)]

@@ -53,7 +53,7 @@ def test_what_cannot_be_read_is_named(tmp_path):
         read_text(tmp_path)
 
 
-def test_rights_and_other_trouble_are_told(tmp_path):
+def test_rights_and_other_trouble_are_reported(tmp_path):
     assert CannotReadError(tmp_path, PermissionError()).happened == f"You have no right to read {tmp_path}."
     assert (
         CannotReadError(tmp_path, OSError(5, "Input/output error")).happened == "The system says: Input/output error."

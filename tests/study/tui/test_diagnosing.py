@@ -70,7 +70,7 @@ def test_esc_stops_it_and_nothing_is_written(files):
 
 
 @pytest.mark.timeout(120)
-def test_what_cannot_be_diagnosed_is_said_on_a_panel(files):
+def test_what_cannot_be_diagnosed_is_reported_on_a_panel(files):
     async def story(sitter):
         await sitter.until("HomeScreen")
         sitter.app.post_message(DiagnoseWanted((str(files / "rec.h5"),), str(files / "three.toml"), ""))

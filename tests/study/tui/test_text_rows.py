@@ -24,6 +24,6 @@ def test_the_widest_column_of_words_wraps_and_numbers_never_do():
     assert max(map(len, align_rows(rows, 20))) > 20  # the terminal wraps what cannot be narrowed
 
 
-def test_a_long_line_goes_on_under_its_text():
+def test_a_long_line_continues_under_its_text():
     assert wrap_hanging("Sensor     one two three", 11, 18) == ("Sensor     one two", "           three")
     assert wrap_hanging("Sensor     one two three", 11, None) == ("Sensor     one two three",)

@@ -52,7 +52,7 @@ def gone(pid: int) -> bool:
     return Path(f"/proc/{pid}/stat").read_text().split(")")[1].split()[0] == "Z"
 
 
-def test_views_come_and_go_on_coming_and_the_child_ends_with_the_feed(session):
+def test_views_come_and_continue_coming_and_the_child_ends_with_the_feed(session):
     feed = WatchFeed(str(session))
     try:
         first = until(feed.latest)
@@ -74,7 +74,7 @@ def test_a_log_that_cannot_be_followed_is_told_as_a_sentence(session):
         feed.close()
 
 
-def test_a_reader_that_dies_is_told(session):
+def test_a_reader_that_dies_is_reported(session):
     feed = WatchFeed(str(session))
     try:
         until(feed.latest)

@@ -25,7 +25,7 @@ def balance(axes, balance_of):
     return found
 
 
-def test_a_single_step_tests_nothing(balance):
+def test_a_single_step_tests_and_names_no_law(balance):
     found = balance(1)
     assert not found.tested
     assert not found.laws

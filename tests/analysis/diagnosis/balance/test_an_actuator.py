@@ -54,7 +54,7 @@ def test_the_error_before_is_that_of_the_force_as_commanded(dead_band):
 
 
 @pytest.mark.parametrize("physics", [{"coulomb": 0.8}, {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}])
-def test_an_actuator_that_gives_what_is_commanded_has_neither(found, axes, physics):
+def test_a_linear_actuator_has_no_deadband_saturation_or_nonlinearity(found, axes, physics):
     balance = found(lambda u: u, replace(axes.Physics(), **physics))
     assert not {"force_deadband", "force_saturation", "force_nonlinearity"} & set(named(balance))
 

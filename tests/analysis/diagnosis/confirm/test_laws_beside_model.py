@@ -85,7 +85,7 @@ def test_a_gain_is_the_share_of_the_error_power_that_goes():
     assert (found.gain, found.low, found.high) == pytest.approx((0.75, 0.75, 0.75))
 
 
-def test_chance_is_no_gain():
+def test_a_random_difference_has_a_gain_interval_around_zero():
     other = np.random.default_rng(6).normal(size=(1600, 2))
     found = held_out_gain(MEASURE, candidate(NOISE), candidate(other))
     assert found.low < 0 < found.high
@@ -110,7 +110,7 @@ def searched(after, rival=None):
         (candidate(0.3 * NOISE, deviations=(4.0,)), None, "at the end of its tolerance"),
     ],
 )
-def test_a_name_is_confirmed_by_what_it_foretells(monkeypatch, after, rival, said):
+def test_a_rival_or_a_poor_prediction_is_an_objection_to_a_name(monkeypatch, after, rival, said):
     monkeypatch.setattr(beside_given, "only_refines", lambda other, best: False)
     found = objection(searched(after, rival), ())
     assert said in found

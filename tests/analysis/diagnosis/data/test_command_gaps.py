@@ -59,7 +59,7 @@ def test_a_long_gap_of_a_slow_command_is_cut_within_the_parts_that_were_known():
     assert parts_of(found) == ((0, 1200), (1600, SAMPLES))
 
 
-def test_a_whole_command_is_not_touched_and_nothing_is_said():
+def test_a_whole_command_is_not_touched_and_nothing_is_reported():
     whole = recording(noise())
     found, said = bridge_gaps([whole], ["a"])
     assert found[0] is whole

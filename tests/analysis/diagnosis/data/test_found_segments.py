@@ -100,7 +100,7 @@ def test_segments_of_its_own_stay():
     assert find_segments(before) == (before, "")
 
 
-def test_a_part_that_does_not_repeat_beside_one_that_does_is_no_rest():
+def test_a_part_that_does_not_repeat_beside_one_that_does_is_not_taken_for_rest():
     command = np.concatenate([tiled(500, 5), np.random.default_rng(9).standard_normal(2000)])
     parts = [{"start": 0, "stop": 2500}, {"start": 2500, "stop": 4500}]
     found, said = find_segments(recording(command, parts=parts))

@@ -55,7 +55,7 @@ def test_friction_is_named_in_spite_of_a_gap(made, gapped):
     assert found.diagnosis.effects[0].parameters["level"].value == pytest.approx(made.FRICTION_N, rel=0.03)
 
 
-def test_growth_is_told_from_motion_that_dies_out(made):
+def test_growth_is_distinguished_from_motion_that_dies_out(made):
     model = made.device(1)
     assert growth_rate(model) == pytest.approx(-8.0)
     assert not is_unstable_within(model, 1000.0)

@@ -62,7 +62,7 @@ def test_what_belongs_together_is_taken():
     ],
     ids=["rate", "channels", "unit"],
 )
-def test_recordings_of_different_kinds_are_told_apart(other, words):
+def test_recordings_of_different_kinds_are_distinguished(other, words):
     assert words in refusal(require_alike, [recording(), other], ["a", "b"])
 
 

@@ -33,12 +33,12 @@ def test_rest_tells_nothing():
     assert said(("rest", 0.0, (), ""), ("multisine", 1.0, (0,), ""), ("multisine", 2.0, (0,), "")) == ()
 
 
-def test_louder_joint_and_other_commands_are_told():
+def test_louder_joint_and_other_commands_are_reported():
     fitted = ("multisine", 1.0, (0,), "fit"), ("multisine", 1.0, (1,), "fit")
     assert said(*fitted, ("multisine", 3.0, (0,), "test")) == ("louder commands",)
     assert "axes driven together" in said(*fitted, ("multisine", 0.9, (0, 1), "test"))
     assert "another kind of command" in said(*fitted, ("sweep", 0.9, (0,), "test"))
 
 
-def test_without_anything_to_fit_nothing_is_told():
+def test_without_anything_to_fit_nothing_is_reported():
     assert said(("sweep", 1.0, (0,), "test")) == ()

@@ -33,7 +33,7 @@ def test_only_its_own_samples_count_for_each_part(arena_of):
     assert other.test == pytest.approx(10 * one.test)
 
 
-def test_where_nothing_was_sealed_nothing_is_said(arena_of):
+def test_where_nothing_was_sealed_nothing_is_reported(arena_of):
     measure = arena_of().measure
     assert np.isnan(fit_score(measure, measure.residuals(arena_of().tuning.model, ())).test).all()
 

@@ -103,7 +103,7 @@ def test_sealed_samples_are_not_fitted_to(rubbing_arena):
     assert not record.test.any()
 
 
-def test_a_sensitivity_foretells_what_a_small_change_does(arena_of):
+def test_a_sensitivity_predicts_the_effect_of_a_small_change(arena_of):
     context = arena_of()
     zero = np.zeros(len(context.tuning.names))
     known = sensitivity(context.measure, context.tuning, zero, NOTHING)

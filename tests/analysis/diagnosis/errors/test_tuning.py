@@ -75,7 +75,7 @@ def test_no_deviation_gives_the_same_model_in_other_coordinates():
 @pytest.mark.parametrize(
     ("what", "matrix", "size"), [("mass", "mass", 0.004), ("damping", "damping", 0.3), ("stiffness", "stiffness", 6.0)]
 )
-def test_a_grounded_number_changes_what_it_says_and_nothing_else(what, matrix, size):
+def test_a_changed_number_moves_its_own_matrix_alone(what, matrix, size):
     model = hanging()
     other = moved(model, **{f"{what}_fy": 2.0})
     wanted = np.zeros((3, 3))
@@ -101,7 +101,7 @@ def test_a_mode_s_frequency_changes_by_the_share_that_it_says():
     assert ratio == pytest.approx(model.damping[2, 2] / np.sqrt(model.stiffness[2, 2] * model.mass[2, 2]))
 
 
-def test_a_mode_s_mass_is_carried_by_the_axis_it_hangs_on():
+def test_a_mode_s_mass_is_added_to_the_axis_it_is_attached_to():
     model = hanging()
     other = moved(model, **{f"mass of the mode at {HANGING_HZ:.3g} Hz": 3.0})
     assert held_frequencies_hz(other) == pytest.approx([HANGING_HZ])

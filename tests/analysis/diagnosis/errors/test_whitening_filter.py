@@ -27,7 +27,7 @@ def test_white_noise_stays_what_it_is():
     assert np.std(whitening_filter([white], LEAST).apply(white) - white) < 0.15
 
 
-def test_a_tone_that_the_colour_lacks_stands_out():
+def test_whitening_raises_a_tone_that_the_noise_lacks():
     colour = whitening_filter([ringing(1)], LEAST)
     tone = 2.0 * np.sin(2 * np.pi * 0.3 * np.arange(8000))[:, None]
     before = np.var(ringing(2) + tone) / np.var(ringing(2))
@@ -36,7 +36,7 @@ def test_a_tone_that_the_colour_lacks_stands_out():
     assert after > 10
 
 
-def test_a_sample_hangs_on_nothing_that_comes_later():
+def test_a_sample_depends_on_no_later_sample():
     colour, course = whitening_filter([ringing(1)], LEAST), ringing(2)
     changed = course.copy()
     changed[5000:] += 7.0

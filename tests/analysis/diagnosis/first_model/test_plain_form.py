@@ -146,7 +146,7 @@ def test_the_sign_of_an_absolute_speed_is_restored(seed):
     assert "sensor tells the amount alone" in said
 
 
-def test_a_speed_that_goes_one_way_is_none_of_amounts():
+def test_a_speed_in_one_direction_is_not_taken_for_an_absolute_speed():
     push = 3.0 + np.abs(smooth(1000, 3))
     recording = of([("u", "voltage", "V", push)], [("w", "speed", "m/s", speed_of(push))])
 

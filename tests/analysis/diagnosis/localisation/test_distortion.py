@@ -47,7 +47,7 @@ def test_invented_odd_distortion_is_recovered_with_its_size(device):
     assert all(c.p_value > DISTORTION_P for c in cells if c.kind in ("even", "varying"))
 
 
-def test_odd_distortion_that_rises_is_told_from_friction_that_falls(device):
+def test_odd_distortion_that_rises_is_distinguished_from_friction_that_falls(device):
     rising = whole(level_trends(found_in(device(cubic=0.02, axes=1).recorded()).cells), "ax", "fx")
     falling = whole(level_trends(found_in(device(coulomb=0.3, axes=1).recorded()).cells), "ax", "fx")
     assert rising["odd"].course in ("rises", "rises from nothing")
@@ -76,7 +76,7 @@ def test_a_multisine_without_silent_odd_lines_says_so(device):
     assert any("No line was left silent" in remark for remark in found.remarks)
 
 
-def test_what_a_recording_cannot_tell_is_said(device):
+def test_what_a_recording_cannot_tell_is_reported(device):
     recording = device(levels=(1.0,), axes=1).recorded()
     assert any("one level only" in remark for remark in found_in(recording).remarks)
     single = replace(recording, segments=tuple(replace(s, period=0) for s in recording.segments))

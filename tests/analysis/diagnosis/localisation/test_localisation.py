@@ -36,7 +36,7 @@ def test_distortion_is_told_per_channel_and_level(friction_found):
     assert {"ax", "x"} <= {cell.output for cell in cells}
 
 
-def test_the_entry_is_said_with_what_comes_next():
+def test_the_entry_is_reported_with_what_comes_next():
     assert entry_sentence(EntryPoint((ALONG_X, ALONG_ALL, OF_AX), MOVED, 1200)) == (
         "What re-tuning leaves enters as a force along x (the drive, the mechanism and a hand all push there, and "
         "these channels cannot tell which does): 90 % of it, at the median of 1200 frequency lines; "
@@ -56,7 +56,7 @@ def test_a_sensor_is_said_to_be_one():
 
 
 @pytest.mark.parametrize("entry", [None, EntryPoint((), None, 0), EntryPoint((ALONG_X,), None, 39)])
-def test_where_too_little_is_there_no_entry_is_said(entry):
+def test_where_too_little_is_there_no_entry_is_reported(entry):
     assert entry_sentence(entry) == ""
 
 

@@ -67,7 +67,7 @@ def friction():
     return bench, pair, foreseen(bench, *pair)
 
 
-def test_dry_friction_and_presliding_are_told_apart_by_the_proposed_recording(friction):
+def test_dry_friction_and_presliding_are_distinguished_by_the_proposed_recording(friction):
     bench, (named, rival), menu = friction
     proposed = as_document(menu[0], NAMES)
     assert proposed is not None and proposed.splits == NAMES
@@ -111,7 +111,7 @@ def mass_or_gain(tolerance, fitted=True):
     return bench, named, replace(rival, deviations=alike) if fitted else rival
 
 
-def test_a_weight_and_a_weak_motor_are_told_apart_where_the_calibration_is_tight():
+def test_a_weight_and_a_weak_motor_are_distinguished_where_the_calibration_is_tight():
     menu = foreseen(*mass_or_gain(Tolerance(1e-4, 0.01, 0.1, 0.01), fitted=False))
     assert as_document(menu[0], ("added_mass", "force_gain")) is not None
 
@@ -152,7 +152,7 @@ def test_a_weight_is_the_same_along_every_driven_axis():
     assert axes.T @ (add_mass(model, 0.03).mass - model.mass) @ axes == pytest.approx(0.03 * eye)
 
 
-def test_a_cheap_recording_that_tells_too_little_stands_behind_a_dear_one_that_tells():
+def test_an_informative_expensive_recording_ranks_before_a_cheap_uninformative_one():
     bench, named, rival = mass_or_gain(LOOSE)
     sweep, *_, weight = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
     known = np.diag([1e9] * (len(bench.tuning.names) + 1))

@@ -65,7 +65,7 @@ def test_what_is_larger_is_named_still_and_by_itself(diagnosed, clean, found_in)
     assert not any(cell.significant for cell in found.maps["after"])
 
 
-def test_a_hum_below_what_a_sound_device_differs_by_is_named(diagnosed, clean):
+def test_a_hum_below_the_learned_model_error_is_named(diagnosed, clean):
     """At a frequency where it differs by little; the same without a hum is no mismatch."""
     without = tuple(name for name in BY_NAME if name not in (*AMONG, "mains_hum"))
     for seed in (6, 7):
@@ -90,7 +90,7 @@ def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, cl
     assert not learned.references.gain_on_clean(NOTHING).any()
 
 
-def test_a_device_that_is_its_model_teaches_next_to_nothing(diagnosed):
+def test_a_device_equal_to_its_model_teaches_hardly_any_error(diagnosed):
     sound, other = (diagnosed.recorded(1, (), seed=seed) for seed in (11, 12))
     floor = learn_model_error((sound,), diagnosed.device(1), (other,), map, quiet).floor
     assert max(floor.channels) < 0.01
@@ -115,7 +115,7 @@ def test_recordings_that_can_only_be_compared_otherwise_teach_nothing():
         require_alike("free simulation", "predicted force")
 
 
-def test_what_was_learned_is_said_and_where_it_is_much_that_too():
+def test_what_was_learned_is_reported_and_where_it_is_much_that_too():
     assert learned_sentence(CleanFloor(), ("ax",)) == ""
     little = learned_sentence(CleanFloor(channels=(0.1, 0.004), recordings=2), ("ax", "x"))
     assert "from 2 clean recordings: ax 10 % and x 0.4 % of the channel's signal" in little

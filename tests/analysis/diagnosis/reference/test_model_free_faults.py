@@ -99,7 +99,7 @@ def test_play_before_the_sensor_is_neither_a_limit_nor_lost_samples():
     assert seen(spoiled(recording(2, 0.0), play), recording(1, 0.0)) == []
 
 
-def test_a_sound_device_that_moves_shows_the_lattice_that_it_has_at_rest_too():
+def test_an_intact_moving_device_shows_the_same_lattice_as_at_rest():
     """An encoder of fine steps takes nearly as many values as there are samples while it moves, and five at rest."""
     at = np.arange(6000)
     moving, resting = 1e-5 * np.round(3e4 * np.sin(at / 900)), 1e-5 * np.round(2.2 * np.sin(at / 300))

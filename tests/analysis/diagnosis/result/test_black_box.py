@@ -75,7 +75,7 @@ def test_without_sealed_samples_there_is_nothing_to_compare_on(arena_of):
     assert black_box(context.whole, replace(retuned), 3, None) is None
 
 
-def test_beyond_what_it_was_fitted_to_the_black_box_is_no_easy_prey(bent):
+def test_the_black_box_is_judged_fairly_beyond_its_fitted_levels(bent):
     """Fitted to the quietest level, tested on one six times as loud."""
     context, _ = bent
     (record,) = context.whole.records

@@ -69,7 +69,7 @@ def test_words_are_only_for_effects_and_numbers_that_there_are():
         assert {*words.numbers, *words.shares} <= known
 
 
-def test_nouns_are_told_apart():
+def test_nouns_are_distinguished():
     nouns = [words.noun for words in EFFECT_WORDS.values()]
     assert len(set(nouns)) == len(nouns)
 
@@ -125,7 +125,7 @@ def test_the_verdict_says_where_more_is_missing():
     assert said.endswith("and a mismatch remains.")
 
 
-def test_no_mismatch_remains_where_none_is_told():
+def test_no_mismatch_remains_where_none_is_reported():
     noise = replace(PLACE, p_value=0.4)
     left = diagnosis("partly_explained", (DRY,), remainder=(noise,), errors=Errors(0.5, 0.36, 0.0026, 0.0114))
     said = verdict_sentence(left)
@@ -166,7 +166,7 @@ def test_a_mismatch_without_a_name_gets_none():
     assert not any(words.noun in said for words in EFFECT_WORDS.values())
 
 
-def test_unknown_errors_and_unknown_noise_are_said():
+def test_unknown_errors_and_unknown_noise_are_reported():
     unknown = Errors(None, None, None, None)
     assert "is not known" in verdict_sentence(diagnosis("explained", (DRY,), errors=unknown))
     assert "is not known" in verdict_sentence(diagnosis("no_mismatch", mismatch=(), errors=unknown))
@@ -193,7 +193,7 @@ def test_of_two_that_cannot_be_told_apart_both_are_named():
     assert inseparable_sentence(replace(DRY, rivals=())) == ""
 
 
-def test_share_and_probability_are_said():
+def test_share_and_probability_are_reported():
     assert share_sentence(DRY) == (
         "It accounts for 90 % of the mismatch that re-tuning leaves; the probability that this is its name is 0.68."
     )

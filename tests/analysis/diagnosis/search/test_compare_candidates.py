@@ -24,7 +24,7 @@ def started(context, name, values):
     return evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), law)
 
 
-def test_a_rival_with_the_best_laws_sensitivities_ends_where_it_ends_alone(rubbing):
+def test_a_rival_started_from_shared_sensitivities_converges_to_its_own_fit(rubbing):
     context, plain, known = rubbing
     rival = started(context, "asymmetric_friction", {"level_positive": 0.02, "level_negative": 0.03})
     alone, shared = (refine_with_sensitivity(context, rival, given)[0] for given in (None, known))

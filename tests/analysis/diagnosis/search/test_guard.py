@@ -22,7 +22,7 @@ def quiet(what, share):
     return None
 
 
-def test_the_others_are_searched_and_the_crash_is_said(diagnosed, arena_of):
+def test_the_others_are_searched_and_the_crash_is_reported(diagnosed, arena_of):
     context = replace(arena_of(diagnosed.RUBBING), guard=Guard(on=True))
     found = explain(context, [BROKEN, RUBS], quiet)
     assert found.after.newest == "coulomb_friction"

@@ -113,13 +113,13 @@ def fitted(context, *claims):
     return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
 
 
-def test_a_profile_tells_a_number_from_none_where_it_is_there_and_not_where_it_is_not(rubbing):
+def test_the_profile_distinguishes_a_present_number_from_zero_and_an_absent_one_not(rubbing):
     both = fitted(rubbing, FRICTION, OPEN)
     assert distance_from_none(rubbing, both, 0) > 1
     assert distance_from_none(rubbing, both, 1) < 1
 
 
-def test_an_interval_that_holds_none_is_judged_by_the_profile_and_then_does_not(rubbing, monkeypatch):
+def test_an_interval_that_contains_zero_is_corrected_by_the_profile_likelihood(rubbing, monkeypatch):
     found = fitted(rubbing, FRICTION)
     place, level = len(rubbing.tuning.names), found.after.fitted.hypothesis.placed_effects()[0].values["level"]
     plain = final_errors(rubbing, found)

@@ -16,7 +16,7 @@ GAIN = next(effect for effect in CATALOGUE if effect.name == "force_gain")
 
 
 @pytest.mark.parametrize(("gain", "nothing"), [(0.7, False), (1e-6, True)])
-def test_a_force_that_never_reaches_the_device_foresees_nothing(arena_of, gain, nothing):
+def test_a_force_that_never_reaches_the_device_predicts_nothing(arena_of, gain, nothing):
     context = arena_of()
     held = hypothesis_of_claim(Claim(GAIN, "one", (0,)), [{"gain": gain}])
     assert is_without_prediction(context.whole, _contender(context, held)) is nothing
@@ -41,7 +41,7 @@ def test_where_noise_is_as_large_as_the_signal_a_foreseen_course_is_asked_for_al
     assert is_without_prediction(measure, _contender(replace(context, whole=measure), held))
 
 
-def test_a_low_pass_that_lets_nothing_through_silences_its_channel(arena_of):
+def test_a_low_pass_far_below_the_band_silences_its_channel(arena_of):
     context = arena_of()
     record = context.whole.records[0]
     backwards = record.measured.copy()
@@ -49,7 +49,7 @@ def test_a_low_pass_that_lets_nothing_through_silences_its_channel(arena_of):
     assert _silences(replace(context.whole, records=(replace(record, measured=backwards),)), context.tuning, 0.01)
 
 
-def test_a_silenced_channel_is_no_answer_though_another_gains_more_by_it(arena_of):
+def test_a_claim_that_silences_a_channel_predicts_nothing_even_if_another_channel_gains(arena_of):
     context = arena_of()
     none = np.zeros(len(context.tuning.names))
     lag = evaluate_fit(
@@ -59,7 +59,7 @@ def test_a_silenced_channel_is_no_answer_though_another_gains_more_by_it(arena_o
     assert predicts_nothing(context.whole, wrenched, lag)
 
 
-def test_a_low_pass_that_is_there_silences_nothing(arena_of):
+def test_a_low_pass_of_the_device_itself_silences_no_channel(arena_of):
     context = arena_of(effects=(PlacedEffect(LAG, (0,), {"bandwidth": 10.0}),))
     assert not _silences(context.whole, context.tuning, 10.0)
 

@@ -79,7 +79,7 @@ def test_far_above_the_noise_only_a_share_of_it_tells(standing_at):
     assert not inseparable(standing_at(3.0, "force_gain"), standing_at(4.0, "sensor_gain"))
 
 
-def test_a_better_one_is_never_a_worse_one(standing_at):
+def test_a_candidate_that_fits_better_is_inseparable_from_a_worse_one(standing_at):
     assert inseparable(standing_at(2.0, "force_gain"), standing_at(1.0, "sensor_gain"))
 
 

@@ -20,7 +20,7 @@ def test_what_errs_by_next_to_nothing_more_is_as_good():
     assert not inseparable(candidate(1.0), candidate(1.01))
 
 
-def test_far_above_the_noise_more_is_next_to_nothing():
+def test_far_above_the_noise_a_small_relative_difference_is_inseparable():
     assert inseparable(candidate(2.0), candidate(2.1))
     assert not inseparable(candidate(2.0), candidate(2.3))
 

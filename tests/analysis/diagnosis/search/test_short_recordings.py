@@ -120,7 +120,7 @@ def test_without_what_lies_around_stretches_forces_would_differ(by_force, monkey
     assert np.abs(apart_by_force(by_force)).max() > 0.05
 
 
-def test_a_period_that_the_record_ends_in_stands_for_none(lagging):
+def test_a_period_cut_off_by_the_end_of_the_record_represents_no_other(lagging):
     (record,) = lagging.measure.records
     ends = record.recording.segments[0].stop - 300
     cut = [getattr(record, name)[:ends] for name in ("command", "measured", "fit", "choose", "test")]

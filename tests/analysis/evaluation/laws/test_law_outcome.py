@@ -58,7 +58,7 @@ def test_another_axis_or_place_is_all_off():
         assert law_error((law,), DRAG) == pytest.approx(1.0)
 
 
-def test_a_law_that_is_no_number_is_all_off():
+def test_a_law_that_is_not_finite_has_an_infinite_error():
     assert law_error((law_of("log(y)", "force", "y"),), DRAG) == float("inf")
 
 
@@ -74,7 +74,7 @@ def test_structure_asks_for_variables_axis_place_and_memory():
     assert not outcome("0.9*fy", acts_on="command").structured
 
 
-def test_a_candidate_is_no_wrong_explanation():
+def test_an_unnamed_candidate_does_not_count_as_a_wrong_explanation():
     held = outcome("-3.0*abs(vy)*y", verdict="unexplained", key="candidates")
     assert not held.wrongly_explained
     assert held.missed

@@ -44,7 +44,7 @@ def unnamed(verdict):
         ("opposite", [pushed(1.0), unnamed("unexplained")], False),
     ],
 )
-def test_a_claim_holds_or_does_not(claim, answers, held):
+def test_a_claim_of_a_control_holds_for_the_expected_answers_alone(claim, answers, held):
     assert judge_control("a control", claim, answers).held is held
 
 

@@ -24,5 +24,5 @@ def test_a_stop_on_one_side_has_its_side():
     assert nearest_true_value("position", -0.0121, {"position": 0.012, "opposite": 0.0}) == 0.012
 
 
-def test_all_else_is_what_it_is():
+def test_other_numbers_are_compared_as_they_are():
     assert nearest_true_value("gain", -1.1, {"gain": 1.1}) == 1.1

@@ -83,6 +83,6 @@ def test_a_finer_command_ends_its_steps_where_the_samples_are(hold):
     assert fine.mean.shape == (1600, 1)
 
 
-def test_an_actuator_that_is_not_there_is_said():
+def test_an_actuator_that_is_not_there_is_reported():
     with pytest.raises(ValueError, match="force_saturation is placed at axis 3; there are 1"):
         simulate_mechanism(free_mass(), np.ones((5, 1)), 1000.0, [PlacedEffect(SATURATION, (2,), {"limit": 1.0})])

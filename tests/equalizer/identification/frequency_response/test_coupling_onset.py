@@ -74,7 +74,7 @@ def test_all_lines_too_noisy_is_refused_with_what_would_do():
         coupling_onset(response_of(0.05 + 0 * LINES, LINES, noise=1.0))
 
 
-def test_coupled_from_the_start_is_said():
+def test_coupled_from_the_start_is_reported():
     found = coupling_onset(response_of(0.4 + 0 * LINES, LINES))
     assert found.from_the_start
     assert found.frequency_hz == LINES[0]

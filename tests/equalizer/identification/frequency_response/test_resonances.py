@@ -50,7 +50,7 @@ def test_the_modes_of_the_synthetic_device_are_found(found, frequency_hz, dampin
         assert found_there.width_hz == pytest.approx(2 * found_there.damping_ratio * found_there.frequency_hz)
 
 
-def test_what_couples_is_told_from_what_is_only_loud(found):
+def test_what_couples_is_distinguished_from_what_is_only_loud(found):
     eleven = nearest(found[0], 11.0)
     assert eleven.seen_in == (COUPLING, GAIN)
 

@@ -148,7 +148,7 @@ def test_the_same_recording_gives_the_same_numbers_again():
     np.testing.assert_array_equal(one.mass, two.mass)
 
 
-def test_a_sensor_that_counts_the_other_way_is_said():
+def test_a_sensor_that_counts_the_other_way_is_reported():
     source = single()
     turned = replace(source, response=replace(source.response, samples=-source.response.samples))
     fit = fit_mechanical_model([turned])

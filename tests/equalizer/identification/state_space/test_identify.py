@@ -85,7 +85,7 @@ def test_states_that_no_data_ask_for_do_no_harm(plants, measuring):
     assert measuring.errors_of(found.model, plant, GRID)[0] < 1e-8
 
 
-def test_too_low_an_order_fits_worse_and_says_so(measuring, centre, response):
+def test_too_low_an_order_fits_worse_and_reports_it(measuring, centre, response):
     low = identify(response, replace(QUICK, order=8))
     assert measuring.errors_of(low.model, centre, GRID)[0] > 0.01
     assert any("order 8 may be too low" in remark for remark in low.remarks)

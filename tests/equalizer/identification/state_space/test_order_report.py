@@ -30,7 +30,7 @@ def test_a_tick_costs_what_its_matrices_cost(report):
     assert dense_multiply_adds(26, 3, 3) == 26 * 26 + 26 * 6 + 9
 
 
-def test_the_share_done_is_told(plants, measuring):
+def test_the_share_done_is_reported(plants, measuring):
     heard: list[float] = []
     response = measuring.noisy(measuring.small_plant(plants), np.arange(4.6, 38, 0.2), 0.3, 4)
     compare_orders(response, orders=(4, 6), on_progress=heard.append)

@@ -60,7 +60,7 @@ def test_a_well_damped_device_is_fitted_as_under_the_bound_to_the_last_digit(pla
         assert ours.remarks == ()
 
 
-def test_a_bound_that_was_asked_for_is_kept_and_what_it_costs_is_said(plants, measuring):
+def test_a_bound_that_was_asked_for_is_kept_and_what_it_costs_is_reported(plants, measuring):
     plant, _ = device_of(plants, (0.01, 0.06, 0.05), 1)
     found = identify(measuring.noisy(plant, LINES, NOISE, 1), replace(QUICK, longest_decay_s=0.5))
     assert found.model.spectral_radius <= np.exp(-1 / 500) * (1 + 1e-12)

@@ -42,7 +42,7 @@ def test_and_on_a_device_s_own_equations(device_model, random_rotation, differen
 
 @settings(max_examples=10, deadline=None)
 @given(st.lists(st.integers(0, 99), min_size=5, max_size=30))
-def test_a_turn_at_every_tick_is_solved_anew_at_every_tick(problem_of, random_rotation, difference, trajectory, seeds):
+def test_a_turn_at_every_tick_is_solved_again_at_every_tick(problem_of, random_rotation, difference, trajectory, seeds):
     problem = problem_of(5, 1, 1e-2)
     transient, state = turning_transient(stored_gains(problem, N), trajectory), None
     state = initial_state(transient)
@@ -73,7 +73,7 @@ def test_steps_are_the_compiled_run(problem_of, random_rotation, trajectory):
     assert state.x == pytest.approx(run.state.x, abs=0)
 
 
-def test_a_normal_that_turns_is_solved_anew_too(problem_of, difference):
+def test_a_normal_that_turns_is_solved_again_too(problem_of, difference):
     problem, draw = problem_of(6, 0), np.random.default_rng(0).standard_normal
     recording, normals = draw(N), draw((2, 3))
     transient = normal_transient(stored_gains(problem, N), recording)

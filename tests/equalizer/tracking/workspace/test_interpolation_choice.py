@@ -35,7 +35,7 @@ def test_without_a_model_between_others_forces_are_blended(three):
     assert choice.at((0.03, 0.01, 0.0)).weights == pytest.approx((0.5, 0.5))
 
 
-def test_where_modes_do_not_match_forces_are_blended_and_the_reason_is_told(three):
+def test_where_modes_do_not_match_forces_are_blended_and_the_reason_is_reported(three):
     first, middle, last = three.models
     flipped = replace(last, C=last.C[[1, 2, 0]], B=last.B[:, [2, 0, 1]])
     choice = choose_interpolation(WorkspaceModels((first, middle, flipped)))

@@ -41,7 +41,7 @@ def test_the_order_in_which_models_are_given_does_not_matter(three):
     np.testing.assert_allclose(model_response(one, LINES), model_response(other, LINES), rtol=1e-6, atol=1e-6)
 
 
-def test_outside_the_nearest_place_is_used_and_that_is_said(three):
+def test_outside_the_nearest_place_is_used_and_reported(three):
     at = modal_interpolation(three).at((0.09, 0.01, 0.0))
     assert "30.0 mm outside" in at.remarks[0]
     edge = modal_interpolation(three).at((0.06, 0.01, 0.0)).models[0]
@@ -55,7 +55,7 @@ def test_devices_that_share_no_modes_are_refused_by_number(three):
         modal_interpolation(WorkspaceModels((first, middle, flipped)))
 
 
-def test_a_remainder_that_no_smooth_model_holds_is_told(three, monkeypatch):
+def test_a_remainder_that_no_smooth_model_holds_is_reported(three, monkeypatch):
     from equalizer.tracking.workspace import modal_interpolation as module
 
     monkeypatch.setattr(module, "REAL_POLES_PER_OCTAVE", 0.1)

@@ -50,7 +50,7 @@ def test_what_is_linear_in_the_place_is_interpolated_exactly(points):
     np.testing.assert_allclose(weights.smooth @ points, place, atol=1e-7)
 
 
-def test_outside_the_nearest_place_inside_is_used_and_that_is_said():
+def test_outside_the_nearest_place_inside_is_used_and_reported():
     outside = place_weights(LINE, (0.08, 0.01, 0.0))
     assert outside.linear.tolist() == pytest.approx([0, 1, 0], abs=1e-6)
     assert outside.outside_m == pytest.approx(0.02)

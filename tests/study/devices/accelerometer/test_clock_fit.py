@@ -44,6 +44,6 @@ def test_a_plain_regression_would_be_led_astray_by_stalls():
 
 
 @pytest.mark.parametrize("device_s", [[], [1.0], [1.0, 1.0], [2.0, 1.0]])
-def test_what_is_no_clock_is_refused(device_s):
+def test_device_times_that_do_not_rise_are_refused(device_s):
     with pytest.raises(ValueError, match="times that rise"):
         fit_clock(np.array(device_s), np.arange(len(device_s), dtype=float))

@@ -25,7 +25,7 @@ def test_the_check_sum_is_the_published_one():
     assert crc_of(np.frombuffer(b"123456789", dtype=np.uint8)[None]) == 0x29B1
 
 
-def test_whole_packets_come_out_as_they_went_in():
+def test_encoded_packets_are_decoded_unchanged():
     data, raw = stream(1000)
     parser = PacketParser()
     samples = parser.feed(data)
@@ -37,7 +37,7 @@ def test_whole_packets_come_out_as_they_went_in():
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(cuts=st.lists(st.integers(0, 100 * SIZE), max_size=40))
-def test_it_does_not_matter_where_the_bytes_are_torn(cuts):
+def test_packets_are_decoded_from_bytes_split_anywhere(cuts):
     data, raw = stream(100)
     parser, found = PacketParser(), []
     for start, stop in zip([0, *sorted(cuts)], [*sorted(cuts), len(data)], strict=True):
@@ -46,7 +46,7 @@ def test_it_does_not_matter_where_the_bytes_are_torn(cuts):
     assert parser.counts.spoiled_bytes == 0
 
 
-def test_numbers_and_times_go_on_where_their_bits_begin_anew():
+def test_counters_and_times_continue_after_an_overflow():
     numbers = 65_500 + np.arange(100)
     times_us = 2**32 - 5000 + 250 * np.arange(100)
     samples = PacketParser().feed(packed(numbers, times_us, np.zeros((100, 3))))
@@ -54,7 +54,7 @@ def test_numbers_and_times_go_on_where_their_bits_begin_anew():
     assert (np.diff(samples.time_us) == 250).all()
 
 
-def test_what_was_lost_is_counted():
+def test_lost_packets_are_counted():
     data, _ = stream(100)
     parser = PacketParser()
     parser.feed(data[: 10 * SIZE])
@@ -63,7 +63,7 @@ def test_what_was_lost_is_counted():
     assert (parser.counts.packets, parser.counts.restarts) == (57, 0)
 
 
-def test_a_firmware_that_begins_anew_is_counted_and_time_goes_on():
+def test_a_firmware_restart_is_counted_and_time_continues():
     parser = PacketParser()
     first = parser.feed(stream(50, first=5000)[0])
     second = parser.feed(stream(50)[0])
@@ -115,7 +115,7 @@ def test_a_million_bytes_of_noise_are_no_packets():
     assert parser.counts.spoiled_bytes > 10**6 - SIZE
 
 
-def test_a_packet_within_a_packet_that_is_right_by_chance_does_not_hide_the_real_one():
+def test_a_false_packet_inside_another_does_not_hide_the_real_one():
     """A false candidate ends in the real packet that follows a good one."""
     data, _ = stream(3)
     inner = bytearray(packed(77, 0, [[0, 0, 0]]))

@@ -85,7 +85,7 @@ def test_at_rest_it_reads_nothing_and_moved_it_reads_the_motion(board, sensor):
     assert sensor.latest()[1] is False
 
 
-def test_a_channel_at_its_limit_is_told(board, sensor):
+def test_a_channel_at_its_limit_is_reported(board, sensor):
     board.acceleration = np.array([100.0, 0.0, 0.0])
     assert within(5.0, lambda: sensor.latest()[1])
 
@@ -114,7 +114,7 @@ def test_every_rate_is_followed_and_what_is_lost_is_counted(rate_hz):
         assert counts.spoiled_bytes >= (SIZE - 1) * (counts.lost - 1)
 
 
-def test_a_line_on_which_nothing_comes_is_an_error_that_says_so():
+def test_a_silent_serial_line_is_an_error():
     master, slave = os.openpty()
     tty.setraw(slave)
     with contextlib.closing(SerialAccelerometer(open_serial(os.ttyname(slave), 115_200), IDEAL, (0, 65_535))) as sensor:
@@ -126,7 +126,7 @@ def test_a_line_on_which_nothing_comes_is_an_error_that_says_so():
     os.close(slave)
 
 
-def test_a_port_that_is_not_there_is_an_error_that_says_so(tmp_path):
+def test_a_missing_port_is_an_error(tmp_path):
     with pytest.raises(DeviceError, match="cannot be opened.*group dialout"):
         open_serial(str(tmp_path / "ttyACM7"), 115_200)
 

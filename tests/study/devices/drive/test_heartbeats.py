@@ -75,14 +75,14 @@ def real(bench) -> bool:
     return not bench.runner.catches_up
 
 
-def test_a_loop_that_is_a_little_late_is_left_alone(bench, rigs):
+def test_a_slightly_late_loop_is_not_stopped(bench, rigs):
     bench.hold(rigs)
     bench.clock.seconds += 0.9 * LATE_S
     bench.drive.check()
     assert bench.governor.fault is Fault.NONE
 
 
-def test_a_loop_that_hangs_is_given_up_where_the_world_does_not_wait(bench, rigs):
+def test_a_hanging_loop_of_a_real_device_is_given_up(bench, rigs):
     bench.hold(rigs)
     bench.clock.seconds += 1.1 * LATE_S
     bench.drive.check()
@@ -90,7 +90,7 @@ def test_a_loop_that_hangs_is_given_up_where_the_world_does_not_wait(bench, rigs
     assert (bench.runner.failure is not None) == real(bench)
 
 
-def test_a_process_that_stood_still_is_not_taken_for_a_lost_device(bench, rigs):
+def test_a_suspended_process_is_not_reported_as_a_lost_device(bench, rigs):
     bench.hold(rigs)
     bench.clock.seconds += 0.5
     bench.clock.while_asleep = lambda: bench.pump(bench.clock.seconds)
@@ -132,7 +132,7 @@ def test_a_loop_that_hangs_with_its_lock_is_given_up_at_the_next_start(bench, ri
     assert not bench.governor.moving
 
 
-def test_the_loop_leaves_a_zero_behind_when_it_ends(rigs):
+def test_the_loop_ends_with_a_zero_force(rigs):
     rig = rigs.HeldForceRig()
     with contextlib.closing(SafeDevice(rig, rigs.SETTINGS, RealClock())) as device:
         device.hold(rigs.push())
@@ -167,7 +167,7 @@ def test_a_tick_whose_work_ends_after_the_next_was_due_is_late(bench, rigs, take
 
 
 @only_real
-def test_ticks_that_were_missed_tell_how_late_the_first_of_them_was_made_good_for(bench, rigs):
+def test_missed_ticks_report_the_delay_of_the_first(bench, rigs):
     bench.hold(rigs)
     bench.pump(0.1052)
     health = bench.governor.health()
@@ -176,7 +176,7 @@ def test_ticks_that_were_missed_tell_how_late_the_first_of_them_was_made_good_fo
 
 
 @only_real
-def test_the_next_stimulus_counts_anew(bench, rigs):
+def test_counters_restart_with_each_stimulus(bench, rigs):
     bench.hold(rigs)
     slow_by(bench, 0.002)
     bench.pump(0.101)

@@ -77,7 +77,7 @@ def allow(monkeypatch):
     return settle
 
 
-def test_what_is_granted_lasts_as_long_as_the_loop_and_is_taken_back(allow):
+def test_real_time_priority_lasts_as_long_as_the_loop(allow):
     library, asked = allow(True, True)
     before_s = sys.getswitchinterval()
     with real_time_class() as granted:
@@ -88,7 +88,7 @@ def test_what_is_granted_lasts_as_long_as_the_loop_and_is_taken_back(allow):
 
 
 @pytest.mark.parametrize(("scheduled", "locked"), [(False, False), (True, False), (False, True)])
-def test_what_is_refused_is_a_warning_with_its_cure_and_hinders_nothing(allow, scheduled, locked):
+def test_a_refused_priority_is_a_warning_with_its_remedy(allow, scheduled, locked):
     allow(scheduled, locked)
     finding = real_time_finding()
     assert (finding.fine, finding.warning, finding.wrong) == (False, True, False)
@@ -97,13 +97,13 @@ def test_what_is_refused_is_a_warning_with_its_cure_and_hinders_nothing(allow, s
     assert ("swapped" in finding.value) == (not locked)
 
 
-def test_with_all_granted_it_is_fine(allow):
+def test_with_all_permissions_there_is_no_warning(allow):
     allow(True, True)
     assert real_time_finding().fine and real_time_finding().advice == ""
 
 
 @pytest.mark.parametrize("first_begun_ends_first", [True, False])
-def test_two_that_overlap_keep_it_until_the_later_end(allow, first_begun_ends_first):
+def test_overlapping_loops_keep_the_priority_until_the_later_end(allow, first_begun_ends_first):
     library, _ = allow(True, True)
     before_s = sys.getswitchinterval()
     begun = [real_time_class(), real_time_class()]
@@ -117,7 +117,7 @@ def test_two_that_overlap_keep_it_until_the_later_end(allow, first_begun_ends_fi
 
 
 @pytest.mark.parametrize("granted_again", [True, False])
-def test_a_look_at_the_priority_takes_nothing_from_a_loop_that_runs(allow, granted_again):
+def test_querying_the_priority_does_not_change_a_running_loop(allow, granted_again):
     library, _ = allow(True, True)
     with real_time_class():
         library.allowed = granted_again
@@ -127,7 +127,7 @@ def test_a_look_at_the_priority_takes_nothing_from_a_loop_that_runs(allow, grant
 
 
 @pytest.mark.parametrize(("limit", "flags"), [(-1, 1 | 2 | 4), (2**20, 1 | 4)], ids=["without limit", "limited"])
-def test_memory_of_later_is_locked_only_where_no_limit_could_refuse_it(allow, monkeypatch, limit, flags):
+def test_future_memory_is_locked_only_without_a_memory_limit(allow, monkeypatch, limit, flags):
     resource = pytest.importorskip("resource")
     monkeypatch.setattr(resource, "getrlimit", lambda which: {resource.RLIMIT_MEMLOCK: (limit, -1)}[which])
     library, _ = allow(True, True)
@@ -136,7 +136,7 @@ def test_memory_of_later_is_locked_only_where_no_limit_could_refuse_it(allow, mo
 
 
 @pytest.mark.parametrize("scheduled", [True, False])
-def test_a_computer_that_leaves_other_threads_nothing_is_a_warning(allow, as_linux_comes, scheduled):
+def test_unlimited_real_time_runtime_of_the_kernel_is_a_warning(allow, as_linux_comes, scheduled):
     allow(scheduled, True)
     as_linux_comes.write_text("-1\n")
     finding = real_time_finding()
@@ -146,7 +146,7 @@ def test_a_computer_that_leaves_other_threads_nothing_is_a_warning(allow, as_lin
     assert real_time_finding().fine == scheduled
 
 
-def test_an_error_within_takes_all_back_too(allow):
+def test_an_error_inside_restores_the_priority(allow):
     library, _ = allow(True, True)
     with pytest.raises(OSError, match="usb"), real_time_class():
         raise OSError("usb")
@@ -154,7 +154,7 @@ def test_an_error_within_takes_all_back_too(allow):
 
 
 @linux
-def test_only_the_thread_that_asks_is_put_first():
+def test_only_the_calling_thread_gets_the_priority():
     """As this system really grants it, or not: then nothing changed."""
     found: list[tuple[bool, int]] = []
 
@@ -188,7 +188,7 @@ def test_on_windows_sleeps_are_made_finer_and_the_thread_comes_first(monkeypatch
     assert ended == ([1] if fine_sleep else [])
 
 
-def test_another_system_offers_nothing_and_says_so(monkeypatch):
+def test_another_operating_system_is_reported_as_offering_no_priority(monkeypatch):
     monkeypatch.setattr(module.platform, "system", lambda: "Darwin")
     monkeypatch.delattr(module.ctypes, "windll", raising=False)
     assert real_time_finding().advice == "This system offers none: close other programs."

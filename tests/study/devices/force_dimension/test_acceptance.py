@@ -36,7 +36,7 @@ def refused(rigs) -> str:
     return no.value.happened
 
 
-def test_what_was_never_accepted_opens_for_no_hand(locked, rigs):
+def test_a_device_without_an_acceptance_record_opens_for_no_hand(locked, rigs):
     assert "There is no acceptance of it" in refused(rigs)
     assert locked.safe and locked.get("opened") == 0
     with contextlib.closing(open_device("omega3", replace(rigs.SETTINGS, hand_on_handle=False), RealClock(), 1)):
@@ -51,12 +51,12 @@ def test_what_was_never_accepted_opens_for_no_hand(locked, rigs):
         ("serial 4242, firmware 2.41, SDK 3.16.1.0", "SDK 3.16.1.0"),
     ],
 )
-def test_another_device_firmware_or_library_voids_it(stub, vendor, rigs, details, said):
+def test_another_device_firmware_or_library_voids_the_acceptance(stub, vendor, rigs, details, said):
     vendor.accept("omega.3", details=details)
     assert f"Another was accepted (omega.3, {details})" in refused(rigs) and said in details
 
 
-def test_it_expires_and_does_not_begin_in_the_future(stub, vendor, rigs):
+def test_an_acceptance_expires_and_must_not_be_dated_in_the_future(stub, vendor, rigs):
     vendor.accept("omega.3", on=(TODAY - VALID_FOR).isoformat())
     open_for_a_hand(rigs)
     for day in (TODAY - VALID_FOR - timedelta(days=1), TODAY + timedelta(days=2)):
@@ -97,7 +97,7 @@ def test_a_device_that_lets_go_under_force_is_accepted_and_then_opens(locked, pa
 
 
 @pytest.mark.real_time
-def test_a_device_whose_force_stays_is_not(locked, patient, rigs, monkeypatch):
+def test_a_device_whose_force_stays_on_is_not_accepted(locked, patient, rigs, monkeypatch):
     """Its watchdog passes the proof at opening, and fails under force."""
     prove = force_proof.prove_force_goes
 
@@ -113,7 +113,7 @@ def test_a_device_whose_force_stays_is_not(locked, patient, rigs, monkeypatch):
 
 
 @pytest.mark.parametrize("arguments", [["--timing", "0"], ["--timing", "0.1"]])
-def test_without_timing_or_with_something_wrong_nothing_is_signed(locked, tmp_path, monkeypatch, arguments):
+def test_without_timing_or_after_a_failed_check_no_acceptance_is_written(locked, tmp_path, monkeypatch, arguments):
     if arguments[1] != "0":
         locked.set("powered", 0)
     called: list[str] = []

@@ -32,7 +32,7 @@ def refused(opened, name: str = "omega3", hand: bool = True) -> str:
 
 
 @pytest.mark.real_time
-def test_it_opens_says_what_it_is_and_ends_braked(stub, opened, rigs):
+def test_an_opened_device_states_its_identity_and_closes_with_brakes_on(stub, opened, rigs):
     with opened() as device:
         assert (device.info.name, device.info.simulated, device.info.sample_rate_hz) == ("omega.3", False, 1000.0)
         assert device.info.details == "serial 4242, firmware 2.41, SDK 3.17.5.0"
@@ -106,7 +106,7 @@ def test_a_library_without_a_function_is_too_old(another, vendor, opened, tmp_pa
         ({"watchdog_settable": 0}, "no watchdog of its own"),
     ],
 )
-def test_what_hinders_it_is_said_and_it_is_left_braked(stub, opened, switches, said):
+def test_a_failed_opening_names_the_cause_and_leaves_the_brakes_on(stub, opened, switches, said):
     for name, value in switches.items():
         stub.set(name, value)
     assert said in refused(opened)

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[4]
 PAGE = (ROOT / "docs" / "hardware.md").read_text("utf-8")
 
 
-def test_the_tests_that_it_names_exist():
+def test_the_tests_named_in_the_hardware_page_exist():
     named = set(re.findall(r"`(?:[\w/]*/)?(test_\w+)(?:\.py)?`", PAGE))
     assert len(named) >= 10
     sources = {path: path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py")}

@@ -29,12 +29,12 @@ def laid(path: Path) -> Path:
     ],
 )
 @pytest.mark.parametrize("variable", ["FDSDK", "FORCEDIM_SDK"])
-def test_it_is_found_in_the_sdk_that_a_variable_names(tmp_path, system, machine, file, variable):
+def test_the_library_is_found_in_the_sdk_named_by_a_variable(tmp_path, system, machine, file, variable):
     path = laid(tmp_path / "sdk" / file)
     assert find_library(computer(tmp_path, system, machine, **{variable: str(tmp_path / "sdk")})) == path
 
 
-def test_it_is_found_in_the_home_folder_and_below_program_files(tmp_path):
+def test_the_library_is_found_in_the_home_folder_and_below_program_files(tmp_path):
     path = laid(tmp_path / "home" / ".local" / "lib" / "libdrd.so.3")
     assert find_library(computer(tmp_path)) == path
     laid(tmp_path / "programs" / "Force Dimension" / "sdk-3.16.1" / "bin" / "drd64.dll")
@@ -42,13 +42,13 @@ def test_it_is_found_in_the_home_folder_and_below_program_files(tmp_path):
     assert find_library(computer(tmp_path, "win32", ProgramFiles=str(tmp_path / "programs"))) == newer
 
 
-def test_the_newest_is_taken_and_libdrd_before_libdhd(tmp_path):
+def test_the_newest_library_is_taken_and_libdrd_before_libdhd(tmp_path):
     for name in ("libdhd.so.3.20.0", "libdrd.so.3.9.0", "libdrd.so.3.17.5"):
         laid(tmp_path / "sdk" / "lib" / name)
     assert find_library(computer(tmp_path, FDSDK=str(tmp_path / "sdk"))) == tmp_path / "sdk/lib/libdrd.so.3.17.5"
 
 
-def test_nothing_is_found_where_nothing_is(tmp_path):
+def test_without_a_library_none_is_found(tmp_path):
     laid(tmp_path / "sdk" / "lib" / "libdrd.dylib")  # of another system
     assert find_library(computer(tmp_path, FDSDK=str(tmp_path / "sdk"))) is None
 

@@ -155,9 +155,7 @@ WAYS = (killed, stopped, stalled, blinded)
 
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("times", [8, pytest.param(200, marks=pytest.mark.slow)])
-def test_whenever_and_however_a_program_ends_the_force_is_off_and_never_was_above_the_cap(
-    surviving_stub, nursery, times
-):
+def test_after_any_end_of_a_program_the_force_is_off_and_stayed_below_the_cap(surviving_stub, nursery, times):
     draw, stub, done = np.random.default_rng(18), surviving_stub, dict.fromkeys(WAYS, 0)
     for attempt in range(3 * times):
         child = nursery()

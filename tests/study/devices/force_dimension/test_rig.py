@@ -51,7 +51,7 @@ def test_a_force_arrives_as_it_was_asked_for(stepped_stub, rig):
 
 
 @pytest.mark.parametrize("asked", [(4.6, 0, 0), (3, 3, 3), (np.nan, 0, 0), (0, np.inf, 0), (1e300, 1e300, 0)])
-def test_what_is_above_the_cap_or_no_number_is_never_sent(stepped_stub, rig, asked):
+def test_forces_above_the_cap_or_not_finite_are_never_sent(stepped_stub, rig, asked):
     rig.write(force(1.0, 0.0, 0.0))
     with pytest.raises(DeviceError, match="refused; at most 4.5 N"):
         rig.write(force(*asked))
@@ -68,7 +68,7 @@ def test_the_library_knows_the_cap_too(stepped_stub, rig):
     assert stepped_stub.applied_n[0] == pytest.approx(CAP_N)
 
 
-def test_a_reading_that_repeats_the_last_is_taken_and_many_of_them_are_an_end(stepped_stub, rig):
+def test_a_repeated_reading_is_accepted_and_many_in_a_row_end_the_force(stepped_stub, rig):
     stepped_stub.set("stale_every", 2)
     for _ in range(4 * STALE_FOR):
         rig.sense()
@@ -78,7 +78,7 @@ def test_a_reading_that_repeats_the_last_is_taken_and_many_of_them_are_an_end(st
             rig.sense()
 
 
-def test_a_force_that_was_scaled_down_for_a_moment_is_taken_and_for_longer_is_an_end(stepped_stub, rig):
+def test_a_briefly_scaled_force_is_accepted_and_a_long_one_ends_the_force(stepped_stub, rig):
     for k in range(20):
         stepped_stub.set("scaled_from_n", 0.5 if k % 4 else 1e9)
         rig.write(force(1.0, 0.0, 0.0))
@@ -90,7 +90,7 @@ def test_a_force_that_was_scaled_down_for_a_moment_is_taken_and_for_longer_is_an
     assert not stepped_stub.applied_n.any()
 
 
-def test_a_device_that_let_go_in_the_middle_of_a_force_is_an_end_that_says_why(stepped_stub, rig):
+def test_a_device_that_releases_during_a_force_ends_it_with_the_reason(stepped_stub, rig):
     rig.write(force(1.0, 0.0, 0.0))
     stepped_stub.set("off_by", 2)
     stepped_stub.advance(0.001)
@@ -113,7 +113,7 @@ def test_after_a_silence_without_force_the_device_is_woken(stub):
         assert stub.applied_n.any() or stub.get("force_on")
 
 
-def test_after_a_silence_with_a_force_it_is_not(stub):
+def test_after_a_silence_with_a_force_the_device_is_not_woken(stub):
     with contextlib.closing(stub.rig()) as rig:
         rig.write(force(0.5, 0.0, 0.0))
         time.sleep(0.1)
@@ -123,7 +123,7 @@ def test_after_a_silence_with_a_force_it_is_not(stub):
         assert stub.safe
 
 
-def test_a_zero_after_a_force_that_was_cut_off_does_not_wake_it_either(stub):
+def test_a_zero_after_a_cut_off_force_does_not_wake_the_device(stub):
     """The call that was to hold the force may hang still: it must not find a device that takes forces again."""
     with contextlib.closing(stub.rig(rests=True)) as rig:
         rig.write(force(0.5, 0.0, 0.0))

@@ -56,7 +56,7 @@ def test_a_device_that_lets_go_in_time_is_proved_and_then_takes_forces_again(ste
         ({"off_by": 1}, "does not keep taking forces: a button"),
     ],
 )
-def test_another_is_not(stepped_stub, handle, switches, said):
+def test_a_device_that_does_not_let_go_in_time_is_not_proved(stepped_stub, handle, switches, said):
     for name, value in switches.items():
         stepped_stub.set(name, value)
     if "force_enables" in switches:

@@ -140,7 +140,7 @@ def test_a_quick_handle_is_slowed_down_to_the_slew_limit_and_counted(rigs):
 
 
 @pytest.mark.parametrize("cap", [math.nan, -1.0, 0.0])
-def test_a_cap_that_is_no_cap_means_no_force(bench, rigs, cap):
+def test_a_cap_that_is_not_positive_means_no_force(bench, rigs, cap):
     bench.governor.settings[govern.TOTAL_CAP] = cap
     assert not bench.hold(rigs.sine(3.0), 300).any()
 

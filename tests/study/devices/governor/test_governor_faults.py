@@ -25,7 +25,7 @@ BEYOND = {
 
 @pytest.mark.parametrize("fault", BEYOND)
 @pytest.mark.parametrize("played", [False, True])
-def test_a_position_that_no_handle_has_lets_go_and_stays_so(bench, rigs, fault, played):
+def test_an_impossible_position_releases_the_handle_for_good(bench, rigs, fault, played):
     """Within `release_s` of the reading that shows it, for a held stimulus and for commands."""
     if played:
         bench.governor.begin_play(rigs.force(np.tile(rigs.sine(2.0).loop.samples, (10, 1))))
@@ -72,7 +72,7 @@ def test_the_spring_gives_way_to_a_position_that_stands_still_before_it_is_stale
 
 
 @pytest.mark.parametrize(("amplitude_n", "x"), [(0.0, 0.0), (0.3, 0.0), (0.4, 0.003), (0.0, -0.003)])
-def test_a_hand_at_rest_is_not_stale(rigs, amplitude_n, x):
+def test_a_hand_at_rest_is_not_taken_for_frozen_encoders(rigs, amplitude_n, x):
     """Tiny forces, with a pull that friction holds: encoders may say the same for a minute."""
     bench = Bench(rigs, replace(rigs.SETTINGS, limits=replace(rigs.LIMITS, longest_hold_s=120.0)))
     bench.rig.parameters[0] = 1e12
@@ -81,7 +81,7 @@ def test_a_hand_at_rest_is_not_stale(rigs, amplitude_n, x):
     assert bench.health().fault is Fault.NONE
 
 
-def test_a_fault_of_the_encoders_is_over_with_the_next_stimulus(bench, rigs):
+def test_an_encoder_fault_is_cleared_by_the_next_stimulus(bench, rigs):
     bench.hold(rigs.sine(1.0), 300)
     bench.lean(0.02, 0.0, 0.0)
     bench.go_on(100)
@@ -91,7 +91,7 @@ def test_a_fault_of_the_encoders_is_over_with_the_next_stimulus(bench, rigs):
 
 
 @pytest.mark.parametrize("nonsense", [math.nan, math.inf, -math.inf, 0.51, -100.0, 1e308])
-def test_a_position_where_no_handle_can_be_lets_go_within_the_release(bench, rigs, nonsense):
+def test_a_position_outside_the_workspace_releases_within_the_release_time(bench, rigs, nonsense):
     bench.hold(rigs.sine(3.0, 45), 408)
     bench.lean(0.0, nonsense, 0.0)
     forces = bench.go_on(100)
@@ -101,7 +101,7 @@ def test_a_position_where_no_handle_can_be_lets_go_within_the_release(bench, rig
 
 
 @pytest.mark.parametrize("nonsense", [math.nan, math.inf, -1e300])
-def test_a_stimulus_that_is_no_number_lets_go(bench, rigs, nonsense):
+def test_a_stimulus_that_is_not_finite_releases_the_handle(bench, rigs, nonsense):
     loop = np.tile([1.0, 0.0, 0.0], (300, 1))
     loop[250, 1] = nonsense
     forces = bench.hold(replace(rigs.sine(), loop=rigs.force(loop)), 400)
@@ -149,7 +149,7 @@ def test_a_safety_release_needs_no_sensor_and_goes_straight_to_zero(bench, rigs)
     assert bench.health().fault is Fault.NONE
 
 
-def test_what_a_slow_slew_limit_holds_up_is_let_go_at_the_end_of_the_fade(rigs):
+def test_a_force_delayed_by_the_slew_limit_is_zero_at_the_end_of_the_fade(rigs):
     bench = Bench(rigs, replace(rigs.SETTINGS, limits=replace(rigs.LIMITS, slew_n_per_s=5.0)))
     bench.lean(0.0, 0.3, 0.0)
     bench.hold(rigs.sine(0.0, fade_s=0.05), 1000)

@@ -33,14 +33,14 @@ def fuzz(lying, ticks: int, first_seed: int) -> Counter:
     return met
 
 
-def test_lying_encoders_and_late_ticks_never_get_a_force_past_the_judge(lying):
+def test_false_readings_and_late_ticks_never_exceed_the_force_limits(lying):
     met = fuzz(lying, 400_000, first_seed=0)
     assert {fault for _, fault in met} >= ENCODERS | {Fault.NONE, Fault.STALLED}
     assert {lie for lie, _ in met} >= set(lying.LIES)
 
 
 @pytest.mark.slow
-def test_ten_million_ticks_of_lying_encoders(lying):
+def test_ten_million_ticks_of_false_readings_never_exceed_the_force_limits(lying):
     fuzz(lying, 10_000_000, first_seed=1_000_000)
 
 

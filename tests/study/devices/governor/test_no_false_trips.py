@@ -80,7 +80,7 @@ def play_all(rigs, ticks: int, seconds: float) -> int:
 
 
 @pytest.mark.parametrize(("lean_m", "frequency_hz", "level_n"), [(0.006, 10, 0.0), (0.0099, 40, 0.1), (0.02, 10, 0.0)])
-def test_a_hand_that_leans_on_the_spring_and_rests_is_believed(rigs, lean_m, frequency_hz, level_n):
+def test_a_hand_resting_on_the_spring_raises_no_fault(rigs, lean_m, frequency_hz, level_n):
     """Dry friction holds it: the encoders say the same for seconds, while the spring pulls with up to 1.5 N."""
     limits = replace(rigs.LIMITS, longest_hold_s=60.0, watchdog_s=5.0)
     rig = RIGS_BY_NAME["simulated"](replace(rigs.SETTINGS, place_m=(lean_m, 0.0, 0.0)), 3)
@@ -95,10 +95,10 @@ def test_a_hand_that_leans_on_the_spring_and_rests_is_believed(rigs, lean_m, fre
     assert governor.moving
 
 
-def test_no_honest_reading_ends_a_trial(rigs):
+def test_no_valid_reading_ends_a_trial(rigs):
     assert play_all(rigs, 200_000, seconds=1.0) >= len(FREQUENCIES_HZ) * len(LEVELS_N)
 
 
 @pytest.mark.slow
-def test_no_honest_reading_ends_a_trial_in_ten_million_ticks(rigs):
+def test_no_valid_reading_ends_a_trial_in_ten_million_ticks(rigs):
     assert play_all(rigs, 10_000_000, seconds=8.0) >= 5 * len(FREQUENCIES_HZ) * len(LEVELS_N)

@@ -16,7 +16,7 @@ from tests.study.devices.hung_driver.patience import alive, hold, wait_until
 pytestmark = pytest.mark.real_time
 
 
-def test_writes_that_fail_for_good_are_not_called_a_force_that_is_off(device, rigs, rig):
+def test_failing_writes_are_not_reported_as_force_off(device, rigs, rig):
     def fail(force_n) -> None:
         raise OSError("usb")
 
@@ -47,7 +47,7 @@ def test_a_final_zero_that_fails_does_not_close_a_trial_without_fault(rigs, rig,
 
 
 @pytest.mark.parametrize("clock", [VirtualClock(), RealClock()], ids=["virtual", "real"])
-def test_a_zero_that_fails_while_the_force_fades_leaves_it_on_and_says_so(rigs, rig, clock):
+def test_a_zero_that_fails_while_the_force_fades_leaves_it_on_and_reports_it(rigs, rig, clock):
     def fail_at_zero(force_n) -> None:
         if not force_n.any():
             raise OSError("usb")
@@ -108,7 +108,7 @@ def test_a_loop_that_is_dead_plays_nothing(rigs, kind):
 
 
 @pytest.mark.parametrize("kind", ["HeldForceRig", "compiled_rig"])
-def test_a_loop_that_dies_without_a_word_is_found_by_its_callers(rigs, kind):
+def test_callers_detect_a_loop_that_died_silently(rigs, kind):
     with contextlib.closing(SafeDevice(getattr(rigs, kind)(), rigs.SETTINGS, RealClock())) as device:
         device.hold(rigs.push())
         device._drive._thread = threading.Thread()  # never started, so not alive

@@ -102,7 +102,7 @@ def test_a_late_write_of_a_device_that_is_still_open_is_taken_back_too(device, r
     assert rig.closed == 0
 
 
-def test_a_driver_that_comes_back_and_takes_no_zero_is_worse_than_lost(device, rigs, rig, hang):
+def test_a_returning_driver_that_refuses_zero_is_not_reported_as_force_off(device, rigs, rig, hang):
     def fail(force_n) -> None:
         raise OSError("usb")
 

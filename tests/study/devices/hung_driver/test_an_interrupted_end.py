@@ -34,7 +34,7 @@ class ImpatientClock(RealClock):
         super().sleep(seconds)
 
 
-def test_a_close_that_is_interrupted_turns_the_force_off_and_can_be_made_good_for(rigs, rig):
+def test_an_interrupted_close_turns_the_force_off_and_can_be_repeated(rigs, rig):
     clock = ImpatientClock()
     device = SafeDevice(rig, rigs.SETTINGS, clock)
     hold(device, rigs, rig)

@@ -67,7 +67,7 @@ def test_no_force_changes_what_is_replayed(rigs, commands, file):
     np.testing.assert_array_equal(usual.response.samples, without_spring.response.samples)
 
 
-def test_a_held_stimulus_goes_on_without_a_seam(rigs, file):
+def test_a_held_stimulus_continues_without_a_seam(rigs, file):
     clock = VirtualClock()
     with contextlib.closing(open_device(f"replay:{file}", rigs.SETTINGS, clock, seed=1)) as device:
         device.hold(rigs.sine(1.0, 25))
@@ -84,7 +84,7 @@ def test_a_held_stimulus_goes_on_without_a_seam(rigs, file):
     assert np.std(accelerations[:, 2]) > 1.0
 
 
-def test_a_stretch_of_the_whole_recording_has_nothing_to_go_over_into_and_plays_all_the_same(rigs, commands, tmp_path):
+def test_a_stretch_of_the_whole_recording_plays_without_a_crossfade(rigs, commands, tmp_path):
     (only,) = played_on("simulated", rigs, [commands[0][:200]])
     write_recording(tmp_path / "short.h5", only)
     clock = VirtualClock()
@@ -108,7 +108,7 @@ def test_a_recorded_protocol_recorded_again_is_the_same_recording(tmp_path, caps
     assert again.device == "replay of simulated omega.3"
 
 
-def test_a_simulated_participant_takes_a_study_on_it(rigs, file, small_text, tmp_path, capsys):
+def test_a_simulated_participant_takes_a_study_on_a_replayed_device(rigs, file, small_text, tmp_path, capsys):
     protocol = tmp_path / "short.toml"
     protocol.write_text(small_text)
     data = ["--data", str(tmp_path / "data"), "--observer", "ideal", "--seed", "5"]
@@ -120,7 +120,7 @@ def test_a_simulated_participant_takes_a_study_on_it(rigs, file, small_text, tmp
     assert not any("void" in row for row in rows[1:])
 
 
-def test_doctor_looks_at_it(file, capsys):
+def test_doctor_checks_a_replayed_device(file, capsys):
     assert main(["doctor", "--device", f"replay:{file}"]) in (0, 1)
     said = capsys.readouterr()
     assert "replay of simulated omega.3" in said.out + said.err
@@ -140,7 +140,7 @@ def without(name: str, recording: Recording) -> Recording:
 @pytest.mark.parametrize(
     ("name", "says"), [("position", "no position"), ("response", "no acceleration"), ("command", "no force")]
 )
-def test_what_cannot_be_replayed_is_said(rigs, originals, tmp_path, name, says):
+def test_a_recording_that_cannot_be_replayed_is_refused_with_the_reason(rigs, originals, tmp_path, name, says):
     write_recording(tmp_path / "lab.h5", without(name, originals[0]))
     with pytest.raises(DeviceError, match=f"lab.h5 has {says}"):
         open_device(f"replay:{tmp_path / 'lab.h5'}", rigs.SETTINGS, VirtualClock(), seed=1)

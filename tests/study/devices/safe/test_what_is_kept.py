@@ -72,7 +72,7 @@ def test_a_loop_longer_than_what_is_kept_leaves_its_last_part(device, clock, rig
     assert len(device.release().recording) == 500
 
 
-def test_what_never_became_steady_has_no_recording(device, clock, rigs):
+def test_a_stimulus_that_never_became_steady_has_no_recording(device, clock, rigs):
     device.hold(rigs.sine(1.0, fade_s=0.3))
     feel(device, clock, 0.4)
     played = device.release()
@@ -113,7 +113,7 @@ def test_compiled_and_stepped_rigs_are_driven_bit_for_bit_alike(rigs):
             assert (getattr(each, name).samples == getattr(other, name).samples).all()
 
 
-def test_sleeping_in_other_portions_changes_nothing(rigs):
+def test_recordings_do_not_depend_on_how_sleep_is_divided(rigs):
     results = []
     for nap in (0.001, 0.0173, 0.25):
         clock, rig = VirtualClock(), rigs.compiled_rig()

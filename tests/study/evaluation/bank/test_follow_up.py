@@ -88,7 +88,7 @@ def test_both_cases_are_told_nothing_of_which_is_which(followed):
         assert {path.name for path in place.iterdir()} == {ANSWER, MODEL, "settings.json"}  # recordings are forgotten
 
 
-def test_the_same_call_goes_on_without_doing_anything_twice(followed):
+def test_the_same_call_continues_without_doing_anything_twice(followed):
     folder, outcome, _, found, _ = followed
     before = {path: path.stat().st_mtime_ns for path in (folder.path / NEXT).rglob("*") if path.is_file()}
     assert follow_up(folder, PLAN, (outcome,), (2, False), lambda done, of: None) == found
@@ -114,7 +114,7 @@ def test_a_start_with_one_name_is_not_taken_up_again(tmp_path):
     assert follow_up(folder, PLAN, (alone,), (1, False), lambda done, of: None) == ()
 
 
-def test_a_device_that_cannot_be_drawn_again_is_said(tmp_path):
+def test_a_device_that_cannot_be_drawn_again_is_reported(tmp_path):
     folder, outcome, _ = started(tmp_path / "bank", True)
     path = folder.label(NUMBER)
     path.write_text(json.dumps(json.loads(path.read_text()) | {"recording_sha256": "0" * 64}))

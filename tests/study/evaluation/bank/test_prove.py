@@ -88,7 +88,7 @@ def test_the_process_that_answers_reaches_no_label(proof, does, refused):
     assert refused in done.stderr
 
 
-def test_the_same_command_goes_on_without_doing_anything_twice(proof):
+def test_the_same_command_continues_without_doing_anything_twice(proof):
     folder, seen = proof[0].folder, []
     before = {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")}
     again = prove(folder.path, PLAN, BankOptions(), lambda what, done, of: seen.append((what, done, of)))

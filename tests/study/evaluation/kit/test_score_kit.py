@@ -105,7 +105,7 @@ def test_a_table_that_was_changed_since_is_refused(tmp_path: Path) -> None:
     assert f"labels.csv.sha256 says {digest}" in changed.value.happened
 
 
-def test_a_table_that_was_sealed_anew_does_not_fit_the_hash_that_was_handed_over(tmp_path: Path) -> None:
+def test_a_table_that_was_sealed_again_does_not_fit_the_hash_that_was_handed_over(tmp_path: Path) -> None:
     table = labels_in(tmp_path)
     handed_over = seal_labels(table)
     folder = answered(tmp_path / "d", {"rec_01": diagnosis("added_mass")})

@@ -102,7 +102,7 @@ def test_an_old_answer_is_not_reused_after_a_change_of_any_file(answered: RealPl
     assert "kept as they are" in error.saved
 
 
-def test_a_file_that_came_or_went_is_said(answered: RealPlan) -> None:
+def test_a_file_that_came_or_went_is_reported(answered: RealPlan) -> None:
     axis = answered.folder / "axis"
     (axis / "later.toml").write_text((axis / "later.toml").read_text().replace("later", "third"))
     (axis / "later.npz").rename(axis / "third.npz")
@@ -111,7 +111,7 @@ def test_a_file_that_came_or_went_is_said(answered: RealPlan) -> None:
     assert "third.npz is not among what it says it was made from" in said
 
 
-def test_other_seconds_are_said(answered: RealPlan) -> None:
+def test_other_seconds_are_reported(answered: RealPlan) -> None:
     error = refusal(RealPlan(answered.folder, answered.out, seconds=180.0))
     assert error.happened == "axis/run/answer.json: --seconds was 20, and is 180."
 
@@ -150,7 +150,7 @@ def test_a_torn_answer_is_named_by_its_folder(answered: RealPlan, torn: str) -> 
     assert "pydantic" not in str(error)
 
 
-def test_moved_away_it_is_answered_anew(answered: RealPlan) -> None:
+def test_moved_away_it_is_answered_again(answered: RealPlan) -> None:
     (answered.folder / "axis" / "run.npz").write_bytes(b"another")
     kept(answered).parent.rename(answered.out.parent / "old")
     assert len(diagnose_folder(answered, silent).results.answers) == 1

@@ -100,7 +100,7 @@ def silent(what: str, share: float) -> None:
     return None
 
 
-def test_one_recording_is_answered_and_the_others_are_said(folder: Path, tmp_path: Path) -> None:
+def test_one_recording_is_answered_and_the_others_are_reported(folder: Path, tmp_path: Path) -> None:
     done = diagnose_folder(RealPlan(folder, tmp_path / "out"), silent)
     axis, torn = done.results.answers
     assert axis.effects == ("sensor_offset",)
@@ -172,7 +172,7 @@ def test_which_way_a_command_is_counted_is_decided_once_for_the_tests_too(tmp_pa
         assert read_mechanical_model(tmp_path / "out" / "spring" / "run" / name).input[0, 0] == -1
 
 
-def test_a_recording_at_which_the_program_crashes_is_said_and_the_others_are_answered(
+def test_a_recording_at_which_the_program_crashes_is_reported_and_the_others_are_answered(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def crash(wanted: object, *more: object) -> object:
@@ -188,7 +188,7 @@ def test_a_recording_at_which_the_program_crashes_is_said_and_the_others_are_ans
     assert "ZeroDivisionError" in done.page.read_text()
 
 
-def test_interrupted_the_same_command_goes_on(folder: Path, tmp_path: Path) -> None:
+def test_interrupted_the_same_command_continues(folder: Path, tmp_path: Path) -> None:
     def leave(what: str, share: float) -> None:
         if what.startswith("torn"):
             raise KeyboardInterrupt

@@ -157,7 +157,7 @@ def test_another_seed_in_the_same_folder_is_refused(written, plan):
         reproduce_paper(other, lambda share: None)
 
 
-def test_interrupted_it_says_that_the_same_command_goes_on(plan, tmp_path):
+def test_interrupted_it_says_that_the_same_command_continues(plan, tmp_path):
     stopped = ReproductionPlan(tmp_path, 2, 3, 2, plan.protocols, order=8, period_s=2.0)
 
     def stop(share: float) -> None:

@@ -68,7 +68,7 @@ _COMMA = (
         ("t,u\nabc,def\n0,x\n", {}, "Line 2, column 't': 'abc' is not a number."),
     ],
 )
-def test_what_is_wrong_with_a_table_is_said_with_its_line(tmp_path, text, settings, sentence):
+def test_what_is_wrong_with_a_table_is_reported_with_its_line(tmp_path, text, settings, sentence):
     with pytest.raises(ImportRefusedError) as refused:
         read(written(tmp_path, text), **settings)
     assert refused.value.happened == sentence
@@ -128,6 +128,6 @@ def test_a_file_with_no_arrays_is_refused(tmp_path):
         read(tmp_path / "a.h5")
 
 
-def test_a_file_that_is_not_there_is_said(tmp_path):
+def test_a_file_that_is_not_there_is_reported(tmp_path):
     with pytest.raises(CannotReadError, match="There is no file"):
         read(tmp_path / "a.npz")

@@ -76,7 +76,7 @@ def test_a_map_is_known_by_its_channels():
         ),
     ],
 )
-def test_what_is_wrong_with_a_map_is_said_by_key(old, new, problem):
+def test_what_is_wrong_with_a_map_is_reported_by_key(old, new, problem):
     assert any(problem in found for found in problems(SOUND.replace(old, new, 1)))
 
 
@@ -101,5 +101,5 @@ def test_what_is_wrong_with_a_map_is_said_by_key(old, new, problem):
         ('[[segment]]\nkind = "loud"', 'segment[1].kind is "loud"; it must be "multisine", "sweep"'),
     ],
 )
-def test_what_contradicts_itself_is_said(more, problem):
+def test_what_contradicts_itself_is_reported(more, problem):
     assert any(problem in found for found in problems(f"{SOUND}\n{more}\n"))

@@ -109,7 +109,7 @@ def test_nothing_about_health_is_in_the_words(form):
     assert "question_1" not in said
 
 
-def test_the_direction_is_told_once_the_answer_counts():
+def test_the_direction_is_reported_once_the_answer_counts():
     (_, presented, answer, _) = log_in_words((PRESENTED, ANSWER, MEASURED))
     assert presented == "09:30:12  Run 2, trial 5 (test): direction 2, 1.000 N at 35 Hz."
     assert answer == "09:30:12  Answer 2 after 1.23 s: right."

@@ -157,7 +157,7 @@ def test_small_corrections_of_the_clock_are_not_worth_a_word():
         (-600.0, "The computer's clock was set back by 10 min."),
     ],
 )
-def test_a_step_is_said_in_words(by_s, said):
+def test_a_step_is_reported_in_words(by_s, said):
     sentence = ClockStep("", by_s, between_sittings=False).sentence
     assert sentence == f"{said} Time limits and the vibration dose do not follow it; the times in the log do."
 

@@ -108,7 +108,7 @@ def test_answers_about_health_are_not_kept(full):
     assert outcome.kept == {}
 
 
-def test_a_set_up_that_is_not_the_protocols_is_said(full):
+def test_a_set_up_that_is_not_the_protocols_is_reported(full):
     answers = {"hearing": "nothing", "hand_hidden": "no", "arm_supported": "yes", "grip": "pen grip", "hand": "right"}
     outcome = judge_form(full, FormKind.SETUP, FormReply(answers))
     assert outcome.passed

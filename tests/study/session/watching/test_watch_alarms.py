@@ -100,13 +100,13 @@ def test_three_void_trials_of_ten_are_an_alarm(story):
 
 
 @pytest.mark.parametrize(("minutes", "kind", "urgent"), [(97, "time near", False), (121, "time reached", True)])
-def test_the_length_of_a_sitting_is_told(story, minutes, kind, urgent):
+def test_the_length_of_a_sitting_is_reported(story, minutes, kind, urgent):
     view = story.answer(True).view(later=60.0 * minutes)
     assert kinds(view) == [kind]
     assert view.alarms[0].urgent is urgent
 
 
-def test_the_vibration_dose_is_told(with_parts):
+def test_the_vibration_dose_is_reported(with_parts):
     limited = with_parts("[limits]", "dose_a8_mps2 = 0.05")
     seen = []
     while "dose reached" not in seen:
@@ -121,7 +121,7 @@ def test_an_adverse_event_is_an_alarm_of_its_own_each_time(story):
     assert [(a.sentence, a.since) for a in second.alarms] == [("Adverse event: pain", at(2))]
 
 
-def test_a_minute_without_an_answer_is_told(story):
+def test_a_minute_without_an_answer_is_reported(story):
     story.open_trial()
     assert story.view(later=59.0).alarms == ()
     late = story.view(later=61.0).alarms[0]

@@ -92,7 +92,7 @@ def test_time_and_dose_count_from_the_first_movement(story):
     assert exposure.dose_share == pytest.approx(exposure.dose_a8_mps2 / 2.5)
 
 
-def test_a_new_sitting_starts_its_time_anew(story):
+def test_a_new_sitting_starts_its_time_again(story):
     story.answer(True).tell(SessionInterrupted(at(100), "the participant left"))
     assert story.view().exposure.elapsed_min == pytest.approx(1.5)
     story.tell(SessionResumed(at(4000), DEVICE, {}))
@@ -111,12 +111,12 @@ def test_a_new_sitting_starts_its_time_anew(story):
         ("trial", "running", "between two trials"),
     ],
 )
-def test_the_live_state_says_what_goes_on(story, activity, standing, words):
+def test_the_live_state_says_what_continues(story, activity, standing, words):
     view = story.answer(True).view(story.live(activity, since_s=1.5))
     assert (view.standing, view.activity, view.activity_s) == (standing, words, 1.5)
 
 
-def test_without_a_live_state_the_log_says_what_goes_on(story):
+def test_without_a_live_state_the_log_says_what_continues(story):
     assert story.answer(True).view().activity == "between two trials"
     for _ in range(3):
         story.answer(True)

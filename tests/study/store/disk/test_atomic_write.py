@@ -103,7 +103,7 @@ def test_a_folder_in_place_of_the_file_is_named(tmp_path):
         write_atomically(tmp_path / "a", b"one", overwrite=True)
 
 
-def test_any_other_trouble_is_told_in_the_systems_words():
+def test_any_other_trouble_is_reported_in_the_systems_words():
     assert (
         CannotWriteError(Path("a"), OSError(5, "Input/output error")).happened == "The system says: Input/output error."
     )

@@ -103,7 +103,7 @@ def test_elsewhere_files_have_the_rights_of_their_folder(umask, tmp_path):
 
 
 @pytest.mark.parametrize("why", ["it was made to be shared", "it holds more than the study"])
-def test_a_folder_that_is_not_closed_is_said(opened, why, monkeypatch, tmp_path):
+def test_a_folder_that_is_not_closed_is_reported(opened, why, monkeypatch, tmp_path):
     if why == "it was made to be shared":
         opened.chmod(0o2775)
     else:

@@ -124,20 +124,20 @@ def test_all_faults_are_named_at_once(written):
 
 
 @pytest.mark.parametrize("keep", [0, 100, 0.5, 0.95])
-def test_a_file_that_is_cut_off_is_said_to_be_so(written, keep):
+def test_a_file_that_is_cut_off_is_reported(written, keep):
     content = written.read_bytes()
     written.write_bytes(content[: int(keep * len(content)) if keep < 1 else keep])
     with pytest.raises(UnusableFileError, match="It is not HDF5 that can be read, or it is cut off"):
         read_recording(written)
 
 
-def test_a_file_with_a_damaged_description_is_said_to_be_so(written):
+def test_a_file_with_a_damaged_description_is_reported(written):
     text_of_unknown_alphabet = written.read_bytes().replace(b"\x19\x01\x01\x00", b"\x19\x01\x0f\x00")
     written.write_bytes(text_of_unknown_alphabet)
     with pytest.raises(UnusableFileError, match=r"It is not HDF5 that can be read.*Unknown string encoding"):
         read_recording(written)
 
 
-def test_a_file_that_is_not_there_is_said_to_be_so(tmp_path):
+def test_a_file_that_is_not_there_is_reported(tmp_path):
     with pytest.raises(CannotReadError, match=r"none\.h5 cannot be read\. There is no file"):
         read_recording(tmp_path / "none.h5")

@@ -29,7 +29,7 @@ def test_what_was_appended_is_read_back(written):
     assert contents.torn == ""
 
 
-def test_an_existing_log_is_never_opened_anew(written):
+def test_an_existing_log_is_never_opened_again(written):
     before = written.read_bytes()
     with pytest.raises(FileExistsError):
         EventLog.create(written)
@@ -37,7 +37,7 @@ def test_an_existing_log_is_never_opened_anew(written):
 
 
 @pytest.mark.parametrize("cut", [1, 2, 10, 40])
-def test_a_torn_last_line_is_told_apart_and_mended(written, cut):
+def test_a_torn_last_line_is_distinguished_and_mended(written, cut):
     whole = written.read_bytes()
     written.write_bytes(whole[:-cut])
     contents = read_log(written)

@@ -152,7 +152,7 @@ def test_beginning_twice_at_once_begins_one_sitting(order):
     run(AppStart(order.data, "simulated"), story)
 
 
-def test_ctrl_c_lets_go_says_what_is_safe_and_the_session_goes_on(sitting, log):
+def test_ctrl_c_lets_go_says_what_is_safe_and_the_session_continues(sitting, log):
     async def story(person: Person) -> None:
         await person.until("TrialScreen")
         await person.answer()
@@ -274,7 +274,7 @@ def test_help_themes_and_commands_are_there_on_every_screen(tmp_path):
     assert app.outcome is None
 
 
-def test_what_the_command_line_asked_for_and_cannot_be_is_told_by_the_command_line(tmp_path):
+def test_what_the_command_line_asked_for_and_cannot_be_is_reported_by_the_command_line(tmp_path):
     async def story(person: Person) -> None:
         until_s = time.monotonic() + 20.0
         while person.app.is_running and time.monotonic() < until_s:

@@ -62,7 +62,7 @@ def test_an_engine_that_talks_nonsense_is_told_as_ended_and_does_end(engine, cap
     assert "UnpicklingError" in capfd.readouterr().err
 
 
-def test_the_last_words_of_an_engine_are_told(engine):
+def test_the_last_words_of_an_engine_are_reported(engine):
     client, heard = engine("gives_up")
     failure = heard.get(timeout=20.0)
     assert failure.error.happened == (
@@ -72,7 +72,7 @@ def test_the_last_words_of_an_engine_are_told(engine):
     client.close()
 
 
-def test_a_system_that_starts_nothing_is_told(monkeypatch):
+def test_a_system_that_starts_nothing_is_reported(monkeypatch):
     def refuse(*arguments, said):
         raise OSError(11, "Resource temporarily unavailable")
 

@@ -151,7 +151,7 @@ def test_requests_from_the_screen_reach_the_session(begun, session, request_, ca
     assert "coughed" in log_of(session)
 
 
-def test_what_cannot_be_begun_is_told_and_the_engine_goes_on(screen, order):
+def test_what_cannot_be_begun_is_reported_and_the_engine_continues(screen, order):
     screen.send(Begin(SessionOrder("no_such_protocol", "simulated", "P01", order.data)))
     failure = screen.next()
     assert isinstance(failure, Failed)
@@ -163,7 +163,7 @@ def test_what_cannot_be_begun_is_told_and_the_engine_goes_on(screen, order):
     assert isinstance(screen.next(), Home)
 
 
-def test_a_killed_engine_says_what_is_safe_and_how_to_go_on(begun, session):
+def test_a_killed_engine_says_what_is_safe_and_how_to_continue(begun, session):
     third_trial(begun)
     os.kill(begun.engine.pid, signal.SIGSEGV)
     failure = begun.next()

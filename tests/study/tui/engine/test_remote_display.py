@@ -123,7 +123,7 @@ def test_a_silent_screen_ends_every_force_at_the_hand(screen, wait):
     assert reply in (silent(0.0, 0.1), silent(0.0, 4.0))
 
 
-def test_a_silent_screen_of_a_busy_computer_is_told_apart(screen):
+def test_a_silent_screen_of_a_busy_computer_is_distinguished(screen):
     screen.fall_silent()
     busy = RemoteDisplay(screen.link, RealClock(), load=lambda: 4.0)
     assert busy.ask(QUESTION, alive) == silent(0.0, 4.0)

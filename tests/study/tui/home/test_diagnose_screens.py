@@ -50,7 +50,7 @@ def test_recordings_of_the_device_in_order_may_be_named(on_screen, folder):
 
 
 @pytest.mark.parametrize(("clean", "said"), [("old.h5", "There is nothing at old.h5."), ("'x", "A quotation mark")])
-def test_wrong_ones_are_said(on_screen, folder, clean, said):
+def test_wrong_ones_are_reported(on_screen, folder, clean, said):
     asked, words = filled(on_screen, folder, f"{folder}/two.h5", clean=clean)
     assert asked == []
     assert said in words
@@ -65,7 +65,7 @@ def test_wrong_ones_are_said(on_screen, folder, clean, said):
         ("{0}/two.h5", "{0}", "There is no file"),
     ],
 )
-def test_what_is_wrong_is_said_before_anything_begins(on_screen, folder, sources, model, said):
+def test_what_is_wrong_is_reported_before_anything_begins(on_screen, folder, sources, model, said):
     asked, words = filled(on_screen, folder, sources.format(folder), model.format(folder))
     assert asked == []
     assert said in words

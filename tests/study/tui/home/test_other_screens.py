@@ -37,7 +37,7 @@ def test_its_report_opens_in_the_browser_and_escape_goes_home(on_screen, diagnos
     assert on_screen(DiagnosisScreen(replace(diagnosis, report="")), story).opened == []
 
 
-def test_agreement_is_said_where_there_is_nothing_else(on_screen, diagnosis):
+def test_agreement_is_reported_where_there_is_nothing_else(on_screen, diagnosis):
     nothing = replace(
         diagnosis, sentences=(), rivals=(), mismatch=(), fit=(), remainder=(), next_experiment="", notes=()
     )
@@ -100,7 +100,7 @@ def test_a_session_is_opened_by_its_folder_or_its_log(on_screen, folder, what):
     assert asked == [("SessionWanted", str(folder / "P01_001"))]
 
 
-def test_a_path_that_is_not_there_is_said(on_screen, folder):
+def test_a_path_that_is_not_there_is_reported(on_screen, folder):
     asked, (_, text) = browse(on_screen, folder, "enter", typed=folder / "nowhere")
     assert asked == []
     assert "There is nothing at" in text

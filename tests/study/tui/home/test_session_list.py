@@ -45,7 +45,7 @@ def test_keys_that_do_nothing_for_the_session_under_the_cursor_are_not_named(on_
     on_screen(HomeScreen(home), story)
 
 
-def test_the_session_under_the_cursor_is_told_in_a_sentence(on_screen, home):
+def test_the_session_under_the_cursor_is_reported_in_a_sentence(on_screen, home):
     async def story(sight):
         await sight.press("f3", "down")
         assert "P04_001 cannot be read. Line 7 of events.jsonl" in sight.words

@@ -19,7 +19,7 @@ def test_lines_come_one_by_one_and_nothing_is_none(pipe):
     assert lines.read(0.0) == "half"
 
 
-def test_the_end_of_the_input_is_told(pipe):
+def test_the_end_of_the_input_is_reported(pipe):
     lines, write = pipe
     os.write(write, b"1\n")
     os.close(write)

@@ -146,7 +146,7 @@ def test_a_practice_trial_is_called_practice(typed):
     assert "Practice 2 of 5, trial 7" in typed.said
 
 
-def test_progress_is_told_once_in_a_run(typed):
+def test_progress_is_reported_once_in_a_run(typed):
     typed.type("1", "1", "2", "1")
     for trial in (1, 2):
         ask(typed, replace(QUESTION, trial_number=trial, progress=Progress(0.25, 12)))
@@ -160,7 +160,7 @@ def test_progress_is_told_once_in_a_run(typed):
 @pytest.mark.parametrize(
     ("passed", "words"), [(True, "That is enough to go on."), (False, "hard to tell for everyone")]
 )
-def test_the_end_of_a_practice_is_told_and_read(typed, passed, words):
+def test_the_end_of_a_practice_is_reported_and_read(typed, passed, words):
     typed.type("")
     typed.display.practice_over(PracticeResult(passed, right=3, of=5))
     assert "Right answers: 3 of the last 5." in typed.said
@@ -199,7 +199,7 @@ def test_the_end_is_told_finished_or_not(typed):
         ("zx", 45.0, "1: toward you-up to away from you-down"),
     ],
 )
-def test_a_direction_is_told_in_words(plane, angle_deg, expected):
+def test_a_direction_is_reported_in_words(plane, angle_deg, expected):
     assert sentence(DirectionPicture(plane, (angle_deg, 0.0)), 1) == expected
 
 

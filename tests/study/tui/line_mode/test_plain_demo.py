@@ -72,7 +72,7 @@ def test_the_menu_says_what_was_felt_and_shows_the_picture_once(typed):
     assert typed.said.count("1: up-left to down-right") == 1
 
 
-def test_the_ends_of_the_list_are_told(typed):
+def test_the_ends_of_the_list_are_reported(typed):
     typed.type("n", "n", "b", "b", "b", "")
     choose(typed)
     assert typed.said.count("This is the last vibration.") == 1
@@ -143,7 +143,7 @@ class Handle:
         return HandleView(left_mm <= 0, f"Bring the handle {left_mm:.0f} mm back", (left_mm, 0.0), 5.0)
 
 
-def test_the_way_back_to_the_centre_is_told_at_most_every_second(unhurried):
+def test_the_way_back_to_the_centre_is_reported_at_most_every_second(unhurried):
     assert unhurried.display.await_handle(Handle(unhurried.clock, 25.0).look, lambda: True) is None
     assert unhurried.out.getvalue().splitlines() == [f"Bring the handle {mm} mm back" for mm in (25, 15, 5)]
 

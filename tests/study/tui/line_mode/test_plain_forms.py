@@ -29,7 +29,7 @@ def filled(typed, *fields: FormField) -> dict[str, str]:
     return reply.answers
 
 
-def test_title_introduction_version_and_approval_are_said(typed):
+def test_title_introduction_version_and_approval_are_reported(typed):
     typed.type("yes")
     filled(typed, CONSENT)
     assert "A form Some words before it. Version 3. Ethics approval EK 12/34. 1 question." in typed.said
@@ -108,7 +108,7 @@ def report(fine: bool) -> DeviceReport:
 
 
 @pytest.mark.parametrize(("line", "goes_on"), [("", True), ("c", False)])
-def test_the_device_check_goes_on_or_is_made_again(typed, line, goes_on):
+def test_the_device_check_continues_or_is_made_again(typed, line, goes_on):
     typed.type("x", line)
     assert typed.display.device_checked(report(fine=True)) is goes_on
     assert "'x' is no answer." in typed.said
@@ -130,7 +130,7 @@ def test_the_device_check_can_be_left(typed):
         typed.display.device_checked(report(fine=True))
 
 
-def test_a_warning_is_said_and_hinders_nothing(typed):
+def test_a_warning_is_reported_and_hinders_nothing(typed):
     typed.type("")
     late = DeviceFinding("Lateness", "too late for a real device", fine=False, advice="Close others.", warning=True)
     assert typed.display.device_checked(DeviceReport("omega.3", simulated=True, findings=(late,)))

@@ -46,7 +46,7 @@ def filled(on_stage):
     return fill
 
 
-def test_numbers_letters_and_the_space_bar_choose_and_enter_goes_on(filled):
+def test_numbers_letters_and_the_space_bar_choose_and_enter_continues(filled):
     reply, _ = filled(THREE, "1", "enter", "y", "enter", "right", "right", "space", "enter", "enter")
     assert reply == FormReply({"s1": "yes", "s2": "yes", "s3": "no"})
 

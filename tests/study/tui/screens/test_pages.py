@@ -107,7 +107,7 @@ def test_a_void_trial_is_explained(read):
     assert "The computer was too busy for a moment" in busy and "This was not your fault" in busy
 
 
-def test_a_device_check_with_a_warning_goes_on_by_enter_and_shows_what_to_do(read):
+def test_a_device_check_with_a_warning_continues_by_enter_and_shows_what_to_do(read):
     late = DeviceFinding("Lateness", "too late for a real device", fine=False, advice="Close others.", warning=True)
     heard, words = read(DeviceCheckScreen(DeviceReport("d", True, (FINE, late))), "g", "enter")
     assert heard == [True]
@@ -115,7 +115,7 @@ def test_a_device_check_with_a_warning_goes_on_by_enter_and_shows_what_to_do(rea
     assert "The device is ready; mind the warning above. Press Enter to go on." in words
 
 
-def test_a_device_that_is_fine_goes_on_by_enter(read):
+def test_a_device_that_is_fine_continues_by_enter(read):
     heard, words = read(DeviceCheckScreen(DeviceReport("d", True, (FINE,))), "g", "enter")
     assert heard == [True]
     assert "ok Loop 4000 ticks" in words and "not to be shown" not in words and "nothing moves" in words
@@ -153,7 +153,7 @@ def test_enter_by_habit_does_not_skip_the_demonstration(on_stage):
     assert on_stage(DemoScreen(MENU), story) == []
 
 
-def test_once_all_was_felt_enter_goes_on(read):
+def test_once_all_was_felt_enter_continues(read):
     everything = tuple((vibration, number) for vibration in (1, 2, 3) for number in (1, 2))
     assert read(DemoScreen(DemoMenu(PICTURE, 3, 3, everything, True)), "enter")[0] == [DemoDone()]
 

@@ -22,7 +22,7 @@ def paused(on_stage):
     return pause
 
 
-def test_enter_goes_on(paused):
+def test_enter_continues(paused):
     assert paused("enter")[0] == [AfterPause.GO_ON]
 
 
@@ -31,7 +31,7 @@ def test_leaving_is_the_second_choice_and_the_first_after_a_request_to_leave(pau
     assert paused("enter", leaving=True)[0] == [AfterPause.LEAVE]
 
 
-def test_reason_and_answers_are_told(paused):
+def test_reason_and_answers_are_reported(paused):
     words = paused()[1]
     assert "Reason: asked for a pause. 37 answers are on the disk." in words
 
@@ -45,7 +45,7 @@ def test_the_consent_is_taken_back_by_a_whole_word_only(paused):
     assert heard == [] and "Nothing is erased." in words
 
 
-def test_a_note_goes_to_the_session_and_the_pause_goes_on(paused):
+def test_a_note_goes_to_the_session_and_the_pause_continues(paused):
     heard, words = paused("n", *"cold hand", "ctrl+s")
     assert heard == [NoteAsked("participant", "cold hand", adverse=False)]
     assert "It goes into the log." in words

@@ -48,7 +48,7 @@ def told(views) -> list[str]:
     return [line for before, now in zip([None, *views], views, strict=False) for line in changes(before, now)]
 
 
-def test_each_trial_is_told_once_when_it_is_closed(views):
+def test_each_trial_is_reported_once_when_it_is_closed(views):
     lines = [line for line in told(views[:-1]) if line.startswith("trial ") and "shown" in line]
     assert len(lines) == views[-1].answers
     assert lines[0].startswith("trial 1 at 25 Hz, 1 N: ")
@@ -59,7 +59,7 @@ def test_nothing_is_told_twice(views):
     assert changes(views[-1], views[-1]) == []
 
 
-def test_the_end_is_told(views):
+def test_the_end_is_reported(views):
     assert told(views)[-1] == "FINISHED: all runs are done"
 
 

@@ -70,7 +70,7 @@ def test_a_stop_that_cannot_be_sent_says_what_to_do(seated):
     assert seated(story, ask=refuse).bells
 
 
-def test_pause_is_sent_and_says_who_goes_on(seated):
+def test_pause_is_sent_and_says_who_continues(seated):
     async def story(seat):
         await seat.press("p")
         assert "Pause sent. The participant goes on" in seat.lines[1]

@@ -162,7 +162,7 @@ def test_a_device_that_is_too_weak_is_found(rig, rigs, clock):
     assert findings(rig, rigs, clock)["Largest force"].value == "12 N"
 
 
-def test_what_a_hand_may_feel_is_said_before_a_sitting(rig, rigs, clock):
+def test_what_a_hand_may_feel_is_reported_before_a_sitting(rig, rigs, clock):
     safety = SafetySettings(stimulus_cap_n=2.5, total_cap_n=4.0)
     with contextlib.closing(SafeDevice(rig, rigs.SETTINGS, clock)) as device:
         report = check_device(device, clock, (0.0, 0.0, 0.0), 4.0, safety)

@@ -33,7 +33,7 @@ GOOD = Terminal("utf-8", "xterm-256color", 80, 24)
         ("no-such-package-of-no-author>=1", False, "not installed"),
     ],
 )
-def test_a_package_is_held_against_what_is_needed(requirement, fine, value):
+def test_an_installed_package_is_compared_with_its_requirement(requirement, fine, value):
     finding = check_requirement(Requirement(requirement))
     assert finding.fine is fine
     assert finding.value.endswith(value)
@@ -121,7 +121,7 @@ def test_a_terminal_in_which_the_screens_would_not_work_is_found(monkeypatch, te
         ({"NO_COLOR": "1"}, "switched off by NO_COLOR; nothing is told by colour alone"),
     ],
 )
-def test_colours_are_told_and_can_be_done_without(monkeypatch, variables, value):
+def test_colours_are_reported_and_can_be_done_without(monkeypatch, variables, value):
     for name in ("COLORTERM", "NO_COLOR"):
         monkeypatch.delenv(name, raising=False)
     for name, setting in variables.items():
@@ -174,7 +174,7 @@ def test_a_full_disk_is_found(tmp_path, monkeypatch):
     assert finding.advice == "Make room, or choose another folder with --data."
 
 
-def test_all_of_it_is_checked(tmp_path):
+def test_the_check_covers_packages_terminal_and_data_folder(tmp_path):
     names = [finding.name for finding in check_installation(tmp_path, GOOD)]
     assert names[0] == "hapteq"
     assert names[-9:] == [

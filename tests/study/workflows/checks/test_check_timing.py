@@ -47,14 +47,14 @@ def test_a_simulated_device_in_virtual_time_is_never_late(settings):
     assert progress[-1] == pytest.approx(1.0)
 
 
-def test_nothing_but_zero_is_written(rigs, settings):
+def test_the_timing_check_writes_zero_forces_alone(rigs, settings):
     rig, clock = rigs.compiled_rig(), VirtualClock()
     timed(SafeDevice(rig, settings, clock), clock)
     assert len(rigs.written(rig)) > 1000
     assert not rigs.written(rig).any()
 
 
-def test_a_spring_that_pulled_meanwhile_is_told(rigs):
+def test_a_spring_that_pulled_meanwhile_is_reported(rigs):
     rig, clock = rigs.compiled_rig(), VirtualClock()
     rig.state[rigs.LEAN] = 0.01
     _, found = timed(SafeDevice(rig, rigs.SETTINGS, clock), clock)
@@ -90,7 +90,7 @@ def test_ticks_that_a_real_loop_missed_are_counted(rigs, settings):
     assert found["Missed ticks"].advice == "Close other programs, switch power saving off, and measure again."
 
 
-def test_a_device_that_is_lost_in_the_middle_is_told(rigs, settings):
+def test_a_device_that_is_lost_in_the_middle_is_reported(rigs, settings):
     def gone():
         raise OSError("usb")
 

@@ -44,7 +44,7 @@ def test_a_law_is_written_as_an_effect_and_read_back(model_file, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["Drag.py", "drag.txt", "cogging.py", "discovered_law.py"])
-def test_a_name_that_is_no_name_is_refused(model_file, tmp_path, name):
+def test_an_invalid_effect_name_is_refused(model_file, tmp_path, name):
     with pytest.raises(StudyError, match="cannot be an effect's name"):
         write_entry(model_file, tmp_path / name)
 

@@ -137,7 +137,7 @@ def test_a_body_on_a_body_is_two_mode(tmp_path):
     assert done.choice.fit.model.coordinates == 2
 
 
-def test_where_no_time_is_known_stiffness_alone_is_told(tmp_path):
+def test_where_no_time_is_known_stiffness_alone_is_reported(tmp_path):
     done = fitted(tmp_path, untimed(recorded(device(1e-6, 1e-6, 900.0))))
     assert done.choice.fit.kind == "massless"
     assert inside(done, "stiffness fx", 900.0)
@@ -205,7 +205,7 @@ def test_the_command_prints_numbers_and_never_overwrites(tmp_path, capsys):
     assert "never overwritten" in capsys.readouterr().err
 
 
-def test_a_recording_whose_units_nothing_says_gets_a_model_and_what_was_assumed_is_said(tmp_path):
+def test_a_recording_whose_units_nothing_says_gets_a_model_and_what_was_assumed_is_reported(tmp_path):
     recording = recorded(device(0.4, 6.0, 300.0))
     plain = {"quantity": "1", "unit": "1"}
     bare = replace(

@@ -40,7 +40,7 @@ def test_all_trials_are_one_recording_with_its_frequencies_one_after_the_other(s
     assert heard == sorted(heard) and set(heard) == {5, 25, 35}
 
 
-def test_before_each_trial_its_own_command_goes_on_with_nothing_to_compare(session):
+def test_before_each_trial_its_own_command_continues_with_nothing_to_compare(session):
     one = session_recordings(session, seed=1).recording
     lead = round(LEAD_S * RATE_HZ)
     first = one.segments[0]
@@ -52,7 +52,7 @@ def test_before_each_trial_its_own_command_goes_on_with_nothing_to_compare(sessi
     np.testing.assert_allclose(one.command.samples[lead - 1], one.command.samples[lead + period - 1], atol=1e-6)
 
 
-def test_what_was_decided_is_played_and_the_spring_is_told_apart(session):
+def test_what_was_decided_is_played_and_the_spring_is_distinguished(session):
     found = session_recordings(session, seed=1)
     one = read_recording(found.parents[1])
     assert found.spring_n_per_m == pytest.approx(137, abs=1)
@@ -97,7 +97,7 @@ def test_only_what_is_there_is_claimed(session):
     assert len(said) == 2
 
 
-def test_trials_with_gaps_or_flags_are_left_out_and_it_is_said(session, tmp_path):
+def test_trials_with_gaps_or_flags_are_left_out_and_reported(session, tmp_path):
     copy = copied(session, tmp_path)
     first, second, *_ = sorted((copy / "recordings").glob("*.h5"))
     one = read_recording(first)

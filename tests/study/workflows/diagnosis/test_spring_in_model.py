@@ -25,7 +25,7 @@ def test_without_a_spring_nothing_is_changed_or_said(two_bodies):
     assert spring_words(0.0) == ()
 
 
-def test_what_was_done_is_said():
+def test_what_was_done_is_reported():
     assert spring_words(136.6) == (
         "A virtual spring of 137 N/m held the handle at its place. It was added to the model for the comparison, and "
         "is not in improved.toml.",

@@ -65,7 +65,7 @@ def test_no_unit_holds_a_second(first):
     assert (system.express("m/s"), system.express("s"), system.express("Hz")) == ("m/sample", "sample", "1/sample")
 
 
-def test_no_place_is_said_in_hertz(first):
+def test_no_place_is_reported_in_hertz(first):
     row = Mismatch("x", "fx", (0.0, 0.5), None, None, 0.02, 0.0)
     assert "Hz" not in place_of(row, Device(True, first.model.system))
     assert "Hz" in place_of(row)

@@ -70,7 +70,7 @@ def test_the_model_on_disk_is_the_device(device, plants):
     assert np.linalg.norm(model_response(model, f) - truth) < 0.01 * np.linalg.norm(truth)
 
 
-def test_it_knows_where_it_comes_from(device):
+def test_results_hold_the_hashes_of_their_input_files(device):
     provenance = read_identified_model(device.plan.out).provenance
     assert provenance["parents"][0]["file"] == "sweep.h5"
     assert (provenance["device"], provenance["input"], provenance["amplitude_n"]) == ("bench", "command", 1.0)

@@ -63,7 +63,7 @@ def test_the_model_gives_the_transient_that_one_gain_misses(done):
     assert told[-1] == 1.0 and told == sorted(told)
 
 
-def test_nothing_acts_before_the_contact(done, folder):
+def test_no_force_acts_before_the_contact(done, folder):
     found, _ = done
     assert len(found.equalized.forces) == len(found.wanted) > len(tap().signal)
     written = read_trajectory(folder / "out" / "forces.csv")

@@ -92,7 +92,7 @@ def test_forces_and_how_they_were_found_are_written(done):
     assert repeat_summary(done)["repeats"] == str(repeats_path(out))
 
 
-def test_a_later_run_goes_on_from_them(done, plan):
+def test_a_later_run_continues_from_them(done, plan):
     again = repeat_trajectory(plan, replace(ORDER, repeats=1, earlier=done.solved.plan.out), unheard)
     assert again.repeated.errors[0] < 0.4 * done.repeated.errors[0]
 

@@ -26,7 +26,7 @@ def write(path, header, columns):
     path.write_text("\n".join([header, *rows]) + "\n")
 
 
-def test_the_example_aligns_two_loggers_and_says_so(tmp_path, velocity_mm_per_s):
+def test_the_example_aligns_two_loggers_and_reports_it(tmp_path, velocity_mm_per_s):
     daq_s, drive_s = np.arange(0, 2.0, 1 / 2000), np.arange(0.1, 2.1, 1 / 1000)
     fine_s = np.arange(0, 2.1, 1 / FINE_HZ)
     place_mm = np.cumsum(velocity_mm_per_s(fine_s)) / FINE_HZ

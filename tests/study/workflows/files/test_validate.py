@@ -147,21 +147,21 @@ def test_a_diagnosis_is_described(tmp_path):
         ("a.h5", "garbage", "HDF5 file", "It does not begin as HDF5 files do."),
     ],
 )
-def test_what_is_wrong_is_said_in_words(tmp_path, name, text, kind, problem):
+def test_what_is_wrong_is_reported_in_words(tmp_path, name, text, kind, problem):
     found = validate_file(written(tmp_path / name, text))
     assert found.kind == kind
     assert any(said.startswith(problem) for said in found.problems), found.problems
     assert all(said.endswith(".") for said in found.problems)
 
 
-def test_a_torn_recording_is_said_to_be_so(tmp_path):
+def test_a_torn_recording_is_reported(tmp_path):
     write_recording(tmp_path / "a.h5", Recording("bench", force(), force()))
     (tmp_path / "a.h5").write_bytes((tmp_path / "a.h5").read_bytes()[:900])
     (problem,) = validate_file(tmp_path / "a.h5").problems
     assert problem.startswith("It is not HDF5 that can be read, or it is cut off")
 
 
-def test_hdf5_of_others_is_said_to_be_so(tmp_path):
+def test_hdf5_of_others_is_reported(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         assert validate_file(tmp_path / "a.h5").problems[0].startswith("It ")
         file.attrs["format"] = "nwb"
@@ -170,12 +170,12 @@ def test_hdf5_of_others_is_said_to_be_so(tmp_path):
     )
 
 
-def test_what_is_not_there_or_no_file_is_said_to_be_so(tmp_path):
+def test_what_is_not_there_or_no_file_is_reported(tmp_path):
     assert validate_file(tmp_path / "none").problems == (f"There is no file {tmp_path / 'none'}.",)
     assert validate_file(tmp_path).problems == ("This folder is not a session: it holds no events.jsonl.",)
 
 
-def test_a_name_that_no_file_can_have_is_said_to_be_so():
+def test_a_name_that_no_file_can_have_is_reported():
     assert "File name too long" in validate_file(Path("a" * 1000)).problems[0]
 
 

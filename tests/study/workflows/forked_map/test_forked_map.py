@@ -50,7 +50,7 @@ def test_a_law_that_was_there_before_comes_back_as_it_is_and_from_where_it_was_f
     assert len({process for _, process in answers}) == 2
 
 
-def test_an_effect_that_is_let_go_is_not_kept():
+def test_an_effect_without_references_is_not_kept_alive():
     law = law_effect(law_of("2*vx", "force", "x"))
     address = id(law)
     assert living_effects()[address] is law
@@ -86,7 +86,7 @@ def test_work_that_was_short_is_forked_again_once_it_takes_longer():
     assert len(set(map_forked(partial(of_seconds, 0.06), range(8)))) == 2
 
 
-def test_functions_without_code_of_their_own_are_told_apart():
+def test_functions_without_code_of_their_own_are_distinguished():
     class Callable:
         def __call__(self) -> None: ...
 

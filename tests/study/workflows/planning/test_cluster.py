@@ -77,7 +77,7 @@ def test_a_scheduler_without_workers_is_refused():
         pass
 
 
-def test_no_scheduler_is_said_and_nothing_is_begun(tmp_path, monkeypatch, capsys):
+def test_no_scheduler_is_reported_and_nothing_is_begun(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(cluster, "PATIENCE_S", 1.0)
     code = main(["power", "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "power"), "--subjects", "5"])
     assert code == 1

@@ -91,7 +91,7 @@ def test_another_frequency_does_not_stand_in_for_the_highest():
     assert verdict.means_error_db == pytest.approx(8.0 - 20 * np.log10(2.0))
 
 
-def test_a_broken_run_goes_on_and_any_number_of_workers_gives_the_same_numbers(run, tmp_path):
+def test_a_broken_run_continues_and_any_number_of_workers_gives_the_same_numbers(run, tmp_path):
     plan = replace(PLAN, people=(3,))
     whole = run(plan)
     path = tmp_path / "power" / FINISHED_NAME

@@ -181,7 +181,7 @@ def test_a_file_that_says_nothing_gets_a_map_to_complete(tmp_path):
 
 
 @pytest.mark.parametrize("out", ["there.h5", "nowhere/r.h5"])
-def test_a_name_that_cannot_be_written_is_said_before_anything_is_read(tmp_path, out):
+def test_a_name_that_cannot_be_written_is_reported_before_anything_is_read(tmp_path, out):
     (tmp_path / "there.h5").write_bytes(b"mine")
     with pytest.raises(StudyError, match="Nothing was imported"):
         import_recording(ImportPlan((tmp_path / "not_there.csv",), None, tmp_path / out))

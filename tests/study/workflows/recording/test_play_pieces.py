@@ -86,7 +86,7 @@ def test_what_had_to_be_lowered_is_so_at_once_when_it_comes_round_again(tmp_path
     assert done.warnings[1] == "Played at 0.7 N instead of 1 N (sweep along x): as before."
 
 
-def test_nothing_goes_below_the_least_amplitude_and_what_still_clips_is_said(tmp_path, device_that_clips_at):
+def test_nothing_goes_below_the_least_amplitude_and_what_still_clips_is_reported(tmp_path, device_that_clips_at):
     bounded = replace(PROTOCOL, segments=(SWEEP,), least_amplitude_n=0.6)
     done = record_on(device_that_clips_at(0.1), plan(tmp_path / "r.h5", bounded), lambda _: None)
     (about,) = read_recording(tmp_path / "r.h5").meta["segments"]

@@ -73,6 +73,6 @@ def test_interrupted_at_once_nothing_is_written(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_does_not_exist_is_said_before_anything_moves(tmp_path):
+def test_a_folder_that_does_not_exist_is_reported_before_anything_moves(tmp_path):
     with pytest.raises(StudyError, match="There is no folder"):
         record_device(plan(tmp_path / "nowhere" / "r.h5"), lambda _: None)

@@ -84,7 +84,7 @@ def test_a_clock_that_is_set_in_a_sitting_changes_nothing_and_is_said_everywhere
     assert fold_session(end.folder).state == end.state
 
 
-def test_a_clock_set_back_between_sittings_is_said_when_the_session_goes_on(sitter, at):
+def test_a_clock_set_back_between_sittings_is_reported_when_the_session_continues(sitter, at):
     first = conduct_new(sitter.plan(), "simulated", at(NOON, leave_at=4))
     seat = at(NOON - timedelta(hours=2))
     again = conduct_resumed(first.folder, "simulated", seat)
@@ -102,14 +102,14 @@ def test_every_entry_of_a_sitting_carries_the_monotonic_clock(sitter):
     assert stamps == sorted(stamps)
 
 
-def test_a_simulated_session_that_goes_on_does_so_after_its_own_last_entry(sitter):
+def test_a_simulated_session_that_continues_does_so_after_its_own_last_entry(sitter):
     """Its time runs ahead of the computer's, which is no clock that was set back."""
     clock = VirtualClock.not_before("2099-01-01T00:00:00.000+00:00")
     assert clock.utc() == "2099-01-01T00:00:00.000+00:00"
     assert VirtualClock.not_before("2001-01-01T00:00:00.000+00:00").utc() > "2026"
 
 
-def test_a_second_session_on_the_same_day_goes_on_with_the_dose_of_the_first(sitter):
+def test_a_second_session_on_the_same_day_continues_with_the_dose_of_the_first(sitter):
     first = conduct_new(sitter.plan(observer=None), "simulated", sitter.participant())
     second = conduct_new(sitter.plan(observer=None), "simulated", sitter.participant(2, leave))
     opened = read_log(second.folder.log).events[0]

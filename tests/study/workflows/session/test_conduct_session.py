@@ -104,7 +104,7 @@ def test_a_trial_that_was_open_at_the_end_is_void_and_drawn_again(sitter):
     assert again[0].level_n == again[1].level_n
 
 
-def test_a_repeat_that_was_asked_for_is_drawn_anew_in_the_same_sitting(sitter):
+def test_a_repeat_that_was_asked_for_is_drawn_again_in_the_same_sitting(sitter):
     done = conduct_new(
         sitter.plan(), "simulated", sitter.participant(4, lambda: Unanswered("asked to repeat", leave=False))
     )
@@ -209,7 +209,7 @@ def test_a_log_without_an_opening_line_says_that_nothing_is_lost(sitter):
         sitter.resumed(left.folder)
 
 
-def test_a_session_that_runs_elsewhere_is_not_touched(sitter):
+def test_a_session_that_runs_elsewhere_is_refused_and_unchanged(sitter):
     left = sitter.interrupted(after=2)
     before = left.folder.log.read_bytes()
     with hold_session_lock(left.folder.path), pytest.raises(StudyError, match="running elsewhere"):

@@ -89,7 +89,7 @@ def test_every_one_of_many_flipped_bits_is_seen(session):
     flips(session, 600)
 
 
-def test_every_cut_tail_is_told_apart_from_an_interrupted_session(session):
+def test_every_cut_tail_is_distinguished_from_an_interrupted_session(session):
     log = session / "events.jsonl"
     whole = log.read_bytes()
     lines = whole.splitlines(keepends=True)
@@ -115,7 +115,7 @@ def test_an_edited_value_is_named_by_its_line(session):
     assert validate_file(session).problems == (said,)
 
 
-def test_a_log_that_goes_on_under_this_version_covers_what_came_before(session, session_logs):
+def test_a_log_that_continues_under_this_version_covers_what_came_before(session, session_logs):
     session_logs.as_older(session)
     older = (session / "events.jsonl").read_bytes()
     chain, line = session_logs.write_chained(read_log(session / "events.jsonl").chain, NOTE)

@@ -106,7 +106,7 @@ def test_what_is_commanded_is_what_the_model_needs_with_the_spring_left_to_itsel
     assert abs(phasor[0]) < 1e-6
 
 
-def test_a_session_goes_on_with_the_model_it_was_begun_with(conducted):
+def test_a_session_continues_with_the_model_it_was_begun_with(conducted):
     (conducted.folder.path.parents[1] / "rigid.h5").unlink()
     assert fold_session(conducted.folder).state == conducted.state
     with pytest.raises(StudyError, match="finished"):  # and not the model, which is in the folder

@@ -182,7 +182,7 @@ def test_ctrl_c_at_any_line_leaves_a_session_that_can_be_resumed(sitter, monkeyp
     assert sitter.resumed(folder).state.closed
 
 
-def test_a_force_that_stayed_on_is_told_before_anything_is_written(sitter, watched, monkeypatch):
+def test_a_force_that_stayed_on_is_reported_before_anything_is_written(sitter, watched, monkeypatch):
     told: list[str] = []
     monkeypatch.setattr(
         "study.workflows.session.simulated_display.SimulatedDisplay.trouble",

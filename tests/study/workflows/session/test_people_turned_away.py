@@ -127,7 +127,7 @@ def test_a_slip_of_the_finger_is_no_refusal_and_is_kept_nowhere(visit, form):
 
 
 @pytest.mark.parametrize(("form", "outcome"), OUTCOMES)
-def test_it_is_asked_again_once_and_then_holds(visit, form, outcome):
+def test_a_refusal_is_asked_again_once_and_then_holds(visit, form, outcome):
     end, visitor = visit(**{form.value: "twice"})
     assert sum(seen.kind is form for seen in visitor.forms) == 3
     assert end.state.sitting.turned_away == outcome

@@ -25,7 +25,7 @@ def decisions(folder):
 
 
 @pytest.mark.timeout(200)
-def test_a_rehearsal_that_was_cut_off_goes_on_and_ends_the_same(rehearsal, sitter, session_logs):
+def test_a_rehearsal_that_was_cut_off_continues_and_ends_the_same(rehearsal, sitter, session_logs):
     done = []
     rehearse_study(rehearsal, workers=2, on_finished=done.append)
     assert done == [1, 2, 3]
@@ -65,7 +65,7 @@ def equalized(small_text, tmp_path) -> Rehearsal:
     return Rehearsal(load_protocol(text, "small.toml"), text, 1, 5, tmp_path / "r", tmp_path / "model.h5")
 
 
-def test_a_rehearsal_does_not_go_on_with_another_model(tmp_path, equalized):
+def test_a_rehearsal_does_not_continue_with_another_model(tmp_path, equalized):
     rehearse_study(equalized, workers=1, on_finished=lambda done: None)
     rehearse_study(equalized, workers=1, on_finished=lambda done: None)
     other = tmp_path / "other.h5"

@@ -52,7 +52,7 @@ def test_each_cause_is_logged_in_the_table_and_followed_by_the_same_stimulus(sit
     assert read_log(end.folder.log).events[0].rules == LATEST
 
 
-def test_a_stall_is_told_from_other_faults():
+def test_a_stall_is_distinguished_from_other_faults():
     assert cause_of(Fault.STALLED) is VoidCause.SCREEN_LATE
     assert {cause_of(fault) for fault in Fault if fault is not Fault.STALLED} == {VoidCause.FAULT}
 
@@ -84,7 +84,7 @@ def test_without_repeats_the_key_is_refused_from_the_first_trial(sitter):
     assert all(trial.void_cause is None for trial in end.state.trials)
 
 
-def test_a_session_of_the_first_rules_goes_on_under_them(sitter, monkeypatch):
+def test_a_session_of_the_first_rules_continues_under_them(sitter, monkeypatch):
     """Its void trials are drawn anew: some seeds give the other direction, which the second rules would refuse."""
     kept = set()
     for number in range(4):

@@ -125,7 +125,7 @@ def test_several_sources_are_heard_in_turn(requests):
 
 @pytest.mark.real_time
 @pytest.mark.may_be_late
-def test_the_live_state_is_told_in_real_time_a_few_times_a_second(rigs):
+def test_the_live_state_is_reported_in_real_time_a_few_times_a_second(rigs):
     told, clock = [], RealClock()
     with contextlib.closing(SafeDevice(rigs.compiled_rig(), rigs.SETTINGS, clock)) as device:
         supervisor = SessionSupervisor(device, clock, QueuedRequests(), told.append, place_m=(0.003, 0.004, 0.0))
@@ -140,7 +140,7 @@ def test_the_live_state_is_told_in_real_time_a_few_times_a_second(rigs):
     assert told[0].offset_mm == pytest.approx(5.0, abs=0.01)
 
 
-def test_in_virtual_time_no_live_state_is_told(device, clock, requests):
+def test_in_virtual_time_no_live_state_is_reported(device, clock, requests):
     told = []
     supervisor = SessionSupervisor(device, clock, requests, told.append)
     supervisor.begin("trial")

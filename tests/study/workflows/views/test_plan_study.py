@@ -86,7 +86,7 @@ def test_a_protocol_without_sessions_is_planned_from_its_file(tmp_path):
     assert any("drawn by lot" in line for line in lines(study))
 
 
-def test_different_texts_of_one_protocol_are_told(sitter, begin, balanced):
+def test_different_texts_of_one_protocol_are_reported(sitter, begin, balanced):
     begin("P01")
     assert only(sitter.data).remarks == ()
     other = replace(sitter.plan("P02"), protocol=balanced[0], protocol_text=balanced[1] + "# later\n")

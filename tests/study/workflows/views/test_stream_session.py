@@ -86,7 +86,7 @@ def test_what_was_there_before_is_not_sent_and_a_torn_line_waits_for_its_end(tmp
     assert [marker["event"] for marker, _ in pushed] == ["clock", "answer_given", "session_closed"]
 
 
-def test_nothing_about_the_person_is_told(tmp_path):
+def test_nothing_about_the_person_is_reported(tmp_path):
     private = {"subject": "P01", "text": "feels dizzy", "answers": ["left-handed"], "protocol_text": "secret"}
     lines = [line("note_taken", **private, monotonic_s=50.0), line("session_closed", **private, monotonic_s=50.0)]
     pushed, _ = streamed(tmp_path, lines)
@@ -95,7 +95,7 @@ def test_nothing_about_the_person_is_told(tmp_path):
 
 
 @pytest.mark.parametrize("monotonic_s", [None, 50.0 - FRESH_S - 1, 60.0, 0.3])
-def test_a_fact_of_another_clock_is_stamped_when_it_is_sent_and_says_so(tmp_path, monotonic_s):
+def test_a_fact_of_another_clock_is_stamped_when_it_is_sent_and_reports_it(tmp_path, monotonic_s):
     pushed, _ = streamed(tmp_path, [line("trial_presented", monotonic_s=monotonic_s), line("session_closed")])
     marker, at_s = pushed[1]
     assert marker["stamped"] == "when it was sent"
@@ -129,7 +129,7 @@ def test_a_note_that_names_the_end_is_not_the_end(tmp_path):
     assert streamed(tmp_path, [line("session_closed", monotonic_s=50.0)], before)[1] == 1
 
 
-def test_no_more_is_read_than_what_came(tmp_path, monkeypatch):
+def test_each_look_reads_only_new_bytes(tmp_path, monkeypatch):
     """At 50 looks a second: room for the largest log that there may be is not taken each time."""
     asked: list[int] = []
 
@@ -145,7 +145,7 @@ def test_no_more_is_read_than_what_came(tmp_path, monkeypatch):
     assert asked == [len(before), 0, 0, len(last)]
 
 
-def test_a_log_that_became_shorter_is_said(tmp_path):
+def test_a_log_that_became_shorter_is_reported(tmp_path):
     log = tmp_path / "events.jsonl"
     log.write_bytes(line("answer_given", answer=1))
     clock = Clock(log, [b""])
@@ -158,7 +158,7 @@ BROKEN = [b"not json\n", b"3\n", b'["session_closed"]\n', b"null\n", b"[" * 100_
 
 
 @pytest.mark.parametrize("broken", BROKEN, ids=["text", "number", "list", "null", "deep", "bytes", "no file"])
-def test_a_log_that_cannot_be_followed_is_said(tmp_path, broken):
+def test_a_log_that_cannot_be_followed_is_reported(tmp_path, broken):
     if broken is None:
         clock = Clock(tmp_path / "gone.jsonl", [])
         with pytest.raises(StudyError, match="cannot be followed"):

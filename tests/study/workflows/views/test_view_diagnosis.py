@@ -58,7 +58,7 @@ def test_tables_have_a_header_and_a_row_each(view):
     assert view.fit[1] == ("fit", "0.3000", "0.2800", "0.0500", "–")
 
 
-def test_a_p_value_below_all_numbers_is_no_zero(tmp_path):
+def test_a_p_value_of_zero_is_shown_as_an_upper_bound(tmp_path):
     sure = replace(FOUND, mismatch=(replace(PLACE, p_value=0.0), replace(PLACE, p_value=0.02)))
     write_diagnosis(tmp_path / "diagnosis.json", sure)
     assert [row[-1] for row in diagnosis_view(tmp_path / "diagnosis.json").mismatch[1:]] == ["< 0.0001", "0.0200"]

@@ -47,7 +47,7 @@ def test_every_run_has_its_staircase_with_as_many_levels_as_answers(taken):
     assert sum(view.staircases[1].reversals) == 5
 
 
-def test_facts_say_who_and_what(taken):
+def test_facts_name_participant_protocol_and_seed(taken):
     facts = dict(session_view(taken).facts)
     assert facts["participant"] == "P01, simulated (ideal), number 1 of this protocol"
     assert facts["protocol"].startswith("small (")
@@ -91,7 +91,7 @@ def test_the_open_trial_of_a_running_session_keeps_its_direction(session, sessio
     assert sum("direction" in line and "Run" in line for line in view.events) == view.line.answers
 
 
-def test_a_torn_last_line_is_said(session):
+def test_a_torn_last_line_is_reported(session):
     with (session / "events.jsonl").open("ab") as log:
         log.write(b'{"utc":"2026')
     assert "A crash tore the last line" in session_view(session).warnings[0]

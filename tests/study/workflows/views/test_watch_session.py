@@ -138,7 +138,7 @@ def test_a_first_line_of_another_kind_cannot_be_followed(growing):
         follow(growing.path.parent).look(now())
 
 
-def test_a_session_erased_under_the_watcher_is_told(growing):
+def test_a_session_erased_under_the_watcher_is_reported(growing):
     growing.grow_to(len(growing.data.splitlines(keepends=True)[0]))
     follower = follow(growing.path.parent)
     follower.look(now())

@@ -40,7 +40,7 @@ def test_a_pause_asked_for_between_two_trials_begins_with_the_next(on_stage):
     assert on_stage(screen, story) == [PAUSE]
 
 
-def test_what_became_of_the_answer_is_said_in_words(on_stage):
+def test_what_became_of_the_answer_is_reported_in_words(on_stage):
     screen = TrialScreen()
 
     async def story(stage):

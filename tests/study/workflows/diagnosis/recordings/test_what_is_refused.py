@@ -50,13 +50,13 @@ def test_a_recording_that_is_too_short_or_all_noise_is_named(files, findings, tm
     )
 
 
-def test_recordings_of_two_devices_are_told_apart_by_name(files, findings, tmp_path, made):
+def test_recordings_of_two_devices_are_distinguished_by_name(files, findings, tmp_path, made):
     write_recording(tmp_path / "three.h5", made.recorded(3))
     error = refused_with(files, findings, tmp_path, sources=(files / "rec.h5", tmp_path / "three.h5"))
     assert "Three.h5 has the command" in error.happened or "three.h5 has the command" in error.happened
 
 
-def test_a_position_that_not_all_recordings_have_is_left_out_and_it_is_said(files, findings, tmp_path, made):
+def test_a_position_that_not_all_recordings_have_is_left_out_and_reported(files, findings, tmp_path, made):
     write_recording(tmp_path / "blind.h5", replace(made.recorded(1, seed=8), position=None))
     sources = (files / "rec.h5", tmp_path / "blind.h5")
     engine = asked_of_engine(plan(files, tmp_path / "out", sources=sources), findings)
@@ -69,7 +69,7 @@ def test_a_position_that_not_all_recordings_have_is_left_out_and_it_is_said(file
     [lambda x: 0 * x, lambda x: 0 * x + 0.01, lambda x: 0.01 + 1e-12 * x, lambda x: np.where(x > 0, 0.01, np.nan)],
     ids=["zero", "somewhere", "rounding", "gaps"],
 )
-def test_a_position_that_stands_still_is_left_out_and_it_is_said(tmp_path, recording, stands):
+def test_a_position_that_stands_still_is_left_out_and_reported(tmp_path, recording, stands):
     dead = replace(recording.position, samples=stands(recording.position.samples))
     write_recording(tmp_path / "dead.h5", replace(recording, position=dead))
     found = read_input((tmp_path / "dead.h5",), seed=1)
@@ -102,7 +102,7 @@ def test_a_recording_that_is_given_twice_is_refused(files, findings, tmp_path, r
             )
 
 
-def test_recordings_of_one_name_are_told_apart_by_their_folders(files, findings, tmp_path, made):
+def test_recordings_of_one_name_are_distinguished_by_their_folders(files, findings, tmp_path, made):
     write_recording(tmp_path / "rec.h5", made.recorded(1, seed=8))
     both = (files / "rec.h5", tmp_path / "rec.h5")
     engine = asked_of_engine(plan(files, tmp_path / "out", sources=both), findings)

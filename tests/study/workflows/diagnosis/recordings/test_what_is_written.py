@@ -28,7 +28,7 @@ def test_the_improved_model_can_be_read_and_holds_what_was_named(done):
     assert [parent["file"] for parent in improved.provenance["parents"]] == ["rec.h5", "model.toml"]
 
 
-def test_it_knows_where_it_comes_from(done):
+def test_results_hold_the_hashes_of_their_input_files(done):
     origin = read_json(done.out / "diagnosis.json", "hapteq-diagnosis", 1)["provenance"]
     assert [parent["file"] for parent in origin["parents"]] == ["rec.h5", "model.toml"]
     assert all(len(parent["sha256"]) == 64 for parent in origin["parents"])
@@ -59,7 +59,7 @@ def test_the_engine_gets_recordings_model_names_and_a_parallel_map(files, findin
     assert engine.model.inputs == len(engine.recordings[0].command.channels) == 1
 
 
-def test_without_a_model_a_linear_one_is_fitted_first_and_it_is_said(files, findings, tmp_path):
+def test_without_a_model_a_linear_one_is_fitted_first_and_reported(files, findings, tmp_path):
     engine, shares = Scripted(findings), []
     alone = plan(files, tmp_path / "out", model=None)
     found = diagnose_recordings(alone, lambda what, share: shares.append(share), engine)
@@ -70,7 +70,7 @@ def test_without_a_model_a_linear_one_is_fitted_first_and_it_is_said(files, find
 
 
 @pytest.mark.parametrize("end", [KeyboardInterrupt(), ValueError("a bug")])
-def test_interrupted_it_leaves_nothing(files, findings, tmp_path, end):
+def test_an_interrupted_diagnosis_leaves_no_files(files, findings, tmp_path, end):
     with pytest.raises(type(end)):
         diagnose_recordings(plan(files, tmp_path / "out"), quiet, Scripted(findings, end))
     assert list(tmp_path.iterdir()) == []

@@ -34,7 +34,7 @@ def test_where_no_model_can_be_fitted_it_is_asked_for(files, findings, tmp_path,
     assert "--model" in error.do_now
 
 
-def test_two_commands_of_one_motion_are_made_one_and_it_is_said(files, findings, tmp_path, recording):
+def test_two_commands_of_one_motion_are_made_one_and_reported(files, findings, tmp_path, recording):
     pushed = recording.command.samples
     both = replace(recording.command, samples=np.hstack([pushed, 0.5 * pushed[::-1]]), channels=("fx", "fy"))
     write_recording(tmp_path / "two.h5", replace(recording, command=both))
@@ -45,7 +45,7 @@ def test_two_commands_of_one_motion_are_made_one_and_it_is_said(files, findings,
     assert "rec.h5 has the command" in error.happened.lower()
 
 
-def test_at_the_screen_a_stop_is_said_and_leaves_nothing(files, tmp_path):
+def test_at_the_screen_a_stop_is_reported_and_leaves_nothing(files, tmp_path):
     def stop(what, share):
         raise KeyboardInterrupt
 

@@ -117,7 +117,7 @@ def test_what_is_no_number_moves_nothing_and_does_not_stay(exported, bridge, bad
     np.testing.assert_array_equal(forces, right)
 
 
-def test_a_sum_that_is_no_force_is_none(exported, bridge):
+def test_a_force_that_overflows_is_replaced_within_the_cap(exported, bridge):
     forces, limited = called(bridge.transient, 1e99 * np.eye(3), 5)
     assert np.isfinite(forces).all() and np.linalg.norm(forces, axis=1).max() <= exported.controller.cap_n
     assert limited == 5
@@ -178,7 +178,7 @@ def test_numbers_are_written_to_their_last_bit(exported):
         ("strong", "the strongest device gives 20 N"),
     ],
 )
-def test_what_cannot_be_exported_is_said_and_nothing_is_written(tmp_path, capsys, change, says):
+def test_what_cannot_be_exported_is_reported_and_nothing_is_written(tmp_path, capsys, change, says):
     model = write_model(tmp_path / "model.h5", size=2 if change == "two axes" else 3)
     out, words = tmp_path / "out", []
     if change == "there already":

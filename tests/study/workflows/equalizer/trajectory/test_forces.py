@@ -27,7 +27,7 @@ def test_the_forces_of_a_table_make_the_device_do_it_row_by_row(plants, plan):
     assert summary(done)["peak_n"] <= 3.0
 
 
-def test_what_is_left_out_is_said(plants, plan, tmp_path):
+def test_what_is_left_out_is_reported(plants, plan, tmp_path):
     t = np.arange(2000)[:, None] / RATE_HZ
     write_trajectory(tmp_path / "whistle.csv", table(noise(plants) + np.sin(2 * np.pi * 84 * t)))
     done = equalize_trajectory(replace(plan, trajectory=tmp_path / "whistle.csv"))
@@ -46,7 +46,7 @@ def test_too_strong_forces_are_refused_with_the_factor_or_solved_under_the_cap(p
     assert any("held at the cap have corners" in line for line in summary_lines(done))
 
 
-def test_what_the_cap_costs_is_said_in_one_figure(plan):
+def test_what_the_cap_costs_is_reported_in_one_figure(plan):
     done = equalize_trajectory(replace(plan, trajectory=plan.trajectory.with_name("loud.csv"), constrain=True))
     capped, lines = summary(done)["capped"], summary_lines(done)
     assert summary(done)["predicted_error"] == capped["error_capped"]

@@ -48,7 +48,7 @@ def test_each_effect_that_a_diagnosis_names_is_compensated_or_reported(plan, tmp
     assert all(told["not_compensated"].values())
 
 
-def test_the_cap_holds_for_the_sum_and_the_share_that_fits_is_said(plan, tmp_path):
+def test_the_cap_holds_for_the_sum_and_the_share_that_fits_is_reported(plan, tmp_path):
     write_mechanical_model(tmp_path / "f.toml", mechanism(ModelEffect("coulomb_friction", None, {"level": 0.2})))
     peak_n = equalize_trajectory(plan).peaks.peak_n
     plan.out.unlink()

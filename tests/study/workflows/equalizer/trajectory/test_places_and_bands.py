@@ -46,7 +46,7 @@ def test_three_places_are_checked_with_the_middle_one_held_out(plants, plan):
     assert played_error(plants, between, 0.15) < 0.2
 
 
-def test_a_place_outside_is_said(plan):
+def test_a_place_outside_is_reported(plan):
     done = equalize_trajectory(with_models(plan, "left", "right", at_m=(0.05, 0.0, 0.0)))
     assert any("20.0 mm outside the points" in remark for remark in done.models.remarks)
 
@@ -56,7 +56,7 @@ def test_a_single_model_far_from_the_place_is_used_with_a_word(plan):
     assert "centre.h5 was identified 20 mm from the place" in done.models.remarks[0]
 
 
-def test_a_place_that_is_no_number_is_refused(plan):
+def test_a_place_that_is_not_finite_is_refused(plan):
     assert "--at is nan, 0, 0" in refusal(replace(plan, at_m=(float("nan"), 0.0, 0.0)), WrongUseError).happened
 
 

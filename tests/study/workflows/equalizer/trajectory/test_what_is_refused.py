@@ -110,7 +110,7 @@ def test_what_was_measured_of_the_model_comes_before_what_it_predicts(plants, pl
     assert summary(done)["quality"]["held_out_error"] == 0.13
 
 
-def test_of_several_models_the_nearest_and_the_worst_are_said(plants, plan, tmp_path):
+def test_of_several_models_the_nearest_and_the_worst_are_reported(plants, plan, tmp_path):
     near, far = ModelQuality(0.01, 0.01), ModelQuality(0.2, 0.1, None, 0.2, None, 5.0)
     write_identified_model(tmp_path / "near.h5", model_of(plants.omega_like(), (0.0, 0.0, 0.0), quality=near))
     write_identified_model(tmp_path / "far.h5", model_of(plants.omega_like(0.05), (0.03, 0.0, 0.0), quality=far))

@@ -73,7 +73,7 @@ def test_without_consent_or_with_an_exclusion_nothing_is_played(plan, full, seat
     assert end.fault is Fault.NONE
 
 
-def test_a_set_up_that_differs_is_told_and_noted(plan, full, seat, person):
+def test_a_set_up_that_differs_is_reported_and_noted(plan, full, seat, person):
     person.fill_in = lambda form: FormReply(
         {f.key: ("nothing" if f.key == "hearing" else f.choices[0] if f.choices else "") for f in form.fields}
         if form.kind is FormKind.SETUP
@@ -120,7 +120,7 @@ class NeverOnTime(VirtualClock):
         super().sleep(max(seconds, 0.0) + (0.067 if seconds < 0.002 else 0.0))
 
 
-def test_a_computer_that_is_too_late_is_a_warning_that_the_experimenter_goes_on_from_and_that_is_logged(plan, full):
+def test_a_computer_that_is_too_late_is_a_warning_that_the_experimenter_continues_from_and_that_is_logged(plan, full):
     clock = NeverOnTime()
     person = Person(clock)
     end = conduct_new(plan(full), "simulated", Participant(display=person, hand=person, clock=clock))

@@ -24,7 +24,7 @@ from tests.study.workflows.session.withdrawal.data_folder import UTC, erase, fil
 PART = ".anova.json.0123abcd.part"
 
 
-def test_what_an_earlier_version_left_half_erased_is_said_and_erased(data):
+def test_what_an_earlier_version_left_half_erased_is_reported_and_erased(data):
     """It wrote the tombstone first, and said that nothing was left but it."""
     left = {"format": "hapteq-tombstone", "version": 1, "session": "P01_001", "withdrawn_utc": UTC, "begun": None}
     (data / "P01_001" / "withdrawn.json").write_text(json.dumps(left))
@@ -96,7 +96,7 @@ def check_half_erased(data: Path) -> None:
     assert participant_number(data, "P09", "corpus", simulated=True) == 1
 
 
-def test_killed_before_any_operation_it_goes_on_and_finishes(data, elsewhere, killer, tmp_path, monkeypatch):
+def test_killed_before_any_operation_it_continues_and_finishes(data, elsewhere, killer, tmp_path, monkeypatch):
     (data / "P01_001" / "recordings" / "more").symlink_to(elsewhere)
     monkeypatch.setattr("study.devices.clock.RealClock.utc", lambda clock: UTC)
     whole = shutil.copytree(data, tmp_path / "whole", symlinks=True)

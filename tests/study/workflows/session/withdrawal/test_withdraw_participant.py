@@ -141,7 +141,7 @@ def test_a_running_session_stops_the_withdrawal_before_anything_is_changed(data)
     assert {name: held for name, held in files(data).items() if not name.endswith("session.lock")} == before
 
 
-def test_an_intent_leads_nowhere_else(data, elsewhere):
+def test_a_forged_withdrawal_intent_erases_nothing_of_others(data, elsewhere):
     left = {"subject": "P01", "withdrawn_utc": UTC, "sessions": {"../other/P01_002": None, "P02_001": None},
             "derived": ["../other/P01_002/trials.csv", str(elsewhere), "analysis"]}  # fmt: skip
     document = {"format": "hapteq-withdrawal", "version": 1, **left}
