@@ -55,6 +55,7 @@ def power(
         return
     for line in power_lines(points):
         typer.echo(line)
+    typer.echo(f"\nFigure: {out / 'figures' / 'power.png'}")
 
 
 def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":

@@ -65,7 +65,7 @@ class PowerPoint:
 def judge_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...]) -> StudyVerdict:
     """Two people at least; thresholds of all people must be complete, so the rule must have no trial limit."""
     study = simulate_study(crowd, rule, people, seed)
-    true_db = 20.0 * float(np.log10(crowd.medians_n[-1] / crowd.medians_n[0]))
+    true_db = true_difference_db(crowd)
     pseudo = pseudo_thresholds(fit_hierarchy(study.answers))
     primary, means = (_highest_contrast(crowd.frequencies_hz, values) for values in (pseudo, study.threshold_db))
     names = [f"{frequency:g} Hz" for frequency in crowd.frequencies_hz]
@@ -84,6 +84,11 @@ def judge_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int,
         means_error_db=_mean_difference(study.threshold_db) - true_db,
         published_found=difference_n > margin_n,
     )
+
+
+def true_difference_db(crowd: Crowd) -> float:
+    """Median threshold at the highest frequency over that at the lowest."""
+    return 20.0 * float(np.log10(crowd.medians_n[-1] / crowd.medians_n[0]))
 
 
 def _highest_contrast(frequencies_hz: Sequence[float], values_db: FloatArray) -> Contrast | None:

@@ -6,7 +6,15 @@ from concurrent.futures import Executor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from analysis.psychophysics.power.power_curve import PowerPoint, Share, StudyVerdict, judge_study, power_point
+from analysis.figures.power_curves import power_picture
+from analysis.psychophysics.power.power_curve import (
+    PowerPoint,
+    Share,
+    StudyVerdict,
+    judge_study,
+    power_point,
+    true_difference_db,
+)
 from analysis.psychophysics.power.simulated_study import Crowd
 from protocols.definition.staircase_rule import StaircaseRule
 from study.errors import StudyError, WrongUseError
@@ -14,6 +22,7 @@ from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import write_json
 from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import read_text
+from study.workflows.picture_files import write_pictures
 
 CHUNK = 10
 """Studies per piece of work: some seconds, so that little is lost when a worker dies."""
@@ -39,7 +48,7 @@ def simulate_power(
     plan: PowerPlan, out: Path, executor: Executor, on_finished: Callable[[int], None]
 ) -> tuple[PowerPoint, ...]:
     """Run all studies, calling `on_finished(count)`. The same seeds give the same numbers on any executor, in any
-    order; results in `out` from an interrupted run of the same plan are reused.
+    order; results in `out` from an interrupted run of the same plan are reused. Writes power.json and figures/power.
 
     Raises StudyError where `out` belongs to another plan, and CannotWriteError.
     """
@@ -70,6 +79,7 @@ def simulate_power(
     points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
     payload = {"plan": _plan_facts(plan), "points": [asdict(point) for point in points]}
     write_json(out / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
+    write_pictures(out / "figures", (power_picture(points, true_difference_db(plan.crowd)),))
     return points
 
 

@@ -1,0 +1,34 @@
+"""The figure of a power simulation."""
+
+import numpy as np
+import pytest
+
+from analysis.figures.power_curves import power_picture
+from analysis.psychophysics.power.power_curve import PowerPoint, Share
+
+
+def point(people: int) -> PowerPoint:
+    found = Share(people / 50, people / 50 - 0.05, people / 50 + 0.04)
+    return PowerPoint(people, 200, 300.0, found, Share(0.3, 0.25, 0.36), Share(0.1, 0.07, 0.15), found, 0.1, -0.2)
+
+
+def test_each_analysis_has_a_curve_with_the_interval_of_its_shares():
+    above, below = power_picture([point(10), point(30)], 3.0).figure.axes
+    model, means, published = above.containers
+    np.testing.assert_allclose(model.lines[0].get_ydata(), [20, 60])
+    np.testing.assert_allclose(means.lines[0].get_ydata(), [30, 30])
+    np.testing.assert_allclose(published.lines[0].get_ydata(), [10, 10])
+    low, high = model.lines[2][0].get_segments()[0][:, 1]
+    assert (low, high) == pytest.approx((15, 24))
+    np.testing.assert_allclose(below.containers[0].lines[0].get_ydata(), [20, 60])
+
+
+@pytest.mark.parametrize(("effect_db", "level"), [(3.0, 80.0), (0.0, 5.0)])
+def test_the_line_is_the_power_asked_for_or_without_an_effect_the_level_of_the_test(effect_db, level):
+    above, _ = power_picture([point(10)], effect_db).figure.axes
+    assert any(np.allclose(line.get_ydata(), [level, level]) for line in above.lines)
+
+
+def test_the_caption_says_that_without_an_effect_each_find_is_an_error():
+    assert "type-1 error" in power_picture([point(10)], 0.0).caption
+    assert "finds the difference" in power_picture([point(10)], 3.0).caption
