@@ -93,6 +93,9 @@ class Trial:
     world waits. None in a log of before they were written down."""
     latest_s: float | None = None
     """The longest from when a tick was due until its work, or that of the tick that came in its place, was done."""
+    onset_s: float | None = None
+    """When the presentation was logged, right before the device moved: seconds of the wall clock since the session was
+    opened, breaks included."""
 
     @property
     def counts(self) -> bool:

@@ -65,7 +65,11 @@ def split_row(line: str, delimiter: str) -> list[str]:
         return []
     if delimiter == " " and '"' not in line:
         return re.split(r"\s+(?![\[(])", line.strip())  # `force [N]` is one field
-    return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
+    try:
+        fields = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    except csv.Error:  # the reader takes no field above 131 072 letters, as a long line of another delimiter is
+        fields = line.split(delimiter)
+    return [field.strip() for field in fields]
 
 
 def is_number(field: str, decimal: str) -> bool:

@@ -68,7 +68,12 @@ def minutes_between(first_utc: str, second_utc: str) -> float:
     """Minutes by the wall clock: negative if it was set back. Both ISO 8601; 0 if the first is empty."""
     if not first_utc:
         return 0.0
-    return (datetime.fromisoformat(second_utc) - datetime.fromisoformat(first_utc)).total_seconds() / 60.0
+    return seconds_between(first_utc, second_utc) / 60.0
+
+
+def seconds_between(first_utc: str, second_utc: str) -> float:
+    """By the wall clock: negative if it was set back. Both ISO 8601."""
+    return (datetime.fromisoformat(second_utc) - datetime.fromisoformat(first_utc)).total_seconds()
 
 
 def _wall_s(before: Moment, now: Moment) -> float:

@@ -25,7 +25,7 @@ from study.session.facts.events import (
     TrialPresented,
     TrialSpoiled,
 )
-from study.session.facts.log_time import Moment
+from study.session.facts.log_time import Moment, seconds_between
 from study.session.facts.void_reasons import computer_too_busy
 from study.session.state.daily_dose import with_dose_elsewhere
 from study.session.state.draw_check import LogContradiction, check_draw, place_of
@@ -69,6 +69,7 @@ def trial_row(opened: SessionOpened, event: TrialPresented, felt: bool | None, r
         angle_deg=event.angle_deg,
         wanted_mps2=event.wanted_mps2,
         repeat_cause=repeat_cause,
+        onset_s=seconds_between(opened.utc, event.utc),
     )
 
 
