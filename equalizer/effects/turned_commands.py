@@ -77,14 +77,14 @@ def _turned_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str,
     for axis in np.flatnonzero(way < 0):
         against |= {inputs[axis], *(prefix + letters[axis] for prefix in (*DERIVATIVES, COMMAND))}
         against |= {outputs[axis]} if len(outputs) == len(inputs) else set()
-    tree = _negated(law.tree, against)
+    tree = _negate_variables(law.tree, against)
     return replace(law, expression=format_formula(Apply("neg", (tree,)) if way[site] < 0 else tree, None, None))
 
 
-def _negated(node: Node, against: set[str]) -> Node:
+def _negate_variables(node: Node, against: set[str]) -> Node:
     match node:
         case Variable(name) if name in against:
             return Apply("neg", (node,))
         case Apply(name, parts):
-            return Apply(name, tuple(_negated(part, against) for part in parts))
+            return Apply(name, tuple(_negate_variables(part, against) for part in parts))
     return node

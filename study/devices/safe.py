@@ -15,7 +15,7 @@ from equalizer.signals.signal import Signal
 from study.devices.admission import check_commands, check_hardware, check_settings, check_stimulus
 from study.devices.clock import Clock, VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
-from study.devices.drive.played import played_loop, played_once
+from study.devices.drive.played import record_commands, record_held_stimulus
 from study.devices.drive.realtime_drive import RealtimeDrive
 from study.devices.drive.runner import CompiledRunner, Runner
 from study.devices.drive.seen import look_of
@@ -83,7 +83,7 @@ class SafeDevice:
         self._governor.ask_release()
         self._wait_until_still(stimulus.fade_out_s)
         self._held = None
-        return played_loop(self._governor, self._info)
+        return record_held_stimulus(self._governor, self._info)
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
         self._must_be_idle()
@@ -96,7 +96,7 @@ class SafeDevice:
             raise
         self._wait_until_still(0.0)
         self._must_be_there()
-        return played_once(self._governor, self._info)
+        return record_commands(self._governor, self._info)
 
     def look(self) -> Look:
         self._drive.check()

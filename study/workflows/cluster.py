@@ -64,14 +64,14 @@ def _require_workers(client: "Client", address: str) -> None:
     except ImportError:  # what a worker without hapteq says of the function that it is sent
         found = dict.fromkeys(client.scheduler_info()["workers"], "")
     if not found:
-        raise _refused(f"The scheduler at {address} has no workers.", f"Start some: dask worker {address}.")
+        raise _cluster_error(f"The scheduler at {address} has no workers.", f"Start some: dask worker {address}.")
     own = own_version()
     if wrong := sorted({each or "none" for each in found.values() if each != own}):
-        raise _refused(
+        raise _cluster_error(
             f"Workers at {address} have hapteq {', '.join(wrong)}; here it is {own}.",
             "Install the same version for all of them.",
         )
 
 
-def _refused(happened: str, do_now: str) -> StudyError:
+def _cluster_error(happened: str, do_now: str) -> StudyError:
     return StudyError("The cluster cannot do this", happened, do_now, saved="Nothing was begun.")

@@ -39,7 +39,7 @@ def find_sensor_faults(
     ]
     for name, look in (
         ("quantization", _quantization),
-        ("sensor_clipping", _clipping),
+        ("sensor_clipping", _find_clipping),
         ("lost_samples", _lost_samples),
     ):
         found = look(new, references)
@@ -75,7 +75,7 @@ def _quantization(new: FloatArray, references: Sequence[FloatArray]) -> Found | 
     return _choose_channels(found, alike and len(found) == new.shape[1], new.shape[1], "step")
 
 
-def _clipping(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
+def _find_clipping(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
     """Clipping: more readings at the largest magnitude than the references have, which exceed that magnitude."""
     found = {}
     for c in range(new.shape[1]):

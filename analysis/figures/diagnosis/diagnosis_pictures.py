@@ -39,10 +39,10 @@ def diagnosis_drawings(found: Findings) -> list[Part]:
         ("the figure of held-out errors", lambda: [held_out_picture(*held)] if held[0] or held[2] else []),
         ("the spectrum of what is left", lambda: _remainder(found)),
     ]
-    return [Part(name, "its drawing", partial(_timed, draw, found.is_timed), ()) for name, draw in drawn]
+    return [Part(name, "its drawing", partial(_with_time_labels, draw, found.is_timed), ()) for name, draw in drawn]
 
 
-def _timed(draw: Callable[[], Sequence[Picture]], timed: bool) -> Sequence[Picture]:
+def _with_time_labels(draw: Callable[[], Sequence[Picture]], timed: bool) -> Sequence[Picture]:
     return draw() if timed else [count_in_samples(picture) for picture in draw()]
 
 

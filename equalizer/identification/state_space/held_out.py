@@ -72,7 +72,7 @@ def _compare_segment(model: IdentifiedModel, recording: Recording, segment: Segm
     if not (np.isfinite(commands).all() and np.isfinite(response[segment.start - start :]).all()):
         raise ValueError(f"samples {start} to {segment.stop} hold missing values; a test segment needs all of them")
     predicted = simulate(model, commands)
-    last = _compared_from(segment) - start
+    last = _first_compared_sample(segment) - start
     length = segment.stop - start - last
     measured = _band_spectrum(response[last:], rate_hz, model.band_hz)
     error = measured - _band_spectrum(predicted[last:], rate_hz, model.band_hz)
@@ -91,7 +91,7 @@ def _lead_samples(model: IdentifiedModel) -> int:
     return round(max(LEAD_S * model.sample_rate_hz, DECAYS * slowest))
 
 
-def _compared_from(segment: Segment) -> int:
+def _first_compared_sample(segment: Segment) -> int:
     """First sample of what is compared: the last period, the transient being over by then, or the whole segment."""
     periods = (segment.stop - segment.start) // segment.period if segment.period else 0
     return segment.stop - segment.period if periods >= 1 else segment.start

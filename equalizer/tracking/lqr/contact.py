@@ -67,7 +67,7 @@ def _deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatA
     if not level > 0:
         raise TrackingError(f"the recording has nothing between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band")
     wanted = every_normal(recording, p)
-    along = [basis.predicted(axis) - wanted[i] for i, axis in enumerate(np.eye(p))]
+    along = [basis.predicted_response(axis) - wanted[i] for i, axis in enumerate(np.eye(p))]
     lines = np.array([band_spectrum(each, rate_hz, band_hz).ravel() for each in along]) / level
     return np.asarray(lines @ lines.T)
 

@@ -37,7 +37,7 @@ def crc_of(rows: Bytes) -> npt.NDArray[np.uint16]:
     return crc
 
 
-def packed(sequence: npt.ArrayLike, time_us: npt.ArrayLike, raw: npt.ArrayLike) -> bytes:
+def encode_packets(sequence: npt.ArrayLike, time_us: npt.ArrayLike, raw: npt.ArrayLike) -> bytes:
     """Packets as the firmware sends them; sequence (n,), time_us (n,) and raw (n, 3), taken modulo their range."""
     numbers = np.atleast_1d(np.asarray(sequence, dtype=np.int64))
     packets = np.zeros(len(numbers), dtype=LAYOUT)

@@ -30,10 +30,10 @@ def calibrate_on_table(path: str, baud: int, before_each: Callable[[str], None],
         raise DeviceError("The accelerometer was not calibrated", f"{error}.", "Do it again.") from error
     finally:
         port.close()
-    return toml_of(calibration, path, baud)
+    return calibration_toml(calibration, path, baud)
 
 
-def toml_of(calibration: Calibration, path: str, baud: int) -> str:
+def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
     reach = np.abs(calibration.sensitivity).sum(axis=1) * RANGE_G * GRAVITY_MPS2
     lowest, highest = float((calibration.bias - reach).min()), float((calibration.bias + reach).max())
     rows = ", ".join(_numbers(row) for row in calibration.sensitivity)

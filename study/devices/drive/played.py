@@ -11,7 +11,7 @@ from study.devices.governor.governor import Governor
 COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) for start in range(0, ROW_SIZE, 3))
 
 
-def played_loop(governor: Governor, info: DeviceInfo) -> Played:
+def record_held_stimulus(governor: Governor, info: DeviceInfo) -> Played:
     """Of a held stimulus: the last of its steady part, whole loops unless the loop is longer than the ring."""
     rows, loop = governor.rows(), governor.steady
     whole = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
@@ -23,7 +23,7 @@ def played_loop(governor: Governor, info: DeviceInfo) -> Played:
     return _make_played(rows[-kept:], governor, info, (segment,))
 
 
-def played_once(governor: Governor, info: DeviceInfo) -> Played:
+def record_commands(governor: Governor, info: DeviceInfo) -> Played:
     """Of commands played once through; which segments they are, the caller knows."""
     health = governor.health()
     if health.fault is not Fault.NONE or len(governor.rows()) < len(governor.loop):

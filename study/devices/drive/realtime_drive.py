@@ -55,7 +55,7 @@ class Glances:
     def wanted(self) -> bool:
         return self._request is not None and not self._request.taken.is_set()
 
-    def taken(self) -> None:
+    def mark_taken(self) -> None:
         """To be said by the loop's thread after a reading."""
         if self._request is not None:
             self._request.taken.set()
@@ -162,7 +162,7 @@ class RealtimeDrive:
                     self._awake.set()
                 elif self._glances.wanted:
                     self._runner.glance()
-                    self._glances.taken()
+                    self._glances.mark_taken()
                 return
             gap_s, self._last_s = now_s - self._last_s, now_s
             if gap_s > self._longest_gap_s:
@@ -178,9 +178,9 @@ class RealtimeDrive:
             self._run = due
             if not self._runner.catches_up:
                 done_s = self._clock.now_s()
-                self._governor.timed(done_s > self._due_s(due + 1), done_s - first_s)
+                self._governor.count_lateness(done_s > self._due_s(due + 1), done_s - first_s)
             if self._glances.wanted:  # asked for a moment before this stimulus began
-                self._glances.taken()
+                self._glances.mark_taken()
 
     def _due_s(self, tick: int) -> float:
         return self._started_s + tick / self._rate_hz

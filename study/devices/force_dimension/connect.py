@@ -6,9 +6,9 @@ import os
 
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.library import DEVICE_IN_USE, Library, LibraryError
-from study.devices.force_dimension.locate import Computer, find_library, patterns, this_computer
+from study.devices.force_dimension.locate import Computer, find_library, library_patterns, this_computer
 from study.devices.force_dimension.models import DeviceModel, name_of_type
-from study.devices.force_dimension.usb import ADVICE, plugged_in
+from study.devices.force_dimension.usb import ADVICE, find_usb_devices
 from study.errors import DeviceError
 
 WATCHDOG_S = 0.03
@@ -26,7 +26,7 @@ def load_library() -> Library:
     computer = this_computer(os.environ)
     path = find_library(computer)
     if path is None:
-        raise no_library(computer)
+        raise missing_library_error(computer)
     return Library(path)
 
 
@@ -73,18 +73,18 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
                 "Check that its power supply is on, and press its force button if it has one.",
             )
     except LibraryError as error:
-        raise failed(model.name, error) from error
+        raise device_error(model.name, error) from error
     return drops_after_s
 
 
-def failed(name: str, error: LibraryError) -> DeviceError:
+def device_error(name: str, error: LibraryError) -> DeviceError:
     return DeviceError(
         f"The {name} does not work", f"The library says: {error}.", "Check its power and its cable, then try again."
     )
 
 
-def no_library(computer: Computer) -> DeviceError:
-    places = list(dict.fromkeys(str(folder) for folder, _ in patterns(computer)))
+def missing_library_error(computer: Computer) -> DeviceError:
+    places = list(dict.fromkeys(str(folder) for folder, _ in library_patterns(computer)))
     return DeviceError(
         "The device's library is not installed",
         f"Neither libdrd nor libdhd was found in {', '.join(places)}."
@@ -113,7 +113,7 @@ def _none_of_them(model: DeviceModel, others: list[str], failures: list[LibraryE
     if others:
         known = [f"--device {name}" for name in others]
         return DeviceError(title, f"Found instead: {', '.join(others)}.", f"Use {' or '.join(known)}, or plug it in.")
-    if any(not device.may_open for device in plugged_in() or ()):
+    if any(not device.may_open for device in find_usb_devices() or ()):
         return DeviceError(title, "A device is plugged in, and this account may not open it.", ADVICE)
     if failures:
         return DeviceError(

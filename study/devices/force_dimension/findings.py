@@ -9,7 +9,7 @@ from study.devices.force_dimension.lab import LabSettings, lab_file, read_lab
 from study.devices.force_dimension.library import LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rigs import info_of
-from study.devices.force_dimension.usb import ADVICE, plugged_in
+from study.devices.force_dimension.usb import ADVICE, find_usb_devices
 from study.devices.force_dimension.watchdog_proof import prove_watchdog
 from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
@@ -70,7 +70,7 @@ def _usb() -> list[DeviceFinding]:
         DeviceFinding("USB", device.product, fine=True)
         if device.may_open
         else DeviceFinding("USB", f"{device.product}: this account may not open it", fine=False, advice=ADVICE)
-        for device in plugged_in() or ()
+        for device in find_usb_devices() or ()
     ]
 
 

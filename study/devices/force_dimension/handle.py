@@ -58,7 +58,7 @@ class Handle:
 
     def read_position(self, into: FloatArray) -> bool:
         """into (3,), m. Whether it is a repetition of an earlier reading. For one thread at a time."""
-        code = self.library.checked("dhdGetPosition", self._get_position(*self._to_xyz))
+        code = self.library.check_answer("dhdGetPosition", self._get_position(*self._to_xyz))
         into[0], into[1], into[2] = self._x.value, self._y.value, self._z.value
         return code == STALE
 
@@ -70,7 +70,7 @@ class Handle:
 
     def set_force(self, x_n: float, y_n: float, z_n: float) -> bool:
         """Whether the device gives less than that. From any thread."""
-        return self.library.checked("dhdSetForce", self._set_force(x_n, y_n, z_n, self.number)) == SCALED
+        return self.library.check_answer("dhdSetForce", self._set_force(x_n, y_n, z_n, self.number)) == SCALED
 
     def status(self) -> Status:
         values = (c_int * STATUS_SIZE)()

@@ -32,7 +32,7 @@ class SensorSettings:
     """Lowest and highest raw value that are no clipping."""
     baud: int = Field(default=2_000_000, gt=0)
 
-    def opened(self) -> SerialAccelerometer:
+    def open_sensor(self) -> SerialAccelerometer:
         """Zeroed, so at rest. Raises `DeviceError`."""
         calibration = Calibration(np.array(self.bias), np.array(self.sensitivity), np.zeros(3), 0.0)
         sensor = SerialAccelerometer(open_serial(self.port, self.baud), calibration, self.raw_range)

@@ -78,7 +78,7 @@ class Library:
         """Unchecked, for calls at every tick: what it returns is for `checked` to judge."""
         return self._functions[name]
 
-    def checked(self, name: str, answer: int) -> int:
+    def check_answer(self, name: str, answer: int) -> int:
         """The answer. Raises `LibraryError` where it is below zero; to be asked in the thread of the call."""
         if answer >= 0:
             return answer
@@ -88,7 +88,7 @@ class Library:
 
     def call(self, name: str, *arguments: Any) -> int:
         """Raises `LibraryError`."""
-        return self.checked(name, int(self._functions[name](*arguments)))
+        return self.check_answer(name, int(self._functions[name](*arguments)))
 
     def _version(self) -> tuple[int, int, int, int]:
         parts = [c_int() for _ in range(4)]

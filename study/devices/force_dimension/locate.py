@@ -29,10 +29,10 @@ def this_computer(environ: Mapping[str, str]) -> Computer:
 
 def find_library(computer: Computer) -> Path | None:
     """libdrd before libdhd: it holds all of the other's functions and the automatic calibration besides."""
-    return next((path for pattern in patterns(computer) if (path := _newest(*pattern)) is not None), None)
+    return next((path for pattern in library_patterns(computer) if (path := _newest(*pattern)) is not None), None)
 
 
-def patterns(computer: Computer) -> Iterator[tuple[Path, str]]:
+def library_patterns(computer: Computer) -> Iterator[tuple[Path, str]]:
     """(folder, file pattern), the most wanted first. A variable that is set is meant: it comes before all else."""
     for folder in _folders(computer):
         for library in ("drd", "dhd"):

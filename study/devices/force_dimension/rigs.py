@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from study.devices.accelerometer.serial_reader import SerialAccelerometer
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.force_dimension.acceptance import check_accepted
-from study.devices.force_dimension.connect import failed, load_library, make_ready, open_model
+from study.devices.force_dimension.connect import device_error, load_library, make_ready, open_model
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.lab import LabSettings, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
@@ -21,7 +21,7 @@ def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRi
     """Raises `DeviceError` that says what is missing. What was opened until then is stopped and closed again."""
     model, lab = MODELS[name], read_lab()
     library = load_library()
-    sensor = lab.accelerometer.opened() if lab.accelerometer is not None else None
+    sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None else None
     try:
         return _rig(library, model, lab, sensor, settings)
     except BaseException:
@@ -49,7 +49,7 @@ def _rig(
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, sensor)
     except LibraryError as error:
         handle.let_go()
-        raise failed(model.name, error) from error
+        raise device_error(model.name, error) from error
     except BaseException:
         handle.let_go()
         raise

@@ -21,14 +21,14 @@ ADVICE = (
 
 
 @dataclass(frozen=True, slots=True)
-class Plugged:
+class UsbDevice:
     product: str
     may_open: bool
 
 
-def plugged_in(
+def find_usb_devices(
     devices: Path = Path("/sys/bus/usb/devices"), nodes: Path = Path("/dev/bus/usb")
-) -> tuple[Plugged, ...] | None:
+) -> tuple[UsbDevice, ...] | None:
     """None where this system does not tell (no Linux)."""
     if not devices.is_dir():
         return None
@@ -38,7 +38,7 @@ def plugged_in(
             continue
         bus, number = _read(folder / "busnum"), _read(folder / "devnum")
         node = nodes / bus.zfill(3) / number.zfill(3)
-        found.append(Plugged(_read(folder / "product") or "unnamed", os.access(node, os.R_OK | os.W_OK)))
+        found.append(UsbDevice(_read(folder / "product") or "unnamed", os.access(node, os.R_OK | os.W_OK)))
     return tuple(found)
 
 

@@ -33,7 +33,7 @@ class Governor:
         self._rate_hz = info.sample_rate_hz
         self._longest_s = settings.limits.longest_hold_s
         self._keep_s = settings.keep_s
-        self.settings = packed_settings(info, settings)
+        self.settings = pack_settings(info, settings)
         self.state = np.zeros(cells.STATE_SIZE)
         self._late_ticks, self._latest_s = 0, 0.0
         self.loop: FloatArray = np.zeros((1, 3))
@@ -120,7 +120,7 @@ class Governor:
             govern.record(self.state, self.buffer, nothing)
             self.state[[cells.TICK, cells.TICKS, cells.MISSED]] += 1.0
 
-    def timed(self, late: bool, after_s: float) -> None:
+    def count_lateness(self, late: bool, after_s: float) -> None:
         """Of the tick that was just run: whether it ended late, and how long after it was due."""
         self._late_ticks += late
         self._latest_s = max(self._latest_s, after_s)
@@ -169,7 +169,7 @@ class Governor:
         return round(seconds * self._rate_hz)
 
 
-def packed_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
+def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
     """The cells of `study.devices.governor.govern` that hold from opening to closing."""
     limits, rate_hz = settings.limits, info.sample_rate_hz
     packed = np.zeros(cells.SETTINGS_SIZE)

@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.simulated.drives import step_cables, step_drives
 from study.devices.simulated.handle import handle_force, step_bending, step_sensor
-from study.devices.simulated.inertia import SIZE, invert_in_place, mass_matrix, transposed_solve
+from study.devices.simulated.inertia import SIZE, invert_in_place, mass_matrix, solve_transposed
 from study.devices.simulated.inlined import inlined
 from study.devices.simulated.layout import (
     ARM_INERTIA,
@@ -95,7 +95,7 @@ def _hold(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> Hel
         midpoint[axis] = state[RELATIVE + axis] + 0.5 * TICK_S * state[VELOCITY + axis]
     inverse_kinematics(parameters, midpoint, angles, held.jacobian)
     inverse_kinematics(parameters, state[RELATIVE : RELATIVE + 3], angles, begin)
-    transposed_solve(begin, force_n, held.command)
+    solve_transposed(begin, force_n, held.command)
     held.centrifugal[:] = 0.0
     for number in range(3):
         held.stretch[number] = state[MOTOR + number] - angles[number]

@@ -52,7 +52,7 @@ def invert_in_place(matrix: FloatArray) -> None:
 
 
 @inlined
-def transposed_solve(jacobian: FloatArray, force: FloatArray, torque: FloatArray) -> None:
+def solve_transposed(jacobian: FloatArray, force: FloatArray, torque: FloatArray) -> None:
     """Fills torque (3,) with jacobian^T torque = force, by cofactors."""
     j = jacobian
     c0 = j[1, 1] * j[2, 2] - j[1, 2] * j[2, 1]

@@ -44,16 +44,16 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
     if begin is None or settings.names:
         first = split_row(rows[0][1], delimiter)
         has_header = not _all_numbers(first, decimal)
-        names = settings.names or tuple(_numbered(first))
+        names = settings.names or tuple(_name_columns(first))
         return TableLayout(delimiter, decimal, names, rows[1:] if has_header else rows)
     width = len(split_row(rows[begin][1], delimiter))
-    above = [split_row(_uncommented(text), delimiter) for number, text in lines if number < rows[begin][0]]
+    above = [split_row(_strip_comment(text), delimiter) for number, text in lines if number < rows[begin][0]]
     header, units = _header_and_units([fields for fields in above if fields], width, decimal)
     if header is None:
         if begin == 0:
             return TableLayout(delimiter, decimal, tuple(f"column{k + 1}" for k in range(width)), rows)
-        return TableLayout(delimiter, decimal, tuple(_numbered(split_row(rows[0][1], delimiter))), rows[1:])
-    return TableLayout(delimiter, decimal, tuple(_with_units(_numbered(header), units)), rows[begin:])
+        return TableLayout(delimiter, decimal, tuple(_name_columns(split_row(rows[0][1], delimiter))), rows[1:])
+    return TableLayout(delimiter, decimal, tuple(_with_units(_name_columns(header), units)), rows[begin:])
 
 
 def is_comment(line: str) -> bool:
@@ -109,7 +109,7 @@ def _most_frequent(line: str, decimal: str) -> str:
     return best if counts[best] else " "
 
 
-def _uncommented(line: str) -> str:
+def _strip_comment(line: str) -> str:
     return line.strip().lstrip("".join(COMMENTS)).strip() if is_comment(line) else line
 
 
@@ -148,7 +148,7 @@ def _is_unit(field: str) -> bool:
     return True
 
 
-def _numbered(header: Sequence[str]) -> list[str]:
+def _name_columns(header: Sequence[str]) -> list[str]:
     return [name or f"column{number}" for number, name in enumerate(header, start=1)]
 
 

@@ -96,7 +96,7 @@ class Conversation:
 
     def input_is_over(self) -> bool:
         """Whether the input has ended with no line left."""
-        return self._lines.ended()
+        return self._lines.has_ended()
 
 
 def printable(text: str) -> str:

@@ -25,7 +25,7 @@ class LineInput:
             raise EOFError
         return self._take_line()
 
-    def ended(self) -> bool:
+    def has_ended(self) -> bool:
         """Whether no line is left and none can come. Consumes nothing."""
         while b"\n" not in self._pending and not self._over:
             if not select.select([self._descriptor], [], [], 0.0)[0]:

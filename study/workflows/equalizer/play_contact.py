@@ -113,11 +113,11 @@ def play_contact(
         recording = plan.scale * transient.signal.samples[:, 0]
         start = causal_start(make_tracking_problem(model, TrackingWeights(plan.weight)), recording, REST)
     except ValueError as problem:
-        raise _refused(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
+        raise _refusal(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
     tracked = start.basis.forces(normal)
     wanted = _along(recording, normal, len(tracked))
     forces = (
-        _within_cap(_faded(_beside_spring(tracked, wanted, models), rate_hz), plan, rate_hz),
+        _within_cap(_fade_out(_beside_spring(tracked, wanted, models), rate_hz), plan, rate_hz),
         _within_cap(_plain_forces(model, wanted), plan, rate_hz),
     )
     measured = _play_both(plan, models, forces, on_progress, before_moving)
@@ -164,7 +164,7 @@ def _beside_spring(forces: FloatArray, wanted: FloatArray, models: ModelsForPlay
     return commands(wanted)
 
 
-def _faded(forces: FloatArray, rate_hz: float) -> FloatArray:
+def _fade_out(forces: FloatArray, rate_hz: float) -> FloatArray:
     left_s = np.arange(len(forces))[::-1] / rate_hz
     share = np.clip(left_s / FADE_S, 0.0, 1.0)
     return np.asarray(forces * (0.5 - 0.5 * np.cos(np.pi * share))[:, np.newaxis])
@@ -180,7 +180,7 @@ def _within_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatA
         require_under_cap(forces, plan.cap_n, rate_hz)
     except ForceLimitError as limit:
         fits = np.floor(1e3 * plan.scale * limit.peaks.largest_scale) / 1e3
-        raise _refused(
+        raise _refusal(
             f"The forces would reach {limit.peaks.peak_n:.3g} N, above the cap of {plan.cap_n:g} N.",
             f"Give --scale {fits:g} or less, or raise --cap for a device that no hand holds.",
         ) from limit
@@ -204,7 +204,7 @@ def _play_both(
 
     with contextlib.closing(open_device(plan.device, settings, clock, plan.seed)) as device:
         if device.info.sample_rate_hz != models.nearest.sample_rate_hz:
-            raise _refused(
+            raise _refusal(
                 f"The model is at {models.nearest.sample_rate_hz:g} Hz, the device runs at "
                 f"{device.info.sample_rate_hz:g} Hz.",
                 "Identify a model from recordings of this device.",
@@ -295,5 +295,5 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-def _refused(happened: str, do_now: str) -> StudyError:
+def _refusal(happened: str, do_now: str) -> StudyError:
     return StudyError("The transient was not played", happened, do_now, saved="Nothing moved.")

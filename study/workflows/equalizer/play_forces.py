@@ -23,7 +23,7 @@ HAND_CAP_N = 3.0
 def require_device_alone(models: ModelsForPlaying) -> None:
     """Raises StudyError for a model that holds a hand."""
     if any("held" in model.provenance.get("hand", ()) for model in models.given):
-        raise _refused(
+        raise _refusal(
             "The model was recorded with a hand on the handle: its forces are right for that hand in that moment.",
             "Take a model of the device alone, and leave the handle alone.",
         )
@@ -34,7 +34,7 @@ def acting_spring(models: ModelsForPlaying) -> VirtualSpring:
     feedback = _feedback(models)
     acting = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
     if not feedback:
-        raise _refused(
+        raise _refusal(
             "The model does not say under which spring it was recorded, so the spring's share of the forces is not "
             "known.",
             "Identify it from recordings that hapteq record made.",
@@ -76,7 +76,7 @@ BeforeMoving = Callable[[str], None]
 
 def refuse_unannounced(notice: str) -> None:
     """Of a caller that tells no person: a real device does not move for it. Raises StudyError."""
-    raise _refused(f"A real device would move without a warning. {notice}", "Use the command, which asks first.")
+    raise _refusal(f"A real device would move without a warning. {notice}", "Use the command, which asks first.")
 
 
 def announce_motion(device: Device, peak_n: float, total_s: float, before_moving: BeforeMoving) -> None:
@@ -113,5 +113,5 @@ def measured_acceleration(played: Played) -> FloatArray:
     return played.recording.response.samples
 
 
-def _refused(happened: str, do_now: str) -> StudyError:
+def _refusal(happened: str, do_now: str) -> StudyError:
     return StudyError("Nothing was played", happened, do_now, saved="Nothing moved.")

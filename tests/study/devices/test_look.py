@@ -237,7 +237,7 @@ def test_concurrent_requests_get_the_same_reading():
     while not glances.wanted:
         time.sleep(0.001)
     time.sleep(0.02)
-    glances.taken()
+    glances.mark_taken()
     for asker in askers:
         asker.join()
     assert served == [True, True]
@@ -250,5 +250,5 @@ def test_a_late_request_is_not_waited_for_again_until_it_is_served():
     assert not glances.ask()
     clock.seconds = 1.0
     assert seconds_for(glances.ask) < 0.05
-    glances.taken()
+    glances.mark_taken()
     assert seconds_for(glances.ask) > PATIENCE_S * 0.9

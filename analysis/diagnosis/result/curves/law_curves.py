@@ -50,7 +50,7 @@ def law_signature(
         main = _Variable(f"force of the law ({system.force})", force)
         along, law_at, values = main.name, *_identity(force[used])
     elif len(law.variables) == 1 and not has_memory(law):
-        law_at, values, visited = _extended(law, main.values[used], rate_hz)
+        law_at, values, visited = _evaluate_beyond(law, main.values[used], rate_hz)
     else:
         law_at, values = bin_law_means(main.values[used], force[used])
     at, mean, spread = bin_means(main.values, evidence.axis_force[:, axis], used, rate_hz)
@@ -82,7 +82,7 @@ def _variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) ->
     return found
 
 
-def _extended(law: Law, seen: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
+def _evaluate_beyond(law: Law, seen: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
     """The formula of one variable over what was visited and beyond, and the visited range."""
     low, high = float(seen.min()), float(seen.max())
     margin = _BEYOND * (high - low)

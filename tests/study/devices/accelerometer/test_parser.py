@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from study.devices.accelerometer.parser import CHECKED, SIZE, SYNC, PacketParser, crc_of, packed
+from study.devices.accelerometer.parser import CHECKED, SIZE, SYNC, PacketParser, crc_of, encode_packets
 
 FIRMWARE = Path(__file__).parents[4] / "docs" / "firmware"
 
@@ -17,7 +17,7 @@ FIRMWARE = Path(__file__).parents[4] / "docs" / "firmware"
 def stream(count: int, first: int = 0, seed: int = 1) -> tuple[bytes, np.ndarray]:
     raw = np.random.default_rng(seed).integers(0, 2**16, (count, 3), dtype=np.uint16)
     numbers = first + np.arange(count)
-    return packed(numbers, 250 * numbers, raw), raw
+    return encode_packets(numbers, 250 * numbers, raw), raw
 
 
 def test_the_check_sum_is_the_published_one():
@@ -49,7 +49,7 @@ def test_packets_are_decoded_from_bytes_split_anywhere(cuts):
 def test_counters_and_times_continue_after_an_overflow():
     numbers = 65_500 + np.arange(100)
     times_us = 2**32 - 5000 + 250 * np.arange(100)
-    samples = PacketParser().feed(packed(numbers, times_us, np.zeros((100, 3))))
+    samples = PacketParser().feed(encode_packets(numbers, times_us, np.zeros((100, 3))))
     assert (samples.sequence == numbers).all()
     assert (np.diff(samples.time_us) == 250).all()
 
@@ -118,7 +118,7 @@ def test_a_million_bytes_of_noise_are_no_packets():
 def test_a_false_packet_inside_another_does_not_hide_the_real_one():
     """A false candidate ends in the real packet that follows a good one."""
     data, _ = stream(3)
-    inner = bytearray(packed(77, 0, [[0, 0, 0]]))
+    inner = bytearray(encode_packets(77, 0, [[0, 0, 0]]))
     forged = None
     for k in range(2**16):  # raw values so that the candidate's check sum fits
         trial = bytearray(inner)
@@ -151,4 +151,4 @@ def test_the_firmware_makes_the_same_packets(vendor, tmp_path):
         raw = random.integers(0, 2**16, 3, dtype=np.uint16)
         out = ctypes.create_string_buffer(SIZE)
         make(out, number, time_us, raw.ctypes.data)
-        assert out.raw == packed(number, time_us, raw[None])
+        assert out.raw == encode_packets(number, time_us, raw[None])

@@ -12,7 +12,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP, Calibration
-from study.devices.accelerometer.parser import SIZE, packed
+from study.devices.accelerometer.parser import SIZE, encode_packets
 from study.devices.accelerometer.serial_reader import FRESH_S, SerialAccelerometer, open_serial
 from study.devices.accelerometer.six_positions import calibrate_on_table
 from study.devices.force_dimension.lab import SensorSettings
@@ -46,7 +46,7 @@ class Board:
                 numbers = np.arange(self.sent, due)
                 raw = np.tile(np.clip(32_768 + SCALE * self.acceleration, 0, 65_535), (len(numbers), 1))
                 with contextlib.suppress(OSError):
-                    os.write(self.master, self.spoil(packed(numbers, 1e6 * numbers / self.rate_hz, raw)))
+                    os.write(self.master, self.spoil(encode_packets(numbers, 1e6 * numbers / self.rate_hz, raw)))
                 self.sent = due
             time.sleep(0.002)
 

@@ -9,7 +9,7 @@ import pytest
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.force_dimension import connect
 from study.devices.force_dimension.models import MODELS
-from study.devices.force_dimension.usb import Plugged
+from study.devices.force_dimension.usb import UsbDevice
 from study.devices.opening import REAL, open_device
 from study.errors import DeviceError, ExitCode
 
@@ -125,7 +125,7 @@ def test_without_a_watchdog_it_opens_where_no_hand_is_on_the_handle(stub, opened
 
 def test_a_device_that_this_account_may_not_open_looks_as_if_it_were_not_there(stub, opened, monkeypatch):
     stub.set("devices", 0)
-    monkeypatch.setattr(connect, "plugged_in", lambda: (Plugged("omega.3", may_open=False),))
+    monkeypatch.setattr(connect, "find_usb_devices", lambda: (UsbDevice("omega.3", may_open=False),))
     said = refused(opened)
     assert "this account may not open it" in said and "udev" in said and '"1451"' in said
 

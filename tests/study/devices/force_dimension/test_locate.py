@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from study.devices.force_dimension.locate import Computer, find_library
-from study.devices.force_dimension.usb import Plugged, plugged_in
+from study.devices.force_dimension.usb import UsbDevice, find_usb_devices
 
 
 def computer(root: Path, system: str = "linux", machine: str = "x86_64", **environ: str) -> Computer:
@@ -57,7 +57,7 @@ def test_devices_of_the_vendor_are_seen_on_the_bus(tmp_path):
     for name, vendor, number in (("1-1", "1451", "7"), ("1-2", "046d", "8"), ("usb1", "", "")):
         for key, text in (("idVendor", vendor), ("busnum", "1"), ("devnum", number), ("product", "omega.3")):
             laid(tmp_path / "sys" / name / key).write_text(f"{text}\n")
-    assert plugged_in(tmp_path / "sys", tmp_path / "bus") == (Plugged("omega.3", may_open=False),)
+    assert find_usb_devices(tmp_path / "sys", tmp_path / "bus") == (UsbDevice("omega.3", may_open=False),)
     laid(tmp_path / "bus" / "001" / "007")
-    assert plugged_in(tmp_path / "sys", tmp_path / "bus") == (Plugged("omega.3", may_open=True),)
-    assert plugged_in(tmp_path / "elsewhere") is None
+    assert find_usb_devices(tmp_path / "sys", tmp_path / "bus") == (UsbDevice("omega.3", may_open=True),)
+    assert find_usb_devices(tmp_path / "elsewhere") is None

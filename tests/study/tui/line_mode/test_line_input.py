@@ -30,10 +30,10 @@ def test_the_end_of_the_input_is_reported(pipe):
 
 def test_an_input_has_ended_only_when_its_last_line_was_taken(pipe):
     lines, write = pipe
-    assert not lines.ended()
+    assert not lines.has_ended()
     os.write(write, b"1\n")
     os.close(write)
-    assert not lines.ended()
+    assert not lines.has_ended()
     assert lines.read(0.0) == "1"
-    assert lines.ended()
-    assert lines.ended()
+    assert lines.has_ended()
+    assert lines.has_ended()

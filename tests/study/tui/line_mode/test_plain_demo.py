@@ -29,7 +29,7 @@ class Person(LineInput):
     def forget(self) -> None:
         return None
 
-    def ended(self) -> bool:
+    def has_ended(self) -> bool:
         return False
 
     def read(self, timeout_s: float) -> str | None:
