@@ -5,6 +5,7 @@ import re
 from dataclasses import dataclass, field, replace
 
 import matplotlib
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -19,9 +20,8 @@ def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> 
     buffer = io.StringIO()
     # Text stays text: it can be read aloud, searched and copied.
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+        _lay_out(figure)
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    # It lies where it should now; laying it out again would take as long as drawing it.
-    figure.set_layout_engine("none")
     text = buffer.getvalue()
     svg = text[text.index("<svg") :]
     svg = re.sub(r'\bid="', f'id="{name}-', svg)
@@ -33,6 +33,18 @@ def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> 
         f'{opening} role="img" aria-labelledby="{named}"><title id="{name}-title">{_escape_markup(title)}</title>'
         f"{described}{rest}"
     )
+
+
+def _lay_out(figure: Figure) -> None:
+    """Place the axes once, for text as wide as in SVG. `savefig` would draw any figure with a layout engine twice, be it
+    an empty one."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        resolution = figure.dpi
+        FigureCanvasSVG(figure)
+        engine.execute(figure)
+        figure.dpi = resolution
+    figure.set_layout_engine(None)
 
 
 def _escape_markup(text: str) -> str:
