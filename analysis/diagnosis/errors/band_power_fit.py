@@ -59,7 +59,11 @@ class View:
     def predict(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
         """(stretches, bands, c): mean prediction over the ensemble; NaN throughout where the model is invalid."""
         members = range(self.ensemble if len(hypothesis.point) else 1)
-        return np.asarray(np.mean([self._member(deviations, perturb(hypothesis, k)) for k in members], axis=0))
+
+        def member(number: int) -> FloatArray:
+            return self._member(deviations, perturb(hypothesis, number))
+
+        return np.asarray(np.mean(list(self.map_(member, members)), axis=0))  # type: ignore[arg-type]
 
     def _member(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
         try:

@@ -37,15 +37,19 @@ def correlation_time(series: FloatArray) -> float:
 
 def shuffle_blocks(strata: IntArray, block: int, random: np.random.Generator) -> IntArray:
     """Indices (n,) that exchange blocks within each stratum, cut from a random offset on. strata: (n,), contiguous."""
-    order = np.arange(len(strata))
+    every, order = np.arange(len(strata)), np.empty(len(strata), dtype=np.int64)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(strata)) + 1, [len(strata)]])
     for start, stop in pairwise(edges.tolist()):
         length = stop - start
         size = max(1, min(block, length // _LEAST_BLOCKS))
-        turned = np.roll(np.arange(start, stop), int(random.integers(length)))
+        cut = stop - int(random.integers(length))
+        turned = np.concatenate([every[cut:stop], every[start:cut]])
         blocks = length // size
-        cut = turned[: blocks * size].reshape(blocks, size)[random.permutation(blocks)].ravel()
-        order[start:stop] = np.concatenate([cut, turned[blocks * size :]])
+        whole = blocks * size
+        order[start : start + whole].reshape(blocks, size)[:] = turned[:whole].reshape(blocks, size)[
+            random.permutation(blocks)
+        ]
+        order[start + whole : stop] = turned[whole:]
     return order
 
 

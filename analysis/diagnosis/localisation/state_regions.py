@@ -84,12 +84,13 @@ def state_regions(
     inside = [(state, state.values[used]) for state in states if state.kind != "time"]
     if inside:
         expected = _mean_square_in(values, strata)
-        found += _test_states(_Sample(values, expected, strata, block), inside, permutations, random)
+        found += _test_states(_Sample(values, expected, strata, block, even=True), inside, permutations, random)
     times = [(state, _within_stratum(strata)) for state in states if state.kind == "time"]
     if times and disturbance.signal is not None:
         signal = disturbance.signal[used] ** 2
         share = _mean_square_in(values, strata) / np.maximum(_mean_square_in(disturbance.signal[used], strata), _TINY)
-        found += _test_states(_Sample(values, share * signal, strata, block), times, permutations, random)
+        driven = _Sample(values, share * signal, strata, block, even=False)
+        found += _test_states(driven, times, permutations, random)
     return tuple(sorted(found, key=lambda region: (region.p_value, -region.share)))
 
 
@@ -100,6 +101,8 @@ class _Sample:
     """Mean square that each sample would have if the state did not matter."""
     strata: IntArray
     block: int
+    even: bool
+    """Whether `expected` is the same throughout each stratum, so that shuffling leaves it as it is."""
 
 
 def _test_states(
@@ -107,12 +110,15 @@ def _test_states(
 ) -> list[StateRegion]:
     by_size = [_equal_bins(np.abs(v) if _uses_magnitude(state) else v) for state, v in states]
     by_sign = [_equal_bins(v) for state, v in states if _has_sign(state)]
-    power, total = asked.values**2, float(np.sum(asked.values**2))
+    total, counts = float(np.sum(asked.values**2)), [np.bincount(b) for b in by_sign]
+    even = [_sums(b, asked.expected) for b in by_size] if asked.even else []
 
     def statistics(order: IntArray) -> FloatArray:
-        moved, expected, means = power[order], asked.expected[order], asked.values[order]
-        sizes = [_unevenness(_sums(b, moved), _sums(b, expected)) for b in by_size]
-        signs = [float(np.sum(_sums(b, means) ** 2 / np.bincount(b))) / total for b in by_sign]
+        moved = asked.values[order]
+        power = moved**2
+        there = even or [_sums(b, asked.expected[order]) for b in by_size]
+        sizes = [_unevenness(_sums(b, power), expected) for b, expected in zip(by_size, there, strict=True)]
+        signs = [float(np.sum(_sums(b, moved) ** 2 / count)) / total for b, count in zip(by_sign, counts, strict=True)]
         return np.array(sizes + signs)
 
     p_values = permutation_p_values(statistics, asked.strata, asked.block, permutations, random)
