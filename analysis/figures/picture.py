@@ -36,8 +36,8 @@ def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> 
 
 
 def _lay_out(figure: Figure) -> None:
-    """Place the axes once, for text as wide as in SVG. `savefig` would draw any figure with a layout engine twice, be it
-    an empty one."""
+    """Place the axes once, for text as wide as in SVG. `savefig` would draw a figure with any layout engine twice, even
+    with an empty one."""
     engine = figure.get_layout_engine()
     if engine is not None:
         resolution = figure.dpi

@@ -9,7 +9,7 @@ import numpy as np
 from analysis.diagnosis.data.carried_weight import add_carried_weight
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.unexplained_motion import evidence_of
-from equalizer.effects.effect import Effect, PlacedEffect
+from equalizer.effects.effect import AxisForce, Effect, JointForce, PlacedEffect
 from equalizer.effects.simulation.simulator import Measurement, SimulationResult, simulate_mechanism, simulate_response
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -28,6 +28,8 @@ class FreeSimulation:
     known: tuple[PlacedEffect, ...] = ()
     """What the model's own file names: it is part of every simulation."""
     least: float = 0.0
+    coarser: int = 1
+    """Times that simulation steps under motion-dependent forces are longer."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
@@ -61,7 +63,8 @@ class FreeSimulation:
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         seen = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
         model = add_carried_weight(model, signals)
-        return simulate(model, record.command, signals.sample_rate_hz, (*self.known, *effects), signals.hold, seen)
+        every = [_coarsen(placed, self.coarser) for placed in (*self.known, *effects)]
+        return simulate(model, record.command, signals.sample_rate_hz, every, signals.hold, seen)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
@@ -72,6 +75,14 @@ class FreeSimulation:
             there = add_carried_weight(model, record.recording)
             found.append(evidence_of(there, record, played, left, (self.unit, self.noise)))
         return tuple(found)
+
+
+def _coarsen(placed: PlacedEffect, times: int) -> PlacedEffect:
+    acts = placed.effect.acts
+    if times == 1 or not isinstance(acts, (AxisForce, JointForce)):
+        return placed
+    longer = replace(acts, steps=-(-acts.steps // times))
+    return replace(placed, effect=replace(placed.effect, acts=longer))
 
 
 def _subtract_prediction(measured: FloatArray, played: SimulationResult) -> FloatArray:

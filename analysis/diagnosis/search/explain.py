@@ -21,7 +21,7 @@ from analysis.diagnosis.search.search_context import (
     first_fits,
     sensitivity_at,
 )
-from analysis.diagnosis.search.short_recordings import ShortRecordings, short_recordings_of
+from analysis.diagnosis.search.short_recordings import ShortRecordings, coarsen, short_recordings_of
 from analysis.diagnosis.search.starting_hypotheses import CLOCK_DRIFT, candidates, clock_drift_by_trial, within_data
 from analysis.diagnosis.search.time_budget import OutOfTimeError, always, limit_map
 from analysis.diagnosis.settings import (
@@ -48,7 +48,7 @@ def fits_on_short_recordings(
 ) -> list[Fitted]:
     """First fits on all samples, the best first, screened on short recordings. timed: hypotheses that depend on
     sampling times, which short recordings cannot judge."""
-    short, guard = short_form.context, context.guard
+    short, guard = replace(short_form.context, measure=coarsen(short_form.context.measure)), context.guard
     there = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
     known = sensitivity_at(short, base.deviations, base.hypothesis)
     screened = screen(short.measure, short.tuning, there, known, timeless, guard.over(short.map_, SCREENING))
@@ -61,7 +61,9 @@ def fits_on_short_recordings(
     if timed:
         # What the model's own numbers do repeats all the same.
         repeats = short_form.repeat_sensitivity(known)
-        screened = screen(context.measure, context.tuning, base, repeats, timed, guard.over(context.map_, SCREENING))
+        coarse = coarsen(context.measure)
+        begun = evaluate_fit(coarse, context.tuning, base.deviations, base.hypothesis)
+        screened = screen(coarse, context.tuning, begun, repeats, timed, guard.over(context.map_, SCREENING))
         fits += first_fits(context, base, repeats, _keep_promising(base, fits, screened))
     # A law that the short recordings leave open may run away on the whole.
     return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda found: found.cost)

@@ -40,7 +40,7 @@ WIDTHS = np.geomspace(0.02, 5.0, 13)
 FIRST_ROUNDS, ROUNDS, STEPS = 5, 4, 2
 """Steps of the first fit, without the model's numbers; linearisations of the last fit; and its steps for each."""
 GAINED = 0.02
-"""Relative decrease of the cost by a linearisation below which it is the last."""
+"""Relative decrease of the cost that a further linearisation must promise."""
 RIVAL = "loose_joint"
 
 
@@ -93,12 +93,15 @@ def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
     """The fit of the hypothesis's and the model's numbers together: play changes the sensitivity to the model's."""
     view = _with_chance(view, start)
     best = evaluate_hypothesis(view, start.deviations, start.hypothesis)
+    before = 0.0
     for _ in range(ROUNDS):
         view = replace(view, by_deviations=_by_deviations(view, best))
         better = fit_band_power(view, best, STEPS)
-        gained = best.cost - better.cost
+        gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
+        # Gains shrink about geometrically, so that the next one can be predicted.
+        foreseen, before = gained * min(gained / before, 1.0) if before > 0 else gained, gained
         best = better
-        if gained <= GAINED * best.cost:
+        if foreseen <= GAINED:
             break
     return best
 

@@ -31,6 +31,16 @@ from equalizer.signals.signal import FloatArray
 Places = npt.NDArray[np.int64]
 
 
+COARSER = 2
+"""Times that simulation steps are longer where laws are only ranked, and their fits begun: a step's error stays far
+below that of the straight line by which gains are foreseen."""
+
+
+def coarsen(measure: ErrorMeasure) -> ErrorMeasure:
+    """The measure with longer simulation steps, where it simulates freely."""
+    return replace(measure, coarser=COARSER) if isinstance(measure, FreeSimulation) else measure
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cut:
     kept: Places
