@@ -39,7 +39,7 @@ def _lay_out(figure: Figure) -> None:
     """Place the axes once, for text as wide as in SVG. `savefig` would draw a figure with any layout engine twice, even
     with an empty one."""
     engine = figure.get_layout_engine()
-    if engine is not None:
+    if engine is not None and figure.axes:
         resolution = figure.dpi
         FigureCanvasSVG(figure)
         engine.execute(figure)
