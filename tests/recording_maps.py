@@ -18,6 +18,28 @@ U = np.random.default_rng(1).standard_normal(N)
 Y = np.cumsum(U) / 50
 
 
+NOISE_ON_ONE_AXIS = """
+device = "one axis"
+title = "Noise on one axis"
+files = ["run.npz"]
+
+[[clock]]
+rate_hz = 500
+
+[[channel]]
+role = "command"
+name = "fx"
+value = "u"
+unit = "N"
+
+[[channel]]
+role = "response"
+name = "ax"
+value = "y"
+unit = "m/s^2"
+"""
+"""A map of one recording; segments and diagnosis are left to the test."""
+
 ONE = """
 device = "rig"
 [[clock]]

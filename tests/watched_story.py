@@ -3,16 +3,13 @@
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
-from protocols.document.hashing import protocol_hash
 from protocols.trial import Phase
 from study.session.facts.events import (
     AnswerGiven,
     DeviceFacts,
     RestTaken,
     SessionClosed,
-    SessionOpened,
     TrialMeasured,
-    TrialPresented,
     TrialSpoiled,
 )
 from study.session.state.due_trial import Present
@@ -20,6 +17,7 @@ from study.session.state.machine import Finish, Rest, next_action
 from study.session.watching.live import Live
 from study.session.watching.watched import Watched, begin_watching, follow
 from study.session.watching.watching import LiveInfo, watch_view
+from tests.session_facts import opened, presented
 
 BEGAN = datetime(2026, 11, 22, 10, 0, tzinfo=UTC)
 
@@ -31,41 +29,6 @@ def at(seconds: float) -> str:
     return (BEGAN + timedelta(seconds=seconds)).isoformat(timespec="milliseconds")
 
 
-def opened(protocol, text, seed=7) -> SessionOpened:
-    return SessionOpened(
-        utc=at(0),
-        format="hapteq-session",
-        version=1,
-        session="P01_001",
-        subject="P01",
-        participant_number=0,
-        observer="scripted",
-        protocol_text=text,
-        protocol_hash=protocol_hash(protocol),
-        protocol_locked=False,
-        seed=seed,
-        device=DEVICE,
-        equalizer="none",
-        versions={"hapteq": "0"},
-    )
-
-
-def presented(action: Present, seconds: float) -> TrialPresented:
-    return TrialPresented(
-        utc=at(seconds),
-        run=action.run,
-        trial=action.trial,
-        attempt=action.attempt,
-        phase=action.phase,
-        frequency_hz=action.frequency_hz,
-        level_db=action.level_db,
-        level_n=action.level_n,
-        direction=action.label,
-        angle_deg=action.angle_deg,
-        polarity=action.polarity,
-    )
-
-
 def place(action: Present) -> dict[str, int]:
     return {"run": action.run, "trial": action.trial, "attempt": action.attempt}
 
@@ -74,7 +37,9 @@ class Story:
     """A session under way; ten seconds for each trial."""
 
     def __init__(self, protocol, text, seed=7) -> None:
-        self.watched: Watched = begin_watching(opened(protocol, text, seed), protocol)
+        self.watched: Watched = begin_watching(
+            opened(protocol, text, utc=at(0), observer="scripted", seed=seed, device=DEVICE), protocol
+        )
         self.seconds = 0.0
 
     def tell(self, event) -> "Story":
@@ -88,7 +53,7 @@ class Story:
             self.tell(RestTaken(at(self.seconds), state.run, state.trial, rested_s=action.seconds))
             action = next_action(self.watched.state)
         self.seconds += 10.0
-        self.tell(presented(action, self.seconds))
+        self.tell(presented(action, at(self.seconds)))
         return action
 
     def answer(self, correct: bool, **measured) -> "Story":

@@ -15,29 +15,13 @@ import pytest
 from analysis.diagnosis.document import Diagnosis, Errors, Fit
 from study.cli.main import main
 from study.store.formats.diagnosis_file import write_diagnosis
+from tests.recording_maps import NOISE_ON_ONE_AXIS
 
 ROOT = Path(__file__).resolve().parents[3]
 LABELS = "recording,change,value,note,salt\nrec_01,added_mass,0.05,,a\nrec_02,nothing,,,b\n"
 OTHERS = "mine\n"
 HASH, OTHER_HASH = (hashlib.sha256(text.encode()).hexdigest() for text in (LABELS, OTHERS))
 TORN = '{"format": "hapteq-'
-MAP = """
-device = "one axis"
-title = "Noise on one axis"
-files = ["run.npz"]
-[[clock]]
-rate_hz = 500
-[[channel]]
-role = "command"
-name = "fx"
-value = "u"
-unit = "N"
-[[channel]]
-role = "response"
-name = "ax"
-value = "y"
-unit = "m/s^2"
-"""
 FILES = {
     "a_file": OTHERS,
     "labels.csv": LABELS,
@@ -48,7 +32,7 @@ FILES = {
     "torn.csv": LABELS[:-4],
     "torn_diagnoses/rec_01/diagnosis.json": TORN,
     "recordings/axis/run.npz": "no archive",
-    "recordings/axis/run.toml": MAP,
+    "recordings/axis/run.toml": NOISE_ON_ONE_AXIS,
     "answered/axis/run/answer.json": TORN,
 }
 

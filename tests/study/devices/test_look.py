@@ -15,6 +15,7 @@ from study.devices.drive.realtime_drive import PATIENCE_S, Glances
 from study.devices.rig import READING_SIZE
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
+from tests.study.devices.hung_driver.patience import alive
 
 pytestmark = pytest.mark.real_time
 
@@ -22,29 +23,6 @@ pytestmark = pytest.mark.real_time
 @pytest.fixture
 def rig(rigs):
     return rigs.ScriptedRig()
-
-
-@pytest.fixture
-def hang():
-    """Blocks its caller until the test is over."""
-    event = threading.Event()
-    yield event
-    event.set()
-
-
-@pytest.fixture
-def device(rigs, rig, hang):
-    device = SafeDevice(rig, rigs.SETTINGS, RealClock())
-    yield device
-    hang.set()
-    device.close()
-
-
-def alive(device, seconds: float) -> None:
-    until_s = time.monotonic() + seconds
-    while time.monotonic() < until_s:
-        device.keep_alive()
-        time.sleep(0.01)
 
 
 def reading(**values: float):

@@ -1,17 +1,13 @@
 """Hand-made facts of a session, for folds driven without any device."""
 
-import importlib.util
-from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+from tests import session_facts
+
 
 @pytest.fixture(scope="session")
 def facts() -> ModuleType:
-    """The builders of `test_state.py`."""
-    spec = importlib.util.spec_from_file_location("state_facts", Path(__file__).parent / "state" / "test_state.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    """The builders of `tests/session_facts.py`."""
+    return session_facts

@@ -11,27 +11,9 @@ from analysis.diagnosis.search.time_budget import CountedBudget
 from study.errors import StudyError
 from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
+from tests.recording_maps import NOISE_ON_ONE_AXIS
 
-MAP = """
-device = "one axis"
-title = "Noise on one axis"
-files = ["run.npz"]
-
-[[clock]]
-rate_hz = 500
-
-[[channel]]
-role = "command"
-name = "fx"
-value = "u"
-unit = "N"
-
-[[channel]]
-role = "response"
-name = "ax"
-value = "y"
-unit = "m/s^2"
-
+MAP = f"""{NOISE_ON_ONE_AXIS}
 [[segment]]
 kind = "noise"
 

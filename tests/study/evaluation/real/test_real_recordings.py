@@ -14,38 +14,20 @@ from study.importing.model_library import list_shipped_models, model_for
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.real_answer_file import read_real_answer
 from study.workflows.files.validate import validate_file
+from tests.recording_maps import NOISE_ON_ONE_AXIS
 
 RATE_HZ, SECONDS = 500.0, 8.0
 MASS, DAMPING, STIFFNESS = 0.2, 4.0, 900.0
 OFFSET = 1.5
 
-MAP = """
-device = "one axis"
-title = "Noise on one axis"
-files = ["run.npz"]
-
-[[clock]]
-rate_hz = 500
-
-[[channel]]
-role = "command"
-name = "fx"
-value = "u"
-unit = "N"
-
-[[channel]]
-role = "response"
-name = "ax"
-value = "y"
-unit = "m/s^2"
-
+MAP = f"""{NOISE_ON_ONE_AXIS}
 [[segment]]
 kind = "noise"
-split = { fit = 0.7, test = 0.3 }
+split = {{ fit = 0.7, test = 0.3 }}
 
 [diagnosis]
 model = "axis.model.toml"
-nominal = { mass = 0.2 }
+nominal = {{ mass = 0.2 }}
 objections = ["It is simulated."]
 """
 
