@@ -13,8 +13,8 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.facts.sitting_events import FormFilled, NoteTaken
-from study.session.state.fold import apply, begin_session
-from study.session.state.state import SessionState
+from study.session.state.fold import apply
+from study.session.state.state import SessionState, begin_session
 from study.session.watching.watch_view import FormLine, NoteLine
 
 NO_STEADY_PART = "no steady part to measure, or too little of it"

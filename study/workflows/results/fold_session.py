@@ -11,8 +11,8 @@ from protocols.document.loading import ProtocolError, load_protocol
 from study.errors import StudyError
 from study.session.facts.events import SessionOpened
 from study.session.state.draw_check import LogContradiction
-from study.session.state.fold import apply, begin_session
-from study.session.state.state import SessionState
+from study.session.state.fold import apply
+from study.session.state.state import SessionState, begin_session
 from study.store.sessions.archive import SessionFolder, SessionWithdrawnError
 from study.store.sessions.event_log import LogContents, read_log
 from study.store.sessions.log_seal import check_seals

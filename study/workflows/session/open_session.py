@@ -11,9 +11,8 @@ from protocols.document.hashing import protocol_hash
 from study.devices.clock import Clock
 from study.devices.device import DeviceInfo
 from study.session.facts.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
-from study.session.state.fold import begin_session
 from study.session.state.rules import LATEST
-from study.session.state.state import SessionState
+from study.session.state.state import SessionState, begin_session
 from study.store.disk.provenance import versions
 from study.store.sessions.archive import SessionFolder, new_session_folder
 from study.store.sessions.event_log import EventLog

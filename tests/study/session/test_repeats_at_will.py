@@ -17,9 +17,9 @@ from protocols.trial import Phase, TrialStatus, VoidCause
 from study.participants.psychometric_curve import WeibullCurve
 from study.session.facts.events import AnswerGiven, TrialMeasured, TrialSpoiled
 from study.session.state.draw_check import LogContradiction
-from study.session.state.fold import apply, begin_session
+from study.session.state.fold import apply
 from study.session.state.machine import next_action
-from study.session.state.state import repeats_left
+from study.session.state.state import begin_session, repeats_left
 from study.store.formats.protocol_files import read_study_protocol
 
 UTC = "2026-01-01T00:00:00.000+00:00"

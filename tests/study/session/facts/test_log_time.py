@@ -9,9 +9,10 @@ import pytest
 from protocols.definition.exposure import SittingLimits
 from study.session.facts.events import DemoPlayed, NoteTaken, SessionInterrupted, SessionResumed
 from study.session.facts.log_time import ClockStep, Moment, clock_step, elapsed_s
-from study.session.state.fold import apply, begin_session
+from study.session.state.fold import apply
 from study.session.state.machine import limit_reached
 from study.session.state.sitting_state import NIGHT_H, dose_now, pass_time
+from study.session.state.state import begin_session
 
 H = 3600.0
 START = datetime.fromisoformat("2026-01-01T08:00:00.000+00:00")

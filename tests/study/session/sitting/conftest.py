@@ -11,7 +11,7 @@ from protocols.definition.preparation import (
     PracticeSettings,
     SetupSettings,
 )
-from study.session.state.fold import begin_session
+from study.session.state.state import begin_session
 
 
 @pytest.fixture

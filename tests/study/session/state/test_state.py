@@ -18,8 +18,9 @@ from study.session.facts.events import (
     parse_event,
 )
 from study.session.state.draw_check import LogContradiction
-from study.session.state.fold import apply, begin_session
+from study.session.state.fold import apply
 from study.session.state.machine import Finish, Rest, next_action
+from study.session.state.state import begin_session
 from tests.session_facts import UTC, answered, measured, one_trial, opened, presented
 
 
