@@ -1,4 +1,4 @@
-"""An honest device is believed: the simulated omega.3 at all that is ever played on it, with and without a hand."""
+"""Valid readings raise no fault: the simulated omega.3 at all that is played on it, with and without a hand."""
 
 from dataclasses import replace
 

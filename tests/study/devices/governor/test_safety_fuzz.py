@@ -109,7 +109,7 @@ def test_in_a_million_ticks_of_abuse_no_force_is_above_the_cap_or_beyond_the_sle
         assert violations == [], seed
         met += faults
         shares.append(share)
-    # Shaken and stale encoders: test_lying_encoders.py.
+    # Shaken and stale encoders: test_false_encoder_readings.py.
     assert set(met) >= set(Fault) - {Fault.LOST, Fault.FORCE_LEFT, Fault.SHAKEN, Fault.STALE}
     assert sum(share > 0.999 for share in shares) > 5  # the cap was reached: it does not hold for want of force
 

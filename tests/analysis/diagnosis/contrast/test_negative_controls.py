@@ -1,4 +1,4 @@
-"""Recordings of the same device, and faults that these data cannot tell apart: nothing is named."""
+"""Recordings of the same device, and faults that these data cannot distinguish: no fault is named."""
 
 from dataclasses import replace
 

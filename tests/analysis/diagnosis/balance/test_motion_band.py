@@ -1,4 +1,4 @@
-"""Where what is written of a command reaches no motion, laws show in the band in which the device moves."""
+"""Laws are found within the band in which the device moves, where part of a command reaches no motion."""
 
 import numpy as np
 import pytest

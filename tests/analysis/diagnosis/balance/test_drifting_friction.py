@@ -1,4 +1,4 @@
-"""Dry friction that changes while a device runs is friction all the same, and is told from a constant one."""
+"""Dry friction that changes during a recording is named as friction and distinguished from a constant one."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The screen of one who watches: stop, pause and notes reach the session, or it is said that they do not."""
+"""The experimenter's screen: stop, pause and notes reach the session, or it reports that they do not."""
 
 import pytest
 

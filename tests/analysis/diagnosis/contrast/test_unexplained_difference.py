@@ -1,4 +1,4 @@
-"""Where no fault explains what sets recordings apart from clean ones, that is said."""
+"""A difference from the clean recordings that no fault explains is reported."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A fault that came since the clean recordings were made is named, with its place and its number."""
+"""A fault that is absent from the clean recordings is named, with its place and its number."""
 
 from dataclasses import replace
 

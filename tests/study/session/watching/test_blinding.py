@@ -1,4 +1,4 @@
-"""What the view of a running session must not tell: the open trial, its direction, the seed."""
+"""What the view of a running session must not show: the open trial, its direction, the seed."""
 
 import json
 from dataclasses import asdict, replace

@@ -1,4 +1,4 @@
-"""A law that takes less of the force than laboratory recordings are sure of is told among the candidates only."""
+"""A law whose share of the force is below the uncertainty of laboratory recordings is only a candidate."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The safe device as its callers see it: what is played, and what is kept of it."""
+"""The safe device as its callers use it: what is played, and the recordings of it."""
 
 from dataclasses import replace
 

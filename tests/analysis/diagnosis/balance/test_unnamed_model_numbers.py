@@ -1,4 +1,4 @@
-"""What is a number of a fitted model is not named, and what repeats have not shown is not explained."""
+"""Numbers that a fitted model holds already are not named; without repeats no verdict is `explained`."""
 
 from dataclasses import replace
 

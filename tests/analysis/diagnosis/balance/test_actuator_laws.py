@@ -1,4 +1,4 @@
-"""What an actuator makes of its command is found where the balance is solved for the acceleration."""
+"""Nonlinear laws of the actuator are found where the balance is solved for the acceleration."""
 
 from dataclasses import replace
 

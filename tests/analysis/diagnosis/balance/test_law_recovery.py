@@ -1,4 +1,4 @@
-"""One physics at a time in an axis, and what the balance of forces says of it; and axes in which nothing is missing."""
+"""One physical effect at a time in an axis is recovered from the force balance; intact axes name none."""
 
 import numpy as np
 import pytest
