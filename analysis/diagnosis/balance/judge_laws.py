@@ -18,6 +18,7 @@ from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.plainest_structure import NOTABLE, numbers_of, plainest_structure
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import Structure, StructureSearch, values_of
+from analysis.diagnosis.settings import STILL_SHARE
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
@@ -39,8 +40,6 @@ MOST_ALIKE = 4
 LEAST_BLOCKS = 4
 CANCELLED = 2.0
 """Standard deviation of a law's own force at most, over the recorded one's: more is cancelled by other columns."""
-STILL = 0.01
-"""Share of the speed's mean square, where it is fitted, below which samples that are held back test nothing."""
 FAMILIES = (
     {"coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
      "position_dependent_friction", "drifting_friction", "quadratic_damping"},
@@ -116,11 +115,17 @@ def family_of(effect: str) -> set[str]:
 def blocks_to_judge(regression: Regression) -> tuple[Block, ...]:
     """The blocks that laws are judged by: the held-out ones where the device moves in them; else the fit blocks, by
     cross-validation, where several of them move; else none, for a single move tests nothing."""
-    fit, test = (_speeds(regression, blocks) for blocks in (regression.fit, regression.test))
-    if len(test) >= LEAST_BLOCKS and test.mean() >= STILL * fit.mean():
+    if len(regression.test) >= LEAST_BLOCKS and held_out_moves(regression):
         return regression.test
+    fit = _speeds(regression, regression.fit)
     several = float(fit.sum()) ** 2 >= LEAST_BLOCKS * float(fit @ fit)
     return regression.fit if several or len(regression.test) < LEAST_BLOCKS else ()
+
+
+def held_out_moves(regression: Regression) -> bool:
+    """Whether the driven motion goes on in the held-out blocks; there must be some."""
+    fit, test = (_speeds(regression, blocks).mean() for blocks in (regression.fit, regression.test))
+    return bool(test >= STILL_SHARE * fit)
 
 
 def _speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:

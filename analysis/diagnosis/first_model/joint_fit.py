@@ -13,6 +13,7 @@ from scipy.special import stdtrit
 
 from analysis.diagnosis.balance.band import NOISE_SHARE
 from analysis.diagnosis.balance.blocks import Block, block_products, squared_error
+from analysis.diagnosis.balance.judge_laws import held_out_moves
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression, regression_of, signal_power
 from equalizer.signals.signal import FloatArray
@@ -20,7 +21,8 @@ from equalizer.signals.signal import FloatArray
 Part = Literal["mass", "damping", "stiffness"]
 PARTS: tuple[Part, ...] = ("mass", "damping", "stiffness")
 LEAST_BLOCKS = 3
-"""Test blocks at least; with fewer, the held-out error is that of cross-validation on the fit blocks."""
+"""Test blocks at least; with fewer, or where nothing moves in them, the held-out error is that of cross-validation on
+the fit blocks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +69,7 @@ def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> Joint
     crossed = [_solve((whole[0] - gram, whole[1] - pull)) for gram, pull in own]
     folds = _errors(fit, shape, crossed)
     test = [regression.test for regression in regressions]
-    tested = len(test[0]) >= LEAST_BLOCKS
+    tested = len(test[0]) >= LEAST_BLOCKS and any(map(held_out_moves, regressions))
     held = _errors(test, shape, [found] * len(test[0])) if tested else folds
     sizes = np.array([max(signal_power(blocks), 1e-300) for blocks in (test if tested else fit)])
     folded = (folds / np.array(powers)).mean(axis=1)

@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from analysis.diagnosis.data.still_stretch import held_out_stands_still
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.tuning import Tuning
@@ -64,7 +65,7 @@ def assemble_findings(
         is_timed=recording.is_timed,
         signatures=looked.signatures,
         black_box=looked.black_box,
-        remarks=_remarks(learned_sentence(learned, channels), courses, tuning, floors),
+        remarks=_remarks((_still_sentence(measure), learned_sentence(learned, channels)), courses, tuning, floors),
         maps=maps.cells,
         local=looked.local,
         floor=floors[0],
@@ -85,11 +86,20 @@ def _models(result: SearchResult, recording: Recording) -> tuple[MechanicalModel
     return as_recorded(with_them, recording), as_recorded(tuning.tune(found.retuned.fitted.deviations), recording)
 
 
+def _still_sentence(measure: ErrorMeasure) -> str:
+    if not held_out_stands_still(measure.records):
+        return ""
+    return (
+        "What was held out for the test holds no motion: errors on it would say nothing, and none is given. Mark a "
+        "stretch that moves as the test."
+    )
+
+
 def _remarks(
-    learned: str, courses: Sequence[Course], tuning: Tuning, floors: tuple[NoiseFloor, ...]
+    first: Sequence[str], courses: Sequence[Course], tuning: Tuning, floors: tuple[NoiseFloor, ...]
 ) -> tuple[str, ...]:
     of_noise = (remark for floor in floors for remark in floor.remarks)
-    said = (learned, *unit_sentences(courses), constant_sentence(tuning.model), *of_noise)
+    said = (*first, *unit_sentences(courses), constant_sentence(tuning.model), *of_noise)
     return tuple(dict.fromkeys(filter(None, said)))
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from analysis.diagnosis.data.still_stretch import held_out_stands_still
 from analysis.diagnosis.document import Errors, Fit
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import rms_over
@@ -38,6 +39,8 @@ def _by_statistic(found: Explanation, statistic: Statistic, parts: tuple[str, ..
 
 
 def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -> Errors:
+    if parts == ("test",) and held_out_stands_still(measure.records):
+        return Errors(None, None, None, None)
     masks = [np.logical_or.reduce([getattr(record, part) for part in parts]) for record in measure.records]
     if not any(mask.any() for mask in masks):
         return Errors(None, None, None, None)

@@ -1,0 +1,57 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.still_stretch import held_out_stands_still
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from equalizer.effects.catalogue import CATALOGUE
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import Signal
+from tests.diagnosed import TRIED, device, recorded
+
+ASKED = DiagnosisSettings(without=tuple(effect.name for effect in CATALOGUE if effect.name not in TRIED))
+N, MOVING = 4000, 2400
+
+
+def turning(speed):
+    push = Signal(np.zeros((N, 1)), 100.0, "torque", "N m", ("drive",))
+    return Recording("wheel", push, Signal(speed[:, None], 100.0, "velocity", "rad/s", ("speed",)))
+
+
+def stops_at(sample, seed=3):
+    speed = 3 * np.abs(np.sin(np.arange(N) / 50)) + 0.05 * np.random.default_rng(seed).standard_normal(N)
+    speed[sample:] = 0.0
+    return speed
+
+
+@pytest.mark.parametrize(("stop", "still"), [(MOVING, True), (N, False)])
+def test_held_out_samples_at_rest_hold_no_motion(stop, still):
+    assert held_out_stands_still(observed_parts([turning(stops_at(stop))], 1)) == still
+
+
+def test_a_steady_speed_is_a_motion_though_its_reading_does_not_change():
+    speed = np.where(np.arange(N) < MOVING, stops_at(N), 2.0)
+    assert not held_out_stands_still(observed_parts([turning(speed)], 1))
+
+
+def test_a_stretch_at_rest_that_is_marked_as_test_stays_and_gives_no_error():
+    moving = recorded(1)
+    still = len(moving) - 3000, len(moving)
+    quiet = np.random.default_rng(5).standard_normal((3000, 1)) * (0.05, 4e-6)
+    silent = [signal.samples.copy() for signal in (moving.command, moving.response, moving.position)]
+    silent[0][still[0] :], silent[1][still[0] :], silent[2][still[0] :] = 0.0, quiet[:, :1], quiet[:, 1:]
+    recording = replace(
+        moving,
+        command=replace(moving.command, samples=silent[0]),
+        response=replace(moving.response, samples=silent[1]),
+        position=replace(moving.position, samples=silent[2]),
+        segments=(*(s for s in moving.segments if s.role == "fit"), Segment(*still, "noise", role="test")),
+    )
+    said = diagnose([recording], device(1), ASKED, map, lambda said, share: None)
+    assert said.diagnosis.fit.test.retuned is None
+    assert any("holds no motion" in remark for remark in said.remarks)
+    assert said.diagnosis.fit.fit.retuned is not None
+    moved = diagnose([moving], device(1), ASKED, map, lambda said, share: None)
+    assert moved.diagnosis.fit.test.retuned is not None
