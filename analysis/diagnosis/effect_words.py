@@ -145,6 +145,11 @@ LAW_WORDS: Mapping[str, LawWords] = {
     "actuator_asymmetry": LawWords(
         EffectWords("an actuator that pushes more to one side than to the other"), place="actuator"
     ),
+    "electromagnet": LawWords(
+        EffectWords("a force that falls with the square of the distance (electromagnet)", {"gap": "{} at the nearest"}),
+        {"gap": ("m", "rad")},
+        "actuator",
+    ),
     "added_stiffness": LawWords(EffectWords("a spring that came in", {"stiffness": "{}"}), {"stiffness": _STIFFNESS}),
     "force_offset": LawWords(EffectWords("an offset of the force", {"offset": "{}"}), {"offset": _FORCE}, "actuator"),
     "force_gain_drift": LawWords(

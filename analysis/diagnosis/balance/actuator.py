@@ -24,13 +24,14 @@ from analysis.diagnosis.balance.blocks import (
     squared_error,
     summed_products,
 )
-from analysis.diagnosis.balance.command_laws import AS_COMMANDED, CommandLaw, command_laws, neighbouring_laws
+from analysis.diagnosis.balance.command_laws import AS_COMMANDED, CommandLaw, coil_laws, command_laws, neighbours_of
 from analysis.diagnosis.balance.judge_laws import MOST_ALIKE, Balance, blocks_to_judge, judge_laws
 from analysis.diagnosis.balance.judged_law import JudgedLaw, bootstrap_draws, gain_with_bound
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
+from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import StructureSearch
 from analysis.diagnosis.types import TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -87,7 +88,7 @@ class _InverseBalance:
         filters = {regression.beside.own, *range(regression.matrices, regression.base - 1)}
         beside = [column for column in regression.columns_of(laws) if column not in filters]
         for motion, columns in zip(regression.motions, regression.columns, strict=True):
-            force = law.of(motion.force[:, regression.axis])
+            force = law.of(motion.force[:, regression.axis], motion.position[:, regression.beside.own])
             others = np.delete(motion.force, regression.axis, axis=1)
             entered = np.hstack([force, np.gradient(force[:, :1], 1 / motion.rate_hz, axis=0), others])
             found.append(np.hstack([motion.decimate(entered), columns[:, beside]]))
@@ -102,6 +103,8 @@ class Actuator:
     judged: JudgedLaw
     alone: bool
     """Without laws of the motion, it leaves as little."""
+    instead: bool = False
+    """By itself it leaves less than the named laws of the motion."""
 
 
 def find_balance(
@@ -115,12 +118,13 @@ def find_balance(
         return balance
     judged = actuator.judged
     if judged.named:
-        through = [_pass_through_law(motion, axis, actuator.law) for motion in motions]
+        own = balance.search.regression.beside.own
+        through = [_pass_through_law(motion, axis, own, actuator.law) for motion in motions]
         again = judge_laws(search_beside_linear(through, axis, rotational, without, time_left))
         return replace(again, laws=(judged, *again.laws), linear=balance.linear)
     if judged.gain_low <= 0 or judged.gain < NOTABLE:
         return balance
-    if judged.gain < MOST:
+    if judged.gain < MOST and not actuator.instead:
         return replace(balance, others=tuple(sorted((*balance.others, judged), key=lambda each: -each.gain)))
     laws = (
         [replace(each, why_not=each.why_not or NEEDLESS) for each in balance.laws] if actuator.alone else balance.laws
@@ -128,9 +132,9 @@ def find_balance(
     return replace(balance, laws=(judged, *laws))
 
 
-def _pass_through_law(motion: Motion, axis: int, law: CommandLaw) -> Motion:
+def _pass_through_law(motion: Motion, axis: int, own: int, law: CommandLaw) -> Motion:
     force = motion.force.copy()
-    force[:, [axis]] = law.of(force[:, axis])
+    force[:, [axis]] = law.of(force[:, axis], motion.position[:, own])
     return replace(motion, force=force)
 
 
@@ -140,7 +144,8 @@ def find_actuator(balance: Balance, without: frozenset[str]) -> Actuator | None:
     search = balance.search
     regression = search.regression
     commands = np.concatenate([motion.force[motion.fit, regression.axis] for motion in regression.motions])
-    laws = [law for law in command_laws(commands) if law.effect not in without]
+    known = [*command_laws(commands), *_laws_of_coils(regression)]
+    laws = [law for law in known if law.effect not in without]
     if not np.isfinite(regression.motions[0].band_hz) or not laws or not np.any(commands):
         return None
     turned = _InverseBalance(search)
@@ -156,16 +161,25 @@ def find_actuator(balance: Balance, without: frozenset[str]) -> Actuator | None:
     return Actuator(law, judged, bool(beside) and alone <= held / (1 - TOLD))
 
 
+def _laws_of_coils(regression: Regression) -> tuple[CommandLaw, ...]:
+    """Empty where no position was measured."""
+    if regression.motions[0].order > 0:
+        return ()
+    own = regression.beside.own
+    return tuple(coil_laws(np.concatenate([motion.position[motion.fit, own] for motion in regression.motions])))
+
+
 def _in_place_of_motion(turned: _InverseBalance, laws: Sequence[CommandLaw], named: tuple[int, ...]) -> Actuator | None:
-    """A law of the command that by itself takes most of what the named laws of the motion leave: they took its part,
-    as a drag does that of an actuator whose gain falls."""
+    """A law of the command that by itself takes most of what the named laws of the motion leave, or leaves less than
+    several of them: they took its part, as a drag does that of an actuator whose gain falls."""
     if not named:
         return None
     best = _best_of_each(turned, laws, ())
     law = min(best, key=lambda each: each[0])[1]
     rivals = [other for _, other in best if other is not law]
     judged = _judge_law(turned, law, rivals, (named, ()))
-    return Actuator(law, judged, True) if judged.gain >= MOST and judged.gain_low > 0 else None
+    less = judged.gain >= MOST or len(named) > 1
+    return Actuator(law, judged, True, True) if less and judged.gain_low > 0 else None
 
 
 def _sums_to_try(search: StructureSearch) -> list[tuple[int, ...]]:
@@ -183,14 +197,17 @@ def _best_of_each(
         error = float(turned.errors(law, beside, False).sum())
         if law.effect not in best or error < best[law.effect][0]:
             best[law.effect] = error, law
-    return [_refine_law(turned, *found, beside) for found in best.values()]
+    refined = [_refine_law(turned, *found, beside) for found in best.values()]
+    # What depends on the position, too, must leave clearly less than what depends on the command alone.
+    plain = min((error for error, law in refined if law.pull is None), default=np.inf)
+    return [(error, law) for error, law in refined if law.pull is None or error < (1 - TOLD) * plain]
 
 
 def _refine_law(
     turned: _InverseBalance, error: float, law: CommandLaw, beside: tuple[int, ...]
 ) -> tuple[float, CommandLaw]:
     for _ in range(ROUNDS):
-        tried = [(float(turned.errors(other, beside, False).sum()), other) for other in neighbouring_laws(law)]
+        tried = [(float(turned.errors(other, beside, False).sum()), other) for other in neighbours_of(law)]
         if not tried or min(tried, key=lambda each: each[0])[0] >= error * (1 - 1e-3):
             break
         error, law = min(tried, key=lambda each: each[0])

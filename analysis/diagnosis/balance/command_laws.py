@@ -6,6 +6,7 @@ the inverted balance; see `actuator`.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,9 @@ DEAD, FULL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (0.3, 0.4, 0.5, 0.6,
 """Shares of the samples that are commanded less: where a dead band ends, and where an actuator gives no more."""
 SQUARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
 """Shares of the force at the largest command that grow with the square of the command."""
+GAPS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
+"""Smallest distance of a magnet from its armature, over the travel: beyond, its pull falls by less than half over the
+travel. One held by a spring stays within a third of the gap, which is 2 here."""
 CLOSER = (0.95, 0.98, 1.02, 1.05)
 """Factors by which a number is moved, as long as that helps."""
 
@@ -28,9 +32,13 @@ class CommandLaw:
     columns: Callable[[FloatArray, dict[str, float]], FloatArray]
     """Columns (n, weights) of a command (n,): their weighted sum is the force; a single column is the force but for a
     gain."""
+    pull: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
+    """(n,): factor of the force at each position; None = it is the same everywhere."""
 
-    def of(self, command: FloatArray) -> FloatArray:
-        return self.columns(command, self.values)
+    def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
+        """command, position: (n,) each."""
+        columns = self.columns(command, self.values)
+        return columns if self.pull is None else columns * self.pull(position, self.values)[:, None]
 
 
 AS_COMMANDED = CommandLaw("as_commanded", {}, lambda u, _: u[:, None])
@@ -52,9 +60,29 @@ def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
     yield CommandLaw("actuator_asymmetry", {}, lambda u, _: np.stack([u, np.abs(u)], axis=1))
 
 
-def neighbouring_laws(law: CommandLaw) -> Iterator[CommandLaw]:
+def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:
+    """An electromagnet: force as the square of the current over that of the distance; beside a permanent magnet, as
+    the current itself. position: (n,), where the magnet may be beyond either end."""
+    low, high = float(position.min()), float(position.max())
+    for side, end in ((1.0, low), (-1.0, high)):
+        for gap in GAPS:
+            for columns in (_force_of_square, AS_COMMANDED.columns):
+                pull = partial(_pull_at, side, end)
+                yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, pull)
+
+
+def _pull_at(side: float, end: float, position: FloatArray, of: dict[str, float]) -> FloatArray:
+    """side: 1 where the position is a distance that grows, from `end` on; -1 where it falls."""
+    return np.asarray((of["gap"] + np.maximum(side * (position - end), 0.0)) ** -2)
+
+
+def _force_of_square(command: FloatArray, of: dict[str, float]) -> FloatArray:
+    return command[:, None] ** 2
+
+
+def neighbours_of(law: CommandLaw) -> Iterator[CommandLaw]:
     """The law with its parameter multiplied by each factor of `CLOSER`."""
-    for name in {"width", "limit", "square"} & set(law.values):
+    for name in {"width", "limit", "square", "gap"} & set(law.values):
         for factor in CLOSER:
             if name != "square" or abs(factor * law.values[name]) <= 1:
                 yield replace(law, values={**law.values, name: factor * law.values[name]})

@@ -110,3 +110,37 @@ def test_a_gain_that_falls_with_the_command_is_no_drag(of_speed):
 
 def test_a_drag_is_none_of_the_actuator(of_speed):
     assert set(named(of_speed(lambda u: u, 2.0))) == {"quadratic_damping"}
+
+
+def pulled(law, seed, count=2500, rate_hz=250.0):
+    """Recording of a mass of 0.1 kg on a spring, pulled by law(current, position), in random steps of the current."""
+    from tests.analysis.diagnosis.balance.invented_axis import recording
+
+    random = np.random.default_rng([seed, 5])
+    current = np.repeat(random.uniform(0.3, 1.0, count // 25), 25)
+    position, x, v = np.empty(count), 0.0, 0.0
+    for k, given in enumerate(current):
+        position[k] = x
+        for _ in range(10):
+            v += (law(given, x) - 20.0 * x - 3.0 * v) / 0.1 / (10 * rate_hz)
+            x += v / (10 * rate_hz)
+    noise = 3e-8 * random.standard_normal(count)
+    return recording(current[:, None], (position + noise)[:, None], rate_hz)
+
+
+@pytest.mark.parametrize("power", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_the_pull_of_a_coil_is_the_first_candidate_and_laws_of_the_motion_do_not_take_its_part(balance_of, power):
+    shot = pulled(lambda i, x: 2.9e-6 * i**power / (0.01 - x) ** 2, 1)
+    balance = balance_of(shot)[0]
+    first = balance.laws[0]
+    assert first.law.effect == "electromagnet"
+    assert not balance.named
+    assert first.values["gap"] == pytest.approx(0.01 - shot.response.samples.max(), rel=0.3)
+
+
+@pytest.mark.parametrize(
+    "law", [lambda i, x: 0.05 * i - 1e6 * x**3, pytest.param(lambda i, x: 0.03 * i**2, marks=pytest.mark.slow)]
+)
+def test_what_pulls_alike_everywhere_is_no_coil(balance_of, law):
+    balance = balance_of(pulled(law, 2))[0]
+    assert "electromagnet" not in {each.law.effect for each in (*balance.laws, *balance.others)}
