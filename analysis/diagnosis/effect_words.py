@@ -145,6 +145,11 @@ LAW_WORDS: Mapping[str, LawWords] = {
     "actuator_asymmetry": LawWords(
         EffectWords("an actuator that pushes more to one side than to the other"), place="actuator"
     ),
+    "actuator_curve": LawWords(
+        EffectWords("a force that grows with a power of its command", {"width": "beyond {}", "power": "power {}"}),
+        {"width": _FORCE, "power": ("1", "1")},
+        "actuator",
+    ),
     "electromagnet": LawWords(
         EffectWords("a force that falls with the square of the distance (electromagnet)", {"gap": "{} at the nearest"}),
         {"gap": ("m", "rad")},

@@ -198,9 +198,8 @@ def _best_of_each(
         if law.effect not in best or error < best[law.effect][0]:
             best[law.effect] = error, law
     refined = [_refine_law(turned, *found, beside) for found in best.values()]
-    # What depends on the position, too, must leave clearly less than what depends on the command alone.
-    plain = min((error for error, law in refined if law.pull is None), default=np.inf)
-    return [(error, law) for error, law in refined if law.pull is None or error < (1 - TOLD) * plain]
+    plain = min((error for error, law in refined if not law.rich), default=np.inf)
+    return [(error, law) for error, law in refined if not law.rich or error < (1 - TOLD) * plain]
 
 
 def _refine_law(

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.diagnosis.balance.actuator import find_balance
+from analysis.diagnosis.balance.actuator_twins import doubt_laws_of_actuator
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motion_band_hz, motions_of
@@ -58,4 +59,4 @@ def _balances_per_axis(
     axes = range(len(recordings[0].command.channels))
     if any(recording.meta.get("imposed") for recording in recordings):
         return tuple(judge_laws(search_beside_linear(motions, axis, turning, without, time_left)) for axis in axes)
-    return tuple(find_balance(motions, axis, turning, without, time_left) for axis in axes)
+    return tuple(doubt_laws_of_actuator(find_balance(motions, axis, turning, without, time_left)) for axis in axes)

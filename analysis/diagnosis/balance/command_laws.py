@@ -15,6 +15,10 @@ from equalizer.signals.signal import FloatArray
 
 DEAD, FULL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
 """Shares of the samples that are commanded less: where a dead band ends, and where an actuator gives no more."""
+STARTS = (0.05, 0.1, 0.2, 0.3)
+"""The same where a curve begins."""
+POWERS = (0.3, 0.5, 0.7, 1.4, 2.0)
+"""Of the command beyond there: valves and magnets that saturate, propellers."""
 SQUARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
 """Shares of the force at the largest command that grow with the square of the command."""
 GAPS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
@@ -34,6 +38,8 @@ class CommandLaw:
     gain."""
     pull: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
     """(n,): factor of the force at each position; None = it is the same everywhere."""
+    rich: bool = False
+    """It fits more than the plain laws do, and counts only where it leaves clearly less than these."""
 
     def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
         """command, position: (n,) each."""
@@ -57,6 +63,9 @@ def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
     unit = float(size.max(initial=0.0)) or 1.0
     for square in SQUARES:
         yield CommandLaw("force_nonlinearity", {"square": square, "reference": unit}, _nonlinear_force)
+    for width in (0.0, *_sizes(size, STARTS)):
+        for power in POWERS:
+            yield CommandLaw("actuator_curve", {"width": width, "power": power}, _power_force, rich=True)
     yield CommandLaw("actuator_asymmetry", {}, lambda u, _: np.stack([u, np.abs(u)], axis=1))
 
 
@@ -68,7 +77,7 @@ def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:
         for gap in GAPS:
             for columns in (_force_of_square, AS_COMMANDED.columns):
                 pull = partial(_pull_at, side, end)
-                yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, pull)
+                yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, pull, rich=True)
 
 
 def _pull_at(side: float, end: float, position: FloatArray, of: dict[str, float]) -> FloatArray:
@@ -82,7 +91,7 @@ def _force_of_square(command: FloatArray, of: dict[str, float]) -> FloatArray:
 
 def neighbours_of(law: CommandLaw) -> Iterator[CommandLaw]:
     """The law with its parameter multiplied by each factor of `CLOSER`."""
-    for name in {"width", "limit", "square", "gap"} & set(law.values):
+    for name in {"width", "limit", "square", "gap", "power"} & set(law.values):
         for factor in CLOSER:
             if name != "square" or abs(factor * law.values[name]) <= 1:
                 yield replace(law, values={**law.values, name: factor * law.values[name]})
@@ -90,6 +99,11 @@ def neighbours_of(law: CommandLaw) -> Iterator[CommandLaw]:
 
 def _nonlinear_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
     return square_law_force(command, of["square"], of["reference"])[:, None]
+
+
+def _power_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
+    beyond = np.maximum(np.abs(command) - of["width"], 0.0)
+    return np.asarray(np.sign(command) * beyond ** of["power"])[:, None]
 
 
 def _sizes(size: FloatArray, shares: Sequence[float]) -> list[float]:

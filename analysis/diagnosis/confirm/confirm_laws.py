@@ -12,7 +12,7 @@ import numpy as np
 from analysis.diagnosis.balance.judge_laws import Balance, family_of
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
-from analysis.diagnosis.confirm.held_out_gain import held_out_gain
+from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_something
 from analysis.diagnosis.confirm.laws_to_play import (
     CONSTANT,
     can_be_played,
@@ -69,7 +69,7 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
         explained = Explanation(before, confirmed, after, tuple((step,) for step in steps), tuple(steps))
         vague: int | None = len(named) - 1
         errors: FloatArray | None = None
-        if _is_borne_out(plain, after):
+        if _is_borne_out(plain, after) and predicts_something(context.whole, after):
             errors = final_errors(context, explained)
             vague = _find_vague_law(explained, errors[len(context.tuning.names) :], len(constant.claims))
         if vague is None:
@@ -160,17 +160,20 @@ def _steps(
 
 
 def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) -> int | None:
-    """Place of a named law whose main parameter's interval includes zero, or any parameter's where the law only refines
-    another of its family; None = there is none."""
+    """Place of a named law that may be absent: the intervals of all parameters that mean so hold it, or any parameter's
+    is open where the law only refines another of its family; None = there is none."""
     begin, hypothesis = 0, explained.steps[-1].fitted.hypothesis
     families = [family_of(claim.effect.name) for claim in hypothesis.claims]
     for place, claim in enumerate(hypothesis.claims):
         free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
         refines = place > constants and families[place] in families[constants:place]
-        for number, parameter in enumerate(free[: None if refines else 1], begin):
+        vague = []
+        for number, parameter in enumerate(free, begin):
             size = {"log": 1.0, "signed": abs(float(hypothesis.point[number])), "linear": np.inf}[parameter.scale]
-            if place >= constants and VAGUE * errors[number] >= size:
-                return place - constants
+            if refines or parameter.none is not None:
+                vague.append(VAGUE * errors[number] >= size)
+        if place >= constants and (any(vague) if refines else bool(vague) and all(vague)):
+            return place - constants
         begin += len(free)
     return None
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judged_law import LEVEL, bootstrap_draws
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.fit_score import rms_over
 from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.signals.signal import FloatArray
 
@@ -43,6 +44,18 @@ def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: Fitt
     shares = 1 - after[drawn].sum(axis=1) / np.maximum(before[drawn].sum(axis=1), np.finfo(float).tiny)
     low, high = np.quantile(shares, [LEVEL, 1 - LEVEL])
     return HeldOutGain(float(1 - after.sum() / before.sum()), float(low), float(high))
+
+
+def predicts_something(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
+    """Whether a completed model leaves less of a held-out motion than its mean alone would: a law that only holds a
+    runaway model still does not. True where forces are compared, or nothing is held out."""
+    masks = [record.test for record in measure.records]
+    if measure.name == "predicted force" or not any(mask.any() for mask in masks):
+        return True
+    signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
+    left = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit
+    size = np.maximum(rms_over(measure.records, signals, masks), np.finfo(float).tiny)
+    return bool(np.sqrt(np.mean((left / size) ** 2)) < 1)
 
 
 def _powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:

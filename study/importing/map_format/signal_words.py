@@ -99,7 +99,8 @@ def name_signal(header: str) -> ParsedName:
 
 
 def roles_of(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
-    """Roles by quantity: forces are commands, or voltages or currents if there are none; accelerations and
+    """Roles by quantity: forces are commands, or voltages or currents if there are none, or else what is called a
+    command; accelerations and
     velocities are responses, or positions if there are no others; other known quantities are conditions. None if
     something is open or contradicted by a name (`open_roles` says what)."""
     return None if open_roles(columns) else [role for column in columns if (role := _role(column, columns))]
@@ -120,7 +121,7 @@ def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
     if found:
         return tuple(found)
     if "command" not in roles:
-        found.append("what the command is (no column is a force, torque, current or voltage)")
+        found.append("what the command is (no column is a force, torque, current or voltage, or called command)")
     if "response" not in roles:
         found.append("what the response is (no column is a position, angle, speed or acceleration)")
     return tuple(found)
@@ -133,8 +134,11 @@ def propose_roles(columns: Sequence[ParsedName]) -> list[SignalRole | Literal[""
 
 
 def _role(column: ParsedName, columns: Sequence[ParsedName]) -> SignalRole | Literal[""]:
-    if _said_role(column, columns) == "condition":
+    said = _said_role(column, columns)
+    if said == "condition":
         return "condition"
+    if said == "command" and column.quantity in ("", "1") and "command" not in _by_quantity(columns).values():
+        return "command"
     known = column.quantity not in ("", "1", "time", *_DRIVES, *_FEEDS, *_MOTIONS, *_PLACES)
     return _by_quantity(columns).get(column.quantity, "condition" if known else "")
 

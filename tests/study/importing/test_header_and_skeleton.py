@@ -43,6 +43,8 @@ def test_a_header_is_a_name_and_a_unit(header, expected):
         ("time [s],current [A],encoder [counts],supply [V]", ["command", "response", "condition"]),
         ("time [s],torque [Nm],motor angle [rad],load angle [rad]", ["command", "response", "response"]),
         ("time [s],force [N],accel [m/s²]", ["command", "response"]),
+        ("time [s],command [%],angle [deg]", ["command", "response"]),
+        ("time [s],cmd,position,supply [V]", ["command", "response", "condition"]),
     ],
 )
 def test_a_header_with_units_needs_no_map(tmp_path, header, roles):

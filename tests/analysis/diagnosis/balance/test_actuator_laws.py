@@ -112,6 +112,26 @@ def test_a_drag_is_none_of_the_actuator(of_speed):
     assert set(named(of_speed(lambda u: u, 2.0))) == {"quadratic_damping"}
 
 
+@pytest.mark.parametrize("lag_s", [0.06, 0.01])
+def test_a_valve_whose_speed_falls_behind_its_command_is_no_drag(balance_of, lag_s):
+    """lag_s: of the speed behind the valve; below the sample period, no inertia shows."""
+    from equalizer.signals.recording import Recording
+    from equalizer.signals.signal import Signal
+
+    random = np.random.default_rng(2)
+    command = np.repeat(random.uniform(0.0, 1.0, 40), 100)
+    given, speed = np.maximum(command - 0.1, 0.0) ** 0.6, np.zeros(len(command))
+    for k in range(1, len(speed)):
+        speed[k] = speed[k - 1] + (given[k - 1] - speed[k - 1]) * (1 - np.exp(-0.02 / lag_s))
+    read = speed + 3e-3 * random.standard_normal(len(speed))
+    signals = (
+        Signal(command[:, None], 50.0, "force", "N", ("u",)),
+        Signal(read[:, None], 50.0, "velocity", "m/s", ("v",)),
+    )
+    balance = balance_of(Recording("invented", *signals))[0]
+    assert not {"quadratic_damping", "coulomb_friction", "stribeck_friction"} & set(named(balance))
+
+
 def pulled(law, seed, count=2500, rate_hz=250.0):
     """Recording of a mass of 0.1 kg on a spring, pulled by law(current, position), in random steps of the current."""
     from tests.analysis.diagnosis.balance.invented_axis import recording

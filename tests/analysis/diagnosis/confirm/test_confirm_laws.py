@@ -25,6 +25,7 @@ OPEN, SURE = 1.01 / VAGUE, 0.1 / VAGUE
 """Standard errors of a logarithm whose interval holds zero, and of one that is well known."""
 DRY = ("coulomb_friction", {"level": 2.0})
 BENDING = ("presliding_hysteresis", {"level": 0.5, "stiffness": 100.0})
+STOP = ("end_stop", {"position": 0.01, "stiffness": 1e4, "opposite": 0.0})
 RIPPLE = ("cogging", {"amplitude": 0.5, "pitch": 0.01, "phase": 0.0})
 
 
@@ -44,9 +45,14 @@ def explained(*laws):
         ((BENDING,), (OPEN, SURE), 0),
         ((DRY, RIPPLE), (SURE, SURE, OPEN, OPEN), None),
         ((DRY, RIPPLE), (OPEN, SURE, SURE, SURE), 0),
+        ((STOP,), (SURE, OPEN), 0),
+        ((STOP,), (OPEN, SURE), None),
     ],
-    ids=["all known", "refinement open", "secondary open alone", "main open", "another family", "first open"],
-)
+    ids=[
+        "all known", "refinement open", "secondary open alone", "main open", "another family", "first open",
+        "no stiffness", "place open",
+    ],
+)  # fmt: skip
 def test_a_law_goes_by_its_main_number_and_a_refinement_by_any(laws, errors, dropped):
     assert _find_vague_law(explained(*laws), np.array([0.0, *errors]), 1) == dropped
 
@@ -85,8 +91,10 @@ def test_without_new_physics_stands_what_foretells_better(given, retuned, plain)
     assert found.plain.score.test[0] == plain
 
 
-@pytest.mark.parametrize(("given", "is_named"), [(4.0, True), (1.0, False)])
-def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkeypatch, given, is_named):
+@pytest.mark.parametrize(
+    ("given", "predicts", "is_named"), [(4.0, True, True), (1.0, True, False), (4.0, False, False)]
+)
+def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkeypatch, given, predicts, is_named):
     """Re-tuning followed what was fitted to, to 4; the law brings that back to 1.1."""
     law = SimpleNamespace(law=SimpleNamespace(effect="coulomb_friction"), place=0)
     regression = SimpleNamespace(beside=SimpleNamespace(own=0))
@@ -95,12 +103,12 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
         "can_be_played": lambda own, weighed: True, "constants_of": lambda balances: SimpleNamespace(claims=()),
         "refit_laws": lambda balances, named: named, "evaluate_fit": lambda *of: given, "refine": lambda *of: 4.0,
         "final_errors": lambda *of: np.zeros(1), "_find_vague_law": lambda *of: None,
-        "_from_starts": lambda *of: ([ends_at(1.1)], ends_at(1.1)),
+        "_from_starts": lambda *of: ([ends_at(1.1)], ends_at(1.1)), "predicts_something": lambda *of: predicts,
     }  # fmt: skip
     for name, stand_in in patched.items():
         monkeypatch.setattr(by_balance, name, stand_in)
     context = SimpleNamespace(
-        measure=None, tuning=SimpleNamespace(names=()), candidate=ends_at, with_test_score=lambda each: each
+        measure=None, whole=None, tuning=SimpleNamespace(names=()), candidate=ends_at, with_test_score=lambda each: each
     )
     found = by_balance.search_by_balance(context, (balance,), False)
     assert (found is not None) == is_named

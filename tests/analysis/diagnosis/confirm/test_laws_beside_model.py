@@ -8,7 +8,7 @@ import pytest
 
 from analysis.diagnosis.confirm import laws_beside_model as beside_given
 from analysis.diagnosis.confirm.balance_beside_model import find_balances_beside_model
-from analysis.diagnosis.confirm.held_out_gain import held_out_gain
+from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_something
 from analysis.diagnosis.confirm.laws_beside_model import objection
 from analysis.diagnosis.search.time_budget import always
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
@@ -89,6 +89,16 @@ def test_a_random_difference_has_a_gain_interval_around_zero():
     other = np.random.default_rng(6).normal(size=(1600, 2))
     found = held_out_gain(MEASURE, candidate(NOISE), candidate(other))
     assert found.low < 0 < found.high
+
+
+@pytest.mark.parametrize(
+    ("name", "left", "something"),
+    [("free simulation", 1.01, False), ("free simulation", 0.9, True), ("predicted force", 1.01, True)],
+)
+def test_a_model_that_leaves_as_much_of_a_motion_as_its_mean_predicts_nothing(name, left, something):
+    record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=3.0 + 2.0 * NOISE)
+    measure = SimpleNamespace(name=name, records=(record,), unit=np.array([2.0, 2.0]))
+    assert predicts_something(measure, candidate(left * NOISE)) == something
 
 
 def searched(after, rival=None):

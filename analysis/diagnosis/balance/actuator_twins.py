@@ -1,0 +1,57 @@
+"""Laws of a driven motion that its actuator might have as well, where the motion cannot tell.
+
+Without reversal, friction is a constant that the motion overcomes from rest: a dead band looks the same. Where no
+inertia shows, speed follows the command at once, and a drag that grows with the speed is a gain that falls with the
+command.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.judge_laws import Balance
+from analysis.diagnosis.balance.judged_law import JudgedLaw
+from analysis.diagnosis.balance.regression import Regression
+from analysis.diagnosis.balance.structures import SLIDING, Structure, is_better
+from analysis.diagnosis.settings import STILL_SHARE
+
+
+def doubt_laws_of_actuator(balance: Balance) -> Balance:
+    """The balance of a driven axis, with the laws not named that its actuator might have as well."""
+    return replace(balance, laws=tuple(_doubt_law(each, balance) for each in balance.laws))
+
+
+def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
+    regression, effect = balance.search.regression, judged.law.effect
+    if not judged.named or judged.law.channel < 0:
+        return judged
+    if effect in SLIDING and not _reverses(regression, judged.law.channel):
+        return _doubted(judged, "force_deadband", "it never moves backwards")
+    if effect == "quadratic_damping" and not _has_inertia(regression, balance.chosen.laws):
+        return _doubted(judged, "force_nonlinearity", "no inertia shows")
+    return judged
+
+
+def _doubted(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
+    alike = tuple(dict.fromkeys((twin, *judged.alike)))
+    return replace(judged, alike=alike, why_not=f"these data cannot tell it from {twin}, for {why}")
+
+
+def _reverses(regression: Regression, channel: int) -> bool:
+    """Whether the motion goes both ways by more than what counts as standing still."""
+    speed = np.concatenate([motion.velocity[motion.fit, channel] for motion in regression.motions])
+    ways = [float(np.sum(np.maximum(way * speed, 0.0) ** 2)) for way in (1.0, -1.0)]
+    return min(ways) > STILL_SHARE * max(ways)
+
+
+def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
+    """Whether a mass takes a notable share of the cross-validated error, and delays the speed by more than a sample."""
+    columns, own = regression.columns_of(laws), regression.beside.own
+    if regression.mass is not None or not np.isfinite(regression.motions[0].band_hz):
+        return True
+    rest = [column for column in columns if column != own]
+    without, held = (Structure(laws, regression.cross_validated_errors(each)) for each in (rest, columns))
+    weights = regression.weights(columns)
+    mass, damping = (float(weights[columns.index(k)]) for k in (own, len(regression.motions[0].channels) + own))
+    # Within a sample, a time constant is that of the held command.
+    return mass * regression.motions[0].rate_hz > max(damping, 0.0) and is_better(without, held)
