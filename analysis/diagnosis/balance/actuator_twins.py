@@ -1,8 +1,8 @@
 """Laws of a driven motion that its actuator might have as well, where the motion cannot tell.
 
-Without reversal, friction is a constant that the motion overcomes from rest: a dead band looks the same. Where no
-inertia shows, speed follows the command at once, and a drag that grows with the speed is a gain that falls with the
-command.
+Without reversal, friction is a constant that the motion overcomes from rest: a dead band looks the same, and a drag
+beside it may be the curve of that actuator. Where no inertia shows, speed follows the command at once: then a drag that
+grows with the speed is a gain that falls with the command, and a dead band is dry friction.
 """
 
 from dataclasses import replace
@@ -15,6 +15,9 @@ from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, Structure, is_better
 from analysis.diagnosis.settings import STILL_SHARE
 
+TWINS = {"quadratic_damping": "force_nonlinearity", "force_deadband": "coulomb_friction"}
+BACKWARDS = "it never moves backwards"
+
 
 def doubt_laws_of_actuator(balance: Balance) -> Balance:
     """The balance of a driven axis, with the laws not named that its actuator might have as well."""
@@ -26,9 +29,13 @@ def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
     if not judged.named or judged.law.channel < 0:
         return judged
     if effect in SLIDING and not _reverses(regression, judged.law.channel):
-        return _doubted(judged, "force_deadband", "it never moves backwards")
-    if effect == "quadratic_damping" and not _has_inertia(regression, balance.chosen.laws):
-        return _doubted(judged, "force_nonlinearity", "no inertia shows")
+        return _doubted(judged, "force_deadband", BACKWARDS)
+    if effect == "quadratic_damping":
+        rubs = any(each.law.effect in SLIDING and each.law.channel == judged.law.channel for each in balance.named)
+        if rubs and not _reverses(regression, judged.law.channel):
+            return _doubted(judged, "force_nonlinearity", BACKWARDS)
+    if effect in TWINS and not _has_inertia(regression, balance.chosen.laws):
+        return _doubted(judged, TWINS[effect], "no inertia shows")
     return judged
 
 
