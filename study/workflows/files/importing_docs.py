@@ -125,7 +125,8 @@ cannot be understood is refused by name, and then nothing is written. `hapteq va
 * **Names** are understood in headers and in the map that is proposed: force, load, torque, position, displacement,
   stroke, encoder, angle, theta, speed, velocity, omega, acceleration, voltage, current, temperature, pressure,
   humidity, setting, supply, with a unit in brackets or at the end (`displacement_mm`, `omega_rad_s`, `torque_Nm`).
-  Without forces, currents and voltages are commands. What is neither drive nor motion is a condition.
+  Without forces, currents and voltages are commands, or else what is called a command. What is neither drive nor
+  motion is a condition.
   The map that is proposed also takes `cmd`, `u` beside `y`, and `ref` or `target` (a helper) for what they say.
 * **Time** runs along the only dimension of a channel. Of a table of arrays take a row (`y[0]`) or column (`y[:, 0]`).
 
