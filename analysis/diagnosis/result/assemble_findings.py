@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 
-from analysis.diagnosis.data.still_stretch import held_out_stands_still
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.tuning import Tuning
@@ -17,7 +16,7 @@ from analysis.diagnosis.localisation.mismatch_maps import Maps, mismatch_maps, w
 from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
 from analysis.diagnosis.next_experiment.propose_experiment import Proposal, propose_experiment
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.result.error_table import channel_errors, errors_of
+from analysis.diagnosis.result.error_table import channel_errors, errors_of, held_out_stands_still
 from analysis.diagnosis.result.findings import Course, Findings
 from analysis.diagnosis.result.looks import looks_of
 from analysis.diagnosis.result.named_effects import Labels, labels_of, named_effects

@@ -1,15 +1,19 @@
 """The errors of the given, the re-tuned and the completed model, normalised and against the noise."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.data.still_stretch import held_out_stands_still
+from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.document import Errors, Fit
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import rms_over
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.search_context import FittedCandidate
+from analysis.diagnosis.settings import STILL_SHARE
+from analysis.diagnosis.types import Mask
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.signal import FloatArray
 
 
 def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
@@ -54,3 +58,28 @@ def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -
 
     noise = float(np.sqrt(np.mean((measure.noise / size) ** 2)))
     return Errors(error(found.before), error(found.retuned), error(found.after), noise)
+
+
+def held_out_stands_still(records: Sequence[Observed]) -> bool:
+    """Whether something is held out, and no channel moves in it as it does in what is fitted."""
+    if not any(each.test.any() for each in records):
+        return False
+    held = _mean_power(records, [each.test for each in records])
+    known = _mean_power(records, [each.fit | each.choose for each in records])
+    return bool((known > 0).any() and (held <= STILL_SHARE * known).all())
+
+
+def _mean_power(records: Sequence[Observed], masks: Sequence[Mask]) -> FloatArray:
+    """(c,): mean square of each channel about rest over the masked samples."""
+    moved = [_about_rest(each, mask)[mask] for each, mask in zip(records, masks, strict=True)]
+    return np.asarray(np.nanmean(np.concatenate(moved) ** 2, axis=0))
+
+
+def _about_rest(record: Observed, mask: Mask) -> FloatArray:
+    """(n, c): speeds as they are, for rest is zero; all else about its mean over the masked samples."""
+    signals = (record.recording.response, record.recording.position)
+    quantities = [word for signal in signals if signal is not None for word in signal.quantities]
+    speeds = [DERIVATIVE_OF_QUANTITY.get(word) == 1 for word in quantities[: record.measured.shape[1]]]
+    if not mask.any():
+        return record.measured
+    return np.asarray(record.measured - np.where(speeds, 0.0, np.nanmean(record.measured[mask], axis=0)))

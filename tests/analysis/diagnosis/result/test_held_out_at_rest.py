@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.data.still_stretch import held_out_stands_still
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.result.error_table import held_out_stands_still
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
