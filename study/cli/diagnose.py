@@ -71,7 +71,7 @@ def diagnose(
     ] = 1,
     compare: CompareOption = "auto",
     seconds: SecondsOption = None,
-    discovery: DiscoveryOption = False,
+    discovery: DiscoveryOption = True,
     effect_file: EffectFileOption = None,
     force_constant: ForceConstantOption = None,
     as_json: JsonOption = False,

@@ -62,7 +62,7 @@ class DiagnosePlan:
     """Files of laws found elsewhere, as `hapteq effect` writes them."""
     seconds: float | None = None
     """Processor time after which the search ends with its best result."""
-    discovery: bool = False
+    discovery: bool = True
     """Also search for laws outside the catalogue."""
     force_constants: tuple[float, ...] = ()
     """One for all commands or one per command, where these are not forces."""
