@@ -1,28 +1,28 @@
 """Whether this process stood still while a test ran against the clock.
 
 A thread asks to be woken every few milliseconds and keeps how late that was. The safety layer lets go of a device whose
-program gives no sign of life for 0.1 s: where a machine gives the test no processor for a good part of that, the device
-is right to let go, and a test of something else fails for no fault of the code. Such a test is run again; a failure
-without a measured pause never is. A lock of the interpreter held for so long shows as a pause too, but each time.
+program gives no sign of life for 0.1 s: where a machine gives the test no processor for so long, the device is right to
+let go, and a test of something else fails for no fault of the code. Such a test is run again; a failure without a
+measured pause never is.
 """
 
 import threading
 import time
 
 PERIOD_S = 0.002
-# A third of the time after which the safety layer takes the program for dead.
-TOO_LONG_S = 0.03
+# After this the safety layer takes the program for dead (`study.devices.drive.realtime_drive.LATE_S`).
+TOO_LONG_S = 0.1
 
 
 class PauseMeter:
     """The longest time by which a thread of this process was woken late, since `reset`."""
 
     def __init__(self) -> None:
-        self.longest_s = 0.0
+        self.longest_s = self._since_s = 0.0
         self._thread: threading.Thread | None = None
 
     def reset(self) -> None:
-        self.longest_s = 0.0
+        self.longest_s, self._since_s = 0.0, time.monotonic()
         if self._thread is None:
             self._thread = threading.Thread(target=self._measure, name="pause meter", daemon=True)
             self._thread.start()
@@ -34,4 +34,5 @@ class PauseMeter:
         while True:
             began_s = time.monotonic()
             time.sleep(PERIOD_S)
-            self.longest_s = max(self.longest_s, time.monotonic() - began_s - PERIOD_S)
+            if began_s >= self._since_s:
+                self.longest_s = max(self.longest_s, time.monotonic() - began_s - PERIOD_S)

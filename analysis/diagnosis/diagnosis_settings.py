@@ -16,7 +16,7 @@ BALANCE = "the force balance"
 
 @dataclass(frozen=True, slots=True)
 class DiagnosisSettings:
-    """Settings of one diagnosis; the defaults are those of `hapteq diagnose`."""
+    """Settings of one diagnosis; the defaults are those of `hapteq diagnose`, but that this discovers laws too."""
 
     without: tuple[str, ...] = ()
     """Effects that are not to be considered."""

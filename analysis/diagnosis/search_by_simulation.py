@@ -114,7 +114,8 @@ def _search(
     context: SearchContext, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
 ) -> SearchOutcome:
     def beyond(seen: SearchResult) -> SearchResult:
-        if not settings.discovery or settings.fitted:
+        # A low hum is no answer: the search is repeated without it.
+        if not settings.discovery or settings.fitted or hums_low(seen.found):
             return seen
         from analysis.diagnosis.discovery.add_laws import add_laws
 

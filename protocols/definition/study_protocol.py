@@ -214,19 +214,21 @@ class MeasurementSettings:
         Field(
             ge=0,
             le=1,
-            description="A trial with a larger share of ticks whose work ended after the next was due, missed ones "
-            "included, is void and comes again. Default 0.02. Only of devices that do not wait for the computer.",
+            description="A trial in which, until the answer, a larger share of ticks was late (their work ended after "
+            "the next was due) or missed is void and comes again: 0.02, say. Default 1: no limit. Devices that wait "
+            "for the computer are never late.",
         ),
-    ] = 0.02
+    ] = 1.0
     longest_late_ms: Annotated[
         float,
         Field(
             gt=0,
             le=1000,
-            description="A trial is void and comes again where a tick's work ended later than this after it was due: "
-            "the device held its last force until then. Default 10 ms: a quarter of a period at 25 Hz.",
+            description="A trial is void and comes again where, until the answer, a tick's work ended later than this "
+            "after it was due, so that the device held its last force: 10, say, a quarter of a period at 25 Hz. "
+            "Default 1000: no limit, for a loop that stands still for 100 ms is lost.",
         ),
-    ] = 10.0
+    ] = 1000.0
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -33,7 +33,7 @@ SAFETY_SINCE: dict[str, Untouched] = {"safety.feedback_cap_n": 1.5, "safety.plau
 
 ROVE_SINCE: dict[str, Untouched] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0}
 
-TIMING_SINCE: dict[str, Untouched] = {"measurement.late_ticks_limit": 0.02, "measurement.longest_late_ms": 10.0}
+TIMING_SINCE: dict[str, Untouched] = {"measurement.late_ticks_limit": 1.0, "measurement.longest_late_ms": 1000.0}
 
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
     "study": {"trial.device_buttons": [], "trial.repeats_per_run": 3, **ROVE_SINCE, **SAFETY_SINCE, **TIMING_SINCE},

@@ -84,7 +84,7 @@ catalogue of effects. The number may shrink only; what only some diagnoses need 
 OPTIONAL_ROOMS = (
     "analysis.diagnosis.contrast",  # only beside clean recordings
     "analysis.diagnosis.reference",
-    "analysis.diagnosis.discovery",  # only with --discovery
+    "analysis.diagnosis.discovery",  # only where a model is given
     "analysis.diagnosis.first_model.fitted_first",  # only without a given model
     "equalizer.identification.mechanical",
     "analysis.figures",  # only once the answer is there

@@ -100,13 +100,29 @@ def refine_with_sensitivity(
         short, evaluate_fit(short.measure, short.tuning, fitted.deviations, fitted.hypothesis), known
     )
     start = evaluate_fit(context.measure, context.tuning, near.deviations, near.hypothesis)
-    found = fit(
-        context.measure, context.tuning, start, short_form.repeat_sensitivity(known), WHOLE_ROUNDS, context.map_
-    )
+    found = _fit_whole(context, start, short_form.repeat_sensitivity(known))
     # What one period leaves open may run away on the whole.
     return (
         _choose_plainest(context, found) if found.cost <= fitted.cost else _refine_from_both_starts(context, fitted)[0]
     ), known
+
+
+def _fit_whole(context: SearchContext, start: Fitted, known: Sensitivity) -> Fitted:
+    """The fit to all periods, from that to one of them: mostly settled after a few steps, but where more than noise is
+    left, the periods may differ, and the fit moves on."""
+    best = start
+    for _ in range(MOST_REFRESHED):
+        better = fit(context.measure, context.tuning, best, known, WHOLE_ROUNDS, context.map_)
+        settled = better.cost > best.cost * (1 - _least_gain(better))
+        best = better
+        if settled:
+            break
+    return best
+
+
+def _least_gain(fitted: Fitted) -> float:
+    """Share of the cost below which a further gain counts as none; far above the noise it is larger."""
+    return max(CONVERGED, CONVERGED_FAR * float(np.log(max(fitted.cost, 1.0))))
 
 
 def _refine_from_both_starts(
@@ -160,7 +176,7 @@ def _refine_from(
         # Gains shrink about geometrically, so that the next one can be predicted.
         foreseen, before = gained * min(gained / before, 1.0) if before > 0 else gained, gained
         best = better
-        settled = (foreseen if complete else gained) < max(CONVERGED, CONVERGED_FAR * np.log(max(best.cost, 1.0)))
+        settled = (foreseen if complete else gained) < _least_gain(best)
         if (complete and settled) or (context.candidate(best).score.worst_channel <= NO_SECOND_START and settled):
             break
         if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:

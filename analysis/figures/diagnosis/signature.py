@@ -12,6 +12,7 @@ from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes, say_nothing_to_draw
 from analysis.wording import typeset
+from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
 _ROUNDED = " A missing force is known only as fast as noise lets it be, so that corners look rounder than they are."
@@ -25,7 +26,12 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
             name=f"signature-{number}",
             title=f"What shows {noun_of(signature.effect)}{f' ({signature.axis})' if signature.axis else ''}",
             caption="Dots: what the model, with all else that was found, fails to explain without this effect, mean "
-            "per bin; bars: two standard errors. Line: the fitted law, simulated and averaged alike."
+            "per bin; bars: two standard errors. "
+            + (
+                "Line: the formula."
+                if signature.effect == DISCOVERED_LAW
+                else "Line: the fitted law, simulated and averaged alike."
+            )
             + (_ROUNDED if signature.of.startswith("missing") else "")
             + (_BEYOND if signature.visited else ""),
             figure=draw_signature(signature),
@@ -60,6 +66,8 @@ def draw_signature(signature: Signature) -> Figure:
         axes.xaxis.set_minor_formatter(NullFormatter())
     else:
         axes.axhline(0, color=GREY, linewidth=0.8, zorder=1)
+        if signature.visited is not None:
+            axes.set_ylim(_visited_limits(signature, y_factor))
         for begins, ends in _never_visited(signature):
             axes.axvspan(x_factor * begins, x_factor * ends, color=GREY, alpha=0.15, linewidth=0, zorder=0)
         if signature.measured_at.min() < 0 < signature.measured_at.max():
@@ -77,6 +85,16 @@ def _scaled_label(said: str, values: FloatArray) -> tuple[str, float]:
         return said[:1].upper() + said[1:], 1.0
     scale = scale_of(rest.removesuffix(")"), float(np.max(np.abs(values))))
     return f"{words[:1].upper()}{words[1:]} ({scale.unit})", scale.factor
+
+
+def _visited_limits(signature: Signature, factor: float) -> tuple[float, float]:
+    """Ordinates of what was visited, with as much again as margin: a formula may have a pole beyond."""
+    assert signature.visited is not None
+    low, high = signature.visited
+    law = signature.law[(signature.law_at >= low) & (signature.law_at <= high)]
+    values = factor * np.concatenate([signature.measured, law])
+    margin = 0.75 * max(float(np.ptp(values)), 1e-300)
+    return float(values.min()) - margin, float(values.max()) + margin
 
 
 def _never_visited(signature: Signature) -> tuple[tuple[float, float], ...]:

@@ -18,13 +18,18 @@ class Judgement:
     """Of a void trial."""
 
 
-def judge(health: Health, settings: MeasurementSettings, felt_whole: bool) -> Judgement:
-    """Judge the trial. felt_whole: whether the stimulus was faultless until the answer; later faults are only
-    flagged."""
+def judge(
+    health: Health, settings: MeasurementSettings, felt_whole: bool, at_answer: Health | None = None
+) -> Judgement:
+    """Judge the trial. health: until the release; at_answer: as it was then, None where both are one. felt_whole:
+    whether the stimulus was faultless until the answer; later faults are only flagged, and late ticks not judged."""
     if health.fault is not Fault.NONE and not felt_whole:
         return Judgement(health.fault.value, (), cause_of(health.fault))
-    if ill_timed := _ill_timed(health, settings):
-        return Judgement(ill_timed, (), VoidCause.MISSED_TICKS)
+    if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):
+        share = 100 * health.missed_ticks / max(health.ticks, 1)
+        return Judgement(f"{share:.1f} % {TICKS_MISSED}", (), VoidCause.MISSED_TICKS)
+    if late := _too_late(at_answer or health, settings):
+        return Judgement(late, (), VoidCause.MISSED_TICKS)
     observed = (
         (health.fault is not Fault.NONE, f"after the answer: {health.fault.value}"),
         (health.stimulus_clipped > 0, "stimulus clipped at its cap"),
@@ -36,15 +41,12 @@ def judge(health: Health, settings: MeasurementSettings, felt_whole: bool) -> Ju
     return Judgement("", tuple(text for seen, text in observed if seen))
 
 
-def _ill_timed(health: Health, settings: MeasurementSettings) -> str:
-    """Which limit of the loop's timing was passed; empty if none was."""
-    missed = health.missed_ticks / max(health.ticks, 1)
-    late = missed + health.late_ticks / max(health.ticks, 1)
+def _too_late(health: Health, settings: MeasurementSettings) -> str:
+    """Which limit for late ticks was passed; empty if none was."""
+    share = (health.missed_ticks + health.late_ticks) / max(health.ticks, 1)
+    if share > settings.late_ticks_limit:
+        return f"{100 * share:.1f} % {TICKS_LATE}"
     latest_ms = 1000 * health.latest_s
-    if missed > settings.missed_ticks_limit:
-        return f"{missed:.1%} {TICKS_MISSED}".replace("%", " %")
-    if late > settings.late_ticks_limit:
-        return f"{late:.1%} {TICKS_LATE}".replace("%", " %")
     return f"{latest_ms:.1f} ms {TICK_HELD}" if latest_ms > settings.longest_late_ms else ""
 
 

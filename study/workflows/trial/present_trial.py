@@ -111,14 +111,14 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
     )
     state = record(state, answer, sitting)
     played = asked.played if asked.played is not None else release_device(sitting)
-    return _close(state, present, played, asked.felt_whole, sitting)
+    return _close(state, present, played, asked, sitting)
 
 
-def _close(state: SessionState, present: Present, played: Played, felt_whole: bool, sitting: Sitting) -> AfterTrial:
+def _close(state: SessionState, present: Present, played: Played, asked: Asked, sitting: Sitting) -> AfterTrial:
     correct = state.answered is not None and state.answered.answer == present.label
     vector = direction_vector(state.protocol.directions, present.direction)
     values = measure_delivered(played.recording, vector, present.frequency_hz) if played.recording else None
-    verdict = judge(played.health, state.protocol.measurement, felt_whole)
+    verdict = judge(played.health, state.protocol.measurement, asked.felt_whole, asked.health)
     fault = played.health.fault
     leave = reason_to_leave(fault)
     if verdict.spoiled:

@@ -59,11 +59,23 @@ def test_what_a_busy_computer_does_to_a_trial_is_counted_as_that(small_protocol)
 )
 def test_above_a_limit_of_the_protocol_late_ticks_make_a_trial_void(small_protocol, missed, late, latest_s, spoiled):
     health = Health(Fault.NONE, 1000, missed, 0, 0, 0, 0, 1.0, late_ticks=late, latest_s=latest_s)
-    found = judge(health, small_protocol.measurement, True)
+    limited = replace(small_protocol.measurement, late_ticks_limit=0.02, longest_late_ms=10.0)
+    found = judge(health, limited, True)
     assert found.spoiled == spoiled
     assert computer_too_busy(found.spoiled) is bool(spoiled)
-    lax = replace(small_protocol.measurement, missed_ticks_limit=1.0, late_ticks_limit=1.0, longest_late_ms=1000.0)
-    assert judge(health, lax, True).spoiled == ""
+
+
+def test_late_ticks_are_judged_as_they_were_at_the_answer(small_protocol):
+    at_answer = Health(Fault.NONE, 1000, 0, 0, 0, 0, 0, 1.0, late_ticks=1, latest_s=0.002)
+    released = replace(at_answer, ticks=1100, late_ticks=50, latest_s=0.05)
+    limited = replace(small_protocol.measurement, late_ticks_limit=0.02, longest_late_ms=10.0)
+    assert judge(released, limited, True, at_answer).spoiled == ""
+    assert judge(released, limited, True).spoiled != ""
+
+
+def test_a_protocol_that_limits_no_late_ticks_counts_such_trials(small_protocol):
+    late = Health(Fault.NONE, 1000, 0, 0, 0, 0, 0, 1.0, late_ticks=900, latest_s=0.09)
+    assert judge(late, small_protocol.measurement, True).spoiled == ""
 
 
 def test_a_silent_screen_is_not_the_participants_fault_either():

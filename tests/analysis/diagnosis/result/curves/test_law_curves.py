@@ -87,3 +87,9 @@ def test_the_correlation_ratio_is_the_share_of_variance_that_bin_means_take():
     assert correlation_ratio(x, x**3) == pytest.approx(1.0, abs=0.05)
     assert correlation_ratio(x, other) == pytest.approx(0.0, abs=0.01)
     assert correlation_ratio(x, x + other) == pytest.approx(0.5, abs=0.03)
+
+
+def test_a_pole_beyond_what_was_visited_does_not_flatten_the_curve(curve):
+    found = curve("1e-6/(0.012 - x)**2")
+    low, high = draw_signature(found).axes[0].get_ylim()
+    assert high - low < 3 * np.ptp(found.measured) + 3 * np.ptp(found.law[found.law_at <= found.visited[1]])
