@@ -40,15 +40,15 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
     if not rows:
         raise ValueError("it holds no lines")
     delimiter, decimal = _marks(rows, settings)
-    begin = next((k for k, (_, text) in enumerate(rows) if _all_numbers(split_row(text, delimiter), decimal)), None)
+    begin = _first_numbers(rows, delimiter, decimal)
     if begin is None or settings.names:
         first = split_row(rows[0][1], delimiter)
-        has_header = not _all_numbers(first, decimal)
         names = settings.names or tuple(_name_columns(first))
-        return TableLayout(delimiter, decimal, names, rows[1:] if has_header else rows)
+        if begin is None or any(_holds_number(split_row(text, delimiter), decimal) for _, text in rows[:begin]):
+            begin = 0 if all(is_number(field, decimal) for field in first) else 1
+        return TableLayout(delimiter, decimal, names, rows[begin:])
     width = len(split_row(rows[begin][1], delimiter))
-    above = [split_row(_strip_comment(text), delimiter) for number, text in lines if number < rows[begin][0]]
-    header, units = _header_and_units([fields for fields in above if fields], width, decimal)
+    header, units = _header_and_units(_rows_above(lines, rows, begin, delimiter), width, decimal)
     if header is None:
         if begin == 0:
             return TableLayout(delimiter, decimal, tuple(f"column{k + 1}" for k in range(width)), rows)
@@ -85,22 +85,54 @@ def _all_numbers(fields: Sequence[str], decimal: str) -> bool:
     return all(is_number(field, decimal) for field in fields) and any(field.lower() not in EMPTY for field in fields)
 
 
+def _first_numbers(rows: Sequence[Line], delimiter: str, decimal: str) -> int | None:
+    """Index of the first row of numbers, or of the first of the rows directly above it that miss every number."""
+    split = (split_row(text, delimiter) for _, text in rows)
+    begin, width = next(((k, len(row)) for k, row in enumerate(split) if _all_numbers(row, decimal)), (None, 0))
+    while begin:
+        above = split_row(rows[begin - 1][1], delimiter)
+        if len(above) != width or any(field.lower() not in EMPTY for field in above):
+            break
+        begin -= 1
+    return begin
+
+
 def _marks(rows: Sequence[Line], settings: CsvMap) -> tuple[str, str]:
-    """Delimiter and decimal sign by which most rows are numbers: of several, those that split the header alike, then
-    those with the most columns. Where none do, what splits the first row most often."""
-    sample = [text for _, text in rows[:: max(len(rows) // _SAMPLED, 1)]]
-    header = next((text for _, text in rows if re.search("[A-Za-z]", text)), "")
-    best, found = (0, False, 0), None
+    """Delimiter and decimal sign by which there are as many columns as the map names; or by which most rows are
+    numbers: of several, those that split the line above them alike, then those with the most columns. Where none do,
+    what splits the first row most often. Raises ValueError where a comma may be either sign."""
+    sample = rows[:: max(len(rows) // _SAMPLED, 1)]
+    best, found = (False, 0, False, 0), None
     for decimal in (settings.decimal,) if settings.decimal else (".", ","):
         for delimiter in (settings.delimiter,) if settings.delimiter else _DELIMITERS:
             if delimiter == decimal:
                 continue
-            read = [fields for text in sample if _all_numbers(fields := split_row(text, delimiter), decimal)]
-            columns = Counter(map(len, read)).most_common(1)[0][0] if read else 0
-            rank = (len(read), len(split_row(header, delimiter)) == columns, columns)
-            if read and rank > best:
+            read = [fields for _, text in sample if _all_numbers(fields := split_row(text, delimiter), decimal)]
+            if not read:
+                continue
+            columns = Counter(map(len, read)).most_common(1)[0][0]
+            begin = _first_numbers(rows, delimiter, decimal)
+            header = rows[begin - 1][1] if begin else ""
+            # A comma in the header speaks for commas that delimit: `t,u,` above `0,1` is no single decimal column.
+            alike = len(split_row(header, delimiter)) == columns and not (decimal == "," and "," in header)
+            rank = (columns == len(settings.names), len(read), alike, columns)
+            if rank > best:
                 best, found = rank, (delimiter, decimal)
+    if found and found[1] == "," and not settings.decimal:
+        _require_decimals(sample, found[0])
     return found or (settings.delimiter or _most_frequent(rows[0][1], settings.decimal), settings.decimal or ".")
+
+
+def _require_decimals(sample: Sequence[Line], delimiter: str) -> None:
+    """Raises ValueError where each comma in a number may as well separate thousands, as in 1,250 but not in 0,250."""
+    read = [(number, split_row(text, delimiter)) for number, text in sample]
+    with_comma = [(number, field) for number, row in read if _all_numbers(row, ",") for field in row if "," in field]
+    if with_comma and all(re.fullmatch(r"[-+]?[1-9]\d{0,2},\d{3}", field) for _, field in with_comma):
+        number, field = with_comma[0]
+        raise ValueError(
+            f"line {number}: the comma in '{field}' may separate thousands; where the decimal sign is a comma, "
+            'the map says decimal = "," under [csv]'
+        )
 
 
 def _most_frequent(line: str, decimal: str) -> str:
@@ -113,6 +145,17 @@ def _strip_comment(line: str) -> str:
     return line.strip().lstrip("".join(COMMENTS)).strip() if is_comment(line) else line
 
 
+def _rows_above(lines: Sequence[Line], rows: Sequence[Line], begin: int, delimiter: str) -> list[list[str]]:
+    """Those that are no comments, and below them a comment that holds units; comments where there is nothing else."""
+    plain = [split_row(text, delimiter) for _, text in rows[:begin]]
+    last = rows[begin - 1][0] if begin else 0
+    between = [text for number, text in lines if last < number < rows[begin][0]]
+    comments = [fields for text in between if (fields := split_row(_strip_comment(text), delimiter))]
+    if not plain:
+        return comments
+    return plain + [fields for fields in comments if len(fields) == len(plain[-1]) and _are_units(fields)][-1:]
+
+
 def _header_and_units(
     above: Sequence[list[str]], width: int, decimal: str
 ) -> tuple[list[str] | None, list[str] | None]:
@@ -120,8 +163,8 @@ def _header_and_units(
     words = [fields if len(fields) == width else None for fields in above]
     last = words[-1] if words else None
     before = words[-2] if len(words) > 1 else None
-    if last and before and _are_units(last) and not _holds_number(before, decimal):
-        return before, last
+    if last and len(words) > 1 and _are_units(last):  # units below what is no header do not become the header
+        return (before, last) if before and not _holds_number(before, decimal) else (None, None)
     return (None if last is None or _holds_number(last, decimal) else last), None
 
 

@@ -11,10 +11,10 @@ ROWS = "0,1,2\n0.1,-3,4.5\n0.2,5,-6\n"
 VALUES = [[0, 1, 2], [0.1, -3, 4.5], [0.2, 5, -6]]
 
 
-def read(tmp_path, data):
+def read(tmp_path, data, settings=CsvMap()):  # noqa: B008
     path = tmp_path / "a.csv"
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
-    return read_arrays(path, CsvMap())
+    return read_arrays(path, settings)
 
 
 @pytest.mark.parametrize(
@@ -62,6 +62,63 @@ def test_words_below_the_header_that_are_no_units_do_not_replace_it(tmp_path):
 def test_a_column_of_whole_numbers_is_not_split_at_its_commas(tmp_path):
     np.testing.assert_array_equal(read(tmp_path, "x\n1,5\n2,25\n").by_name["x"], [1.5, 2.25])
     assert list(read(tmp_path, "x,y\n1,5\n2,25\n").by_name) == ["x", "y"]
+
+
+@pytest.mark.parametrize(
+    "text", ["Rig 3\ntime,force\n0,1\n1,2\n2,4", "t,u,\n0,1\n1,2\n2,4", "t [ms],u [counts, raw]\n0,1\n1,2\n2,4"]
+)
+def test_two_columns_of_whole_numbers_are_not_read_as_decimals(tmp_path, text):
+    found = read(tmp_path, text, CsvMap(names=("t", "u"))).by_name
+    np.testing.assert_array_equal([found["t"], found["u"]], [[0, 1, 2], [1, 2, 4]])
+    if text.startswith("Rig"):
+        assert list(read(tmp_path, text).by_name) == ["time", "force"]
+    else:
+        with pytest.raises(ImportRefusedError, match="2 fields, but there are 3 columns"):
+            read(tmp_path, text)
+
+
+@pytest.mark.parametrize("text", ["t\tu\tv\n0\t1,250\t1\n1\t2,500\t3", "t;u\n0;1,250", "0;1,250", "x\n-1,250\n2,500"])
+def test_commas_that_may_separate_thousands_are_refused_until_the_map_states_the_decimal_sign(tmp_path, text):
+    with pytest.raises(ImportRefusedError, match='1,250.* the map says decimal = ","'):
+        read(tmp_path, text)
+    assert 1.25 in np.abs(np.hstack(list(read(tmp_path, text, CsvMap(decimal=",")).by_name.values())))
+
+
+@pytest.mark.parametrize("row", ["0,250;1,250", "1,250;1,25", "1250,125;1,250"])
+def test_a_comma_that_cannot_separate_thousands_is_a_decimal_sign(tmp_path, row):
+    values = [float(field.replace(",", ".")) for field in row.split(";")]
+    assert list(read(tmp_path, f"t;u\n{row}").by_name.values()) == values
+
+
+@pytest.mark.parametrize("mark", ["#", "%"])
+def test_a_comment_below_the_header_does_not_replace_it_but_may_hold_its_units(tmp_path, mark):
+    header = ",".join(NAMES)
+    assert list(read(tmp_path, f"{header}\n{mark} run 2, by hand, slow\n{ROWS}").by_name) == NAMES
+    assert list(read(tmp_path, f"time,force,travel\n{mark} s, N, mm\n{mark} by hand\n{ROWS}").by_name) == NAMES
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("force [N],travel [mm]\n,\n1,2\n2,3", ["force [N]", "travel [mm]"]),
+        ("force,travel\nN,mm\nnan,\n1,2\n2,3", ["force [N]", "travel [mm]"]),
+        ("u\nnan\n1\n2", ["u"]),
+        ("t,u\nnan,nan\n1,2\n2,3", ["t", "u"]),
+        ("nan,nan\n1,2\n2,3", ["column1", "column2"]),
+    ],
+)
+def test_a_first_row_without_a_number_is_a_row_of_missing_samples(tmp_path, text, names):
+    found = read(tmp_path, text).by_name
+    assert list(found) == names
+    expected = [[np.nan, 1, 2], [np.nan, 2, 3]][: len(names)]
+    np.testing.assert_array_equal(list(found.values()), expected)
+    said = read(tmp_path, text, CsvMap(names=("a", "b")[: len(names)])).by_name
+    np.testing.assert_array_equal(list(said.values()), expected)
+
+
+def test_a_row_of_units_does_not_become_the_header(tmp_path):
+    with pytest.raises(ImportRefusedError, match="Line 2, column 't': 's' is not a number"):
+        read(tmp_path, "t,1\ns,N\n0,5")
 
 
 @pytest.mark.parametrize("data", [b"t,u\n0,1\n\0\0\1\2\3\4", b"\xff\xfet\0,"])
