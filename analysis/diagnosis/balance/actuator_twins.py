@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.regression import Regression
@@ -20,8 +21,14 @@ BACKWARDS = "it never moves backwards"
 
 
 def doubt_laws_of_actuator(balance: Balance) -> Balance:
-    """The balance of a driven axis, with the laws not named that its actuator might have as well."""
-    return replace(balance, laws=tuple(_doubt_law(each, balance) for each in balance.laws))
+    """The balance of a driven axis, with the laws not named that its actuator might have as well. Without a
+    law of the command, what was found behind it is not named either."""
+    laws = tuple(_doubt_law(each, balance) for each in balance.laws)
+    through = [each.law.effect for each in balance.named if each.place == NO_COLUMN]
+    if through and not any(each.named and each.place == NO_COLUMN for each in laws):
+        why = f"it was found behind {through[0]}, which these data leave in doubt"
+        laws = tuple(replace(each, why_not=each.why_not or why) for each in laws)
+    return replace(balance, laws=laws)
 
 
 def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:

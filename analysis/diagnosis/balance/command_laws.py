@@ -26,6 +26,7 @@ GAPS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 travel. One held by a spring stays within a third of the gap, which is 2 here."""
 CLOSER = (0.95, 0.98, 1.02, 1.05)
 """Factors by which a number is moved, as long as that helps."""
+MOVED = ("width", "limit", "square", "gap", "power")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,11 +91,12 @@ def _force_of_square(command: FloatArray, of: dict[str, float]) -> FloatArray:
 
 
 def neighbours_of(law: CommandLaw) -> Iterator[CommandLaw]:
-    """The law with its parameter multiplied by each factor of `CLOSER`."""
-    for name in {"width", "limit", "square", "gap", "power"} & set(law.values):
-        for factor in CLOSER:
-            if name != "square" or abs(factor * law.values[name]) <= 1:
-                yield replace(law, values={**law.values, name: factor * law.values[name]})
+    """The law with each number of `MOVED` that is not zero multiplied by each factor of `CLOSER`."""
+    for name in MOVED:
+        value = law.values.get(name, 0.0)
+        for factor in CLOSER if value else ():
+            if name != "square" or abs(factor * value) <= 1:
+                yield replace(law, values={**law.values, name: factor * value})
 
 
 def _nonlinear_force(command: FloatArray, of: dict[str, float]) -> FloatArray:

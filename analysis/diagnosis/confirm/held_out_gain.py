@@ -13,6 +13,7 @@ from analysis.diagnosis.balance.judged_law import LEVEL, bootstrap_draws
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import rms_over
 from analysis.diagnosis.search.search_context import FittedCandidate
+from analysis.diagnosis.settings import SEALED_SURPRISE
 from equalizer.signals.signal import FloatArray
 
 STRETCHES = 16
@@ -48,14 +49,16 @@ def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: Fitt
 
 def predicts_something(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
     """Whether a completed model leaves less of a held-out motion than its mean alone would: a law that only holds a
-    runaway model still does not. True where forces are compared, or nothing is held out."""
+    runaway model still does not. Channels that hold no more than noise do not count. True where forces are compared, or
+    nothing that moves is held out."""
     masks = [record.test for record in measure.records]
     if measure.name == "predicted force" or not any(mask.any() for mask in masks):
         return True
     signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
     left = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit
-    size = np.maximum(rms_over(measure.records, signals, masks), np.finfo(float).tiny)
-    return bool(np.sqrt(np.mean((left / size) ** 2)) < 1)
+    size = rms_over(measure.records, signals, masks)
+    moves = size > SEALED_SURPRISE * measure.noise
+    return not moves.any() or bool(np.mean((left[moves] / size[moves]) ** 2) < 1)
 
 
 def _powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:

@@ -86,7 +86,7 @@ def _models(result: SearchResult, recording: Recording) -> tuple[MechanicalModel
 
 
 def _still_sentence(measure: ErrorMeasure) -> str:
-    if not held_out_stands_still(measure.records):
+    if not held_out_stands_still(measure.records, measure.noise):
         return ""
     return (
         "What was held out for the test holds no motion: errors on it would say nothing, and none is given. Mark a "

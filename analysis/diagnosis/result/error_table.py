@@ -10,7 +10,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import rms_over
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import STILL_SHARE
+from analysis.diagnosis.settings import SEALED_SURPRISE, STILL_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
@@ -43,7 +43,7 @@ def _by_statistic(found: Explanation, statistic: Statistic, parts: tuple[str, ..
 
 
 def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -> Errors:
-    if parts == ("test",) and held_out_stands_still(measure.records):
+    if parts == ("test",) and held_out_stands_still(measure.records, measure.noise):
         return Errors(None, None, None, None)
     masks = [np.logical_or.reduce([getattr(record, part) for part in parts]) for record in measure.records]
     if not any(mask.any() for mask in masks):
@@ -60,13 +60,15 @@ def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -
     return Errors(error(found.before), error(found.retuned), error(found.after), noise)
 
 
-def held_out_stands_still(records: Sequence[Observed]) -> bool:
-    """Whether something is held out, and no channel moves in it as it does in what is fitted."""
+def held_out_stands_still(records: Sequence[Observed], noise: FloatArray) -> bool:
+    """Whether something is held out, and no channel moves in it as it does in what is fitted. noise: (c,), rms."""
     if not any(each.test.any() for each in records):
         return False
     held = _mean_power(records, [each.test for each in records])
     known = _mean_power(records, [each.fit | each.choose for each in records])
-    return bool((known > 0).any() and (held <= STILL_SHARE * known).all())
+    # A channel that only holds noise everywhere never falls below a share of what is fitted.
+    still = np.fmax(STILL_SHARE * known, (SEALED_SURPRISE * noise) ** 2)
+    return bool((STILL_SHARE * known > noise**2).any() and (held <= still).all())
 
 
 def _mean_power(records: Sequence[Observed], masks: Sequence[Mask]) -> FloatArray:

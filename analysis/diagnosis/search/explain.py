@@ -64,17 +64,20 @@ def fits_on_short_recordings(
         coarse = coarsen(context.measure)
         begun = evaluate_fit(coarse, context.tuning, base.deviations, base.hypothesis)
         screened = screen(coarse, context.tuning, begun, repeats, timed, guard.over(context.map_, SCREENING))
-        fits += first_fits(context, base, repeats, _keep_promising(base, fits, screened))
+        fits += first_fits(context, base, repeats, _keep_promising((base, begun), fits, screened))
     # A law that the short recordings leave open may run away on the whole.
     return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda found: found.cost)
 
 
 def _keep_promising(
-    base: Fitted, fits: Sequence[Fitted], screened: Sequence[ScreenedHypothesis]
+    bases: tuple[Fitted, Fitted], fits: Sequence[Fitted], screened: Sequence[ScreenedHypothesis]
 ) -> list[ScreenedHypothesis]:
-    """The screened hypotheses whose predicted gain is enough beside the best gain so far."""
+    """The screened hypotheses whose predicted gain is enough beside the best gain so far, with costs beside the base.
+    bases: as simulated for fits, and as for the screening, where steps are longer."""
+    base, begun = bases
     best = max((base.cost - law.cost for law in fits), default=0.0)
-    return [law for law in screened if base.cost - law.cost >= max(WORTH_FITTING * best, 0.0)]
+    told = [replace(law, cost=base.cost - (begun.cost - law.cost)) for law in screened]
+    return [law for law in told if base.cost - law.cost >= max(WORTH_FITTING * best, 0.0)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,6 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance import actuator_twins
+from analysis.diagnosis.balance.command_laws import AS_COMMANDED, neighbours_of
+
 
 @pytest.fixture(scope="module")
 def found(axes, balance_of):
@@ -43,8 +46,14 @@ def test_a_limit_of_the_force_is_recovered(found):
     assert named(balance)["force_saturation"].values["limit"] == pytest.approx(4.0, rel=0.1)
 
 
-def test_a_dead_band_leaves_the_dry_friction_beside_it(found, axes):
-    balance = found(lambda u: u - np.clip(u, -1.5, 1.5), replace(axes.Physics(), coulomb=0.5))
+@pytest.fixture(scope="module")
+def rubbing_dead_band(found, axes):
+    """Of 1.5 N, beside a dry friction of 0.5 N."""
+    return found(lambda u: u - np.clip(u, -1.5, 1.5), replace(axes.Physics(), coulomb=0.5))
+
+
+def test_a_dead_band_leaves_the_dry_friction_beside_it(rubbing_dead_band):
+    balance = rubbing_dead_band
     assert set(named(balance)) == {"force_deadband", "coulomb_friction"}
     assert named(balance)["coulomb_friction"].values["level"] == pytest.approx(0.5, rel=0.2)
 
@@ -164,3 +173,20 @@ def test_the_pull_of_a_coil_is_the_first_candidate_and_laws_of_the_motion_do_not
 def test_what_pulls_alike_everywhere_is_no_coil(balance_of, law):
     balance = balance_of(pulled(law, 2))[0]
     assert "electromagnet" not in {each.law.effect for each in (*balance.laws, *balance.others)}
+
+
+def test_a_law_of_the_command_is_tried_in_order_and_never_twice():
+    law = replace(AS_COMMANDED, values={"power": 2.0, "width": 0.0, "limit": 3.0})
+    tried = [tuple(each.values.values()) for each in neighbours_of(law)]
+    assert tried == [(2.0, 0.0, 3.0 * f) for f in (0.95, 0.98, 1.02, 1.05)] + [
+        (2.0 * f, 0.0, 3.0) for f in (0.95, 0.98, 1.02, 1.05)
+    ]
+
+
+@pytest.mark.parametrize("inertia", [True, False])
+def test_laws_behind_a_dead_band_in_doubt_are_not_named(rubbing_dead_band, monkeypatch, inertia):
+    balance = rubbing_dead_band
+    monkeypatch.setattr(actuator_twins, "_has_inertia", lambda regression, laws: inertia)
+    doubted = actuator_twins.doubt_laws_of_actuator(balance)
+    assert set(named(doubted)) == ({"force_deadband", "coulomb_friction"} if inertia else set())
+    assert len(doubted.laws) == len(balance.laws)

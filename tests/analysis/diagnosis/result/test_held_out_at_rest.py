@@ -13,11 +13,14 @@ from tests.diagnosed import TRIED, device, recorded
 
 ASKED = DiagnosisSettings(without=tuple(effect.name for effect in CATALOGUE if effect.name not in TRIED))
 N, MOVING = 4000, 2400
+NOISE = np.array([0.05])
 
 
 def turning(speed):
-    push = Signal(np.zeros((N, 1)), 100.0, "torque", "N m", ("drive",))
-    return Recording("wheel", push, Signal(speed[:, None], 100.0, "velocity", "rad/s", ("speed",)))
+    read = speed.reshape(N, -1)
+    push = Signal(np.zeros(read.shape), 100.0, "torque", "N m", tuple(f"drive{k}" for k in range(read.shape[1])))
+    names = tuple(f"speed{k}" for k in range(read.shape[1]))
+    return Recording("wheel", push, Signal(read, 100.0, "velocity", "rad/s", names))
 
 
 def stops_at(sample, seed=3):
@@ -28,12 +31,27 @@ def stops_at(sample, seed=3):
 
 @pytest.mark.parametrize(("stop", "still"), [(MOVING, True), (N, False)])
 def test_held_out_samples_at_rest_hold_no_motion(stop, still):
-    assert held_out_stands_still(observed_parts([turning(stops_at(stop))], 1)) == still
+    assert held_out_stands_still(observed_parts([turning(stops_at(stop))], 1), NOISE) == still
 
 
 def test_a_steady_speed_is_a_motion_though_its_reading_does_not_change():
     speed = np.where(np.arange(N) < MOVING, stops_at(N), 2.0)
-    assert not held_out_stands_still(observed_parts([turning(speed)], 1))
+    assert not held_out_stands_still(observed_parts([turning(speed)], 1), NOISE)
+
+
+@pytest.mark.parametrize(
+    ("stop", "size", "still"), [(MOVING, 0.0, True), (N, 0.0, False), (MOVING, 0.2, False)],
+    ids=["idle beside one at rest", "idle beside one that moves", "moves a little beside one at rest"],
+)  # fmt: skip
+def test_an_idle_axis_that_only_holds_noise_does_not_move(stop, size, still):
+    small = size * np.sin(np.arange(N) / 50) + NOISE * np.random.default_rng(8).standard_normal(N)
+    shot = turning(np.stack([stops_at(stop), small], axis=1))
+    assert held_out_stands_still(observed_parts([shot], 1), np.repeat(NOISE, 2)) == still
+
+
+def test_where_nothing_moves_at_all_nothing_stands_still():
+    noise = NOISE * np.random.default_rng(8).standard_normal(N)
+    assert not held_out_stands_still(observed_parts([turning(noise)], 1), NOISE)
 
 
 def test_a_stretch_at_rest_that_is_marked_as_test_stays_and_gives_no_error():

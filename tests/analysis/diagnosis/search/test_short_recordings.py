@@ -1,6 +1,7 @@
 """One settled period of each segment tells of a law what the whole recording does."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from analysis.diagnosis.errors.choose_measure import measure_by_force
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, sensitivity
 from analysis.diagnosis.search import short_recordings
+from analysis.diagnosis.search.explain import _keep_promising
+from analysis.diagnosis.search.screening import ScreenedHypothesis
 from analysis.diagnosis.search.short_recordings import short_recordings_of
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -127,3 +130,11 @@ def test_a_period_cut_off_by_the_end_of_the_record_represents_no_other(lagging):
     context = replace(lagging, measure=lagging.measure.with_records((Observed(record.recording, *cut),)))
     short = short_recordings_of(context, NOTHING)
     assert short is None or short.stands_in.max() < sum(each.fit.sum() for each in short.context.measure.records)
+
+
+@pytest.mark.parametrize("coarse", [4.0, 10.0, 16.0])
+def test_laws_screened_with_longer_steps_are_kept_by_what_they_gain_there(coarse):
+    base, begun, fit = (SimpleNamespace(cost=cost) for cost in (10.0, coarse, 5.0))
+    screened = [ScreenedHypothesis(NOTHING, begun.cost - gain) for gain in (4.0, 0.1)]
+    (kept,) = _keep_promising((base, begun), [fit], screened)
+    assert kept.cost == pytest.approx(base.cost - 4.0)
