@@ -126,7 +126,7 @@ def test_a_text_that_is_no_table_is_refused():
             "\n",
             "column 19 of the header is missing; it must be 'status'",
         ),
-        (",135.0,,,,,\n", "\n", "line 2 has 19 fields, but the header names 25"),
+        (",135.0,,,,,,\n", "\n", "line 2 has 19 fields, but the header names 26"),
         (",3,1,test", ",three,1,test", "line 2, column trial: 'three' is not a whole number"),
         ("25.0", "high", "line 2, column frequency_hz: 'high' is not a number"),
         ("25.0", "", "line 2, column frequency_hz: it is empty, but a value is needed"),
