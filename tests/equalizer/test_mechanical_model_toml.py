@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,8 +15,6 @@ from equalizer.plant.mechanical_model import (
 )
 from equalizer.plant.mechanical_model_toml import MATRICES, mechanical_model_toml, parse_mechanical_model
 from equalizer.signals.signal import FloatArray
-
-CASES = Path(__file__).parents[2].parent / "shared" / "cases"
 
 ONE_AXIS = """
 [model]
@@ -79,11 +75,8 @@ def test_a_written_model_is_read_back_to_the_last_digit(model):
 
 
 @pytest.mark.parametrize("number", range(11))
-def test_the_shared_cases_are_read_and_written_without_loss(number):
-    path = CASES / f"open-{number:02d}.toml"
-    if not path.exists():
-        pytest.skip("the shared cases lie outside the repository and are not here")
-    model = parse_mechanical_model(path.read_text())
+def test_the_shared_cases_are_read_and_written_without_loss(shared, number):
+    model = parse_mechanical_model((shared / "cases" / f"open-{number:02d}.toml").read_text())
     assert (model.coordinates, model.inputs, model.outputs) == (6, 3, 3)
     assert model.sensor == SensorLimits(500.0, 29.43)
     assert model.tolerance is not None

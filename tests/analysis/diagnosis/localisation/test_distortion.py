@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +8,6 @@ from analysis.diagnosis.localisation.distortion import find_distortions
 from analysis.diagnosis.localisation.level_trends import level_trends
 from analysis.diagnosis.noise.noise_floor import noise_floor
 from analysis.diagnosis.settings import DISTORTION_P
-
-CASES = Path(__file__).parents[4].parent / "shared" / "cases"
 
 
 def found_in(recording):
@@ -127,20 +124,18 @@ def test_images_of_a_held_command_are_no_driven_lines():
         (10, "az", "fz", "odd", "falls"),
     ],
 )
-def test_the_shared_cases_show_the_signature_of_their_effect(number, output, input, kind, course):
-    if not CASES.is_dir():
-        pytest.skip("the shared cases lie outside the repository and are not here")
+def test_the_shared_cases_show_the_signature_of_their_effect(shared, number, output, input, kind, course):
     from study.store.formats.recording_file import read_recording
 
-    found = whole(level_trends(found_in(read_recording(CASES / f"open-{number:02d}.h5")).cells), output, input)
+    found = whole(
+        level_trends(found_in(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells), output, input
+    )
     assert found[kind].course == course
 
 
 @pytest.mark.parametrize("number", [0, 4, 5, 6, 9])
-def test_linear_shared_cases_have_no_distortion(number):
-    if not CASES.is_dir():
-        pytest.skip("the shared cases lie outside the repository and are not here")
+def test_linear_shared_cases_have_no_distortion(shared, number):
     from study.store.formats.recording_file import read_recording
 
-    trends = level_trends(found_in(read_recording(CASES / f"open-{number:02d}.h5")).cells)
+    trends = level_trends(found_in(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells)
     assert not any(trend.present for trend in trends)

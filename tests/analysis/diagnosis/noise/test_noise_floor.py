@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -7,8 +6,6 @@ import pytest
 from analysis.diagnosis.noise.noise_floor import noise_floor
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
-
-CASES = Path(__file__).parents[4].parent / "shared" / "cases"
 
 
 def without_periods(recording: Recording) -> Recording:
@@ -107,22 +104,18 @@ def test_where_nothing_is_quiet_the_noise_is_not_known():
 
 
 @pytest.mark.parametrize("number", [0, 1, 2, 4, 5, 6, 7, 8, 9, 10])
-def test_the_noise_of_the_shared_cases_is_found(number):
-    if not CASES.is_dir():
-        pytest.skip("the shared cases lie outside the repository and are not here")
+def test_the_noise_of_the_shared_cases_is_found(shared, number):
     from study.store.formats.recording_file import read_recording
 
-    floor = noise_floor(read_recording(CASES / f"open-{number:02d}.h5"))
+    floor = noise_floor(read_recording(shared / "cases" / f"open-{number:02d}.h5"))
     assert floor.response_rms == pytest.approx([0.042, 0.042, 0.083], rel=0.03)
     assert floor.position_rms == pytest.approx([np.hypot(4e-6, 1e-5 / np.sqrt(12))] * 3, rel=0.03)
 
 
-def test_rattling_in_every_segment_does_not_pass_for_noise():
-    if not CASES.is_dir():
-        pytest.skip("the shared cases lie outside the repository and are not here")
+def test_rattling_in_every_segment_does_not_pass_for_noise(shared):
     from study.store.formats.recording_file import read_recording
 
-    floor = noise_floor(read_recording(CASES / "open-03.h5"))
+    floor = noise_floor(read_recording(shared / "cases" / "open-03.h5"))
     assert floor.response_rms == pytest.approx([0.042, 0.042, 0.083], rel=0.05)
     assert "at rest" in " ".join(floor.remarks)
 

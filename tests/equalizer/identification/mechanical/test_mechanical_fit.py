@@ -1,7 +1,6 @@
 """Mechanical models are recovered from recordings of plants that are known, and refused where there is nothing."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -266,11 +265,9 @@ def test_settings_that_cannot_be_are_refused(numbers, words):
         MechanicalFitSettings(**numbers)
 
 
-def test_a_motor_axis_with_friction_is_within_a_fifth_of_its_known_mass():
+def test_a_motor_axis_with_friction_is_within_a_fifth_of_its_known_mass(shared):
     """EMPS: about 95 kg are published; dry friction is no part of a linear model."""
-    folder = Path(__file__).parents[4].parent / "shared" / "recordings" / "emps"
-    if not folder.is_dir():
-        pytest.skip("the real recordings are not beside the project")
+    folder = shared / "recordings" / "emps"
     found = []
     for name, role in (("estimation", "fit"), ("validation", "test")):
         data = np.load(folder / f"{name}.npz")

@@ -1,15 +1,12 @@
 """The drive is that of the labelled cases."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from study.evaluation.challenge.drive_plan import PERIOD, draw_plan, multisine
 from study.store.formats.recording_file import read_recording
-
-CASES = Path(__file__).parents[4].parent / "shared" / "cases"
 
 
 def test_a_multisine_has_odd_lines_and_one_of_four_silent():
@@ -29,10 +26,8 @@ def test_a_multisine_peaks_at_its_level_and_falls_with_the_root_of_frequency():
     np.testing.assert_allclose(scaled, scaled[0], rtol=1e-9)
 
 
-def test_segments_and_fixed_waves_are_those_of_the_labelled_cases():
-    if not CASES.exists():
-        pytest.skip("../shared/cases is absent")
-    plan, recorded = draw_plan(np.random.default_rng(3)), read_recording(CASES / "open-00.h5")
+def test_segments_and_fixed_waves_are_those_of_the_labelled_cases(shared):
+    plan, recorded = draw_plan(np.random.default_rng(3)), read_recording(shared / "cases" / "open-00.h5")
     assert json.dumps([(s.start, s.stop, s.kind, s.period, s.role) for s in plan.segments]) == json.dumps(
         [(s.start, s.stop, s.kind, s.period, s.role) for s in recorded.segments]
     )

@@ -1,7 +1,6 @@
 """The bench is that of the labelled cases: with the known numbers it plays their recordings back to the noise."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,8 +15,6 @@ from study.evaluation.challenge.sensor_kernel import one_pole
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import read_recording
 
-CASES = Path(__file__).parents[4].parent / "shared" / "cases"
-
 
 def bench_of(model):
     """The bare parts of a case's model: modes stand on its diagonal."""
@@ -29,13 +26,15 @@ def bench_of(model):
     return Bench(model.mass[:3, :3], damping, stiffness, modes)
 
 
-def opened(name):
-    if not CASES.exists():
-        pytest.skip("../shared/cases is absent")
-    truth = json.loads((CASES / f"{name}.truth.json").read_text(encoding="utf-8"))
-    recording = read_recording(CASES / f"{name}.h5")
-    model = bench_of(read_mechanical_model(CASES / f"{name}.toml"))
-    return recording, model, truth
+@pytest.fixture
+def opened(shared):
+    def case(name):
+        cases = shared / "cases"
+        truth = json.loads((cases / f"{name}.truth.json").read_text(encoding="utf-8"))
+        model = bench_of(read_mechanical_model(cases / f"{name}.toml"))
+        return read_recording(cases / f"{name}.h5"), model, truth
+
+    return case
 
 
 def misfit(device, recording):
@@ -47,14 +46,14 @@ def misfit(device, recording):
     return max(apart[read[:, j], j].std() for j in range(3))
 
 
-def test_where_nothing_is_missing_only_noise_is_left():
+def test_where_nothing_is_missing_only_noise_is_left(opened):
     recording, model, _ = opened("open-00")
     plan = DrivePlan(recording.command.samples, recording.segments)
     bench, _ = retune(model, recording.response.samples, plan)
     assert misfit(Device(bench), recording) < 1.03
 
 
-def test_the_labelled_saturation_explains_its_case():
+def test_the_labelled_saturation_explains_its_case(opened):
     recording, model, (truth,) = opened("open-07")
     (effect,) = (each for each in ACTUATOR if each.name == truth["effect"])
     plan = DrivePlan(recording.command.samples, recording.segments)

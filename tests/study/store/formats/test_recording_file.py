@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -17,8 +16,6 @@ from equalizer.signals.signal import Signal
 from study.store.disk.file_errors import AlreadyThereError
 from study.store.formats.recording_file import read_recording, write_recording
 from study.store.formats.recording_layout import LAYOUT, SEGMENT_FIELDS, SIGNAL_ATTRIBUTES
-
-CASES = Path(__file__).parents[4].parent / "shared" / "cases"
 
 words = st.text(st.characters(exclude_categories=("Cs", "Cc")), max_size=12)
 
@@ -123,11 +120,8 @@ def test_an_inconsistent_recording_is_not_written(tmp_path, recording):
 
 
 @pytest.mark.parametrize("number", range(11))
-def test_the_shared_cases_are_read_and_written_without_loss(number, tmp_path):
-    path = CASES / f"open-{number:02d}.h5"
-    if not path.exists():
-        pytest.skip("the shared cases lie outside the repository and are not here")
-    read = read_recording(path)
+def test_the_shared_cases_are_read_and_written_without_loss(shared, number, tmp_path):
+    read = read_recording(shared / "cases" / f"open-{number:02d}.h5")
     assert (len(read), read.sample_rate_hz, len(read.segments)) == (105_000, 1000.0, 14)
     assert read.response.unit == "m/s^2"
     write_recording(tmp_path / "again.h5", read, precision="float32")

@@ -18,7 +18,6 @@ from study.workflows.files.file_content import FileContent
 from study.workflows.files.recognisers import RECOGNISERS
 from study.workflows.files.validate import validate_file
 
-SHARED = Path(__file__).parents[4].parent / "shared"
 SHIPPED = Path(__file__).parents[4] / "protocols"
 
 MODEL = """[model]
@@ -56,10 +55,8 @@ def test_a_recording_is_described(tmp_path):
 
 
 @pytest.mark.parametrize("number", range(11))
-def test_the_shared_cases_are_sound(number):
-    recording, model = (SHARED / "cases" / f"open-{number:02d}.{ending}" for ending in ("h5", "toml"))
-    if not recording.exists():
-        pytest.skip("the shared cases lie outside the repository and are not here")
+def test_the_shared_cases_are_sound(shared, number):
+    recording, model = (shared / "cases" / f"open-{number:02d}.{ending}" for ending in ("h5", "toml"))
     assert sound(recording) == "recording, 105 s at 1000 Hz, 3 commands, 3 responses, 3 positions, 14 segments"
     assert sound(model) == (
         f"mechanical model 'bench open-{number:02d}', 6 coordinates, 3 inputs, 3 outputs (acceleration), no effects"
