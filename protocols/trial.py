@@ -96,6 +96,8 @@ class Trial:
     onset_s: float | None = None
     """When the presentation was logged, right before the device moved: seconds of the wall clock since the session was
     opened, breaks included."""
+    harmonics_mps2: float | None = None
+    """Amplitude of the acceleration at 2 to 5 times the frequency, all axes together. None where none was measured."""
 
     @property
     def counts(self) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from analysis.psychophysics.anova import OneWayAnova, one_way_anova
 from analysis.psychophysics.catch_trials import CatchTally, catch_tallies
 from analysis.psychophysics.comparisons import Comparisons, compare_all
+from analysis.psychophysics.cues.cue_findings import CueFinding, cue_findings, cue_warnings
 from analysis.psychophysics.detection import detection_thresholds
 from analysis.psychophysics.equalized_delivery import deliveries, delivery_warning
 from analysis.psychophysics.group_contrasts import Contrast, contrasts
@@ -108,6 +109,8 @@ class StudyAnalysis(Summarised):
     detection_table: ThresholdTable
     catches: tuple[CatchTally, ...]
     practice: tuple[PracticeRun, ...]
+    cues: tuple[CueFinding, ...]
+    """What else than the direction differed as delivered, and whether answers followed it."""
 
     def summary(self) -> Summary:
         table = self.table
@@ -136,14 +139,13 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
     rows = tuple(threshold_of(run, rule) for run in runs)
     tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
     table = threshold_table(rows, protocol.stimulus.frequencies_hz)
-    detection = detection_thresholds(trials, protocol)
+    detection, catches = detection_thresholds(trials, protocol), catch_tallies(trials)
     detection_table = threshold_table(detection, protocol.detection.frequencies_hz)
-    catches = catch_tallies(trials)
     anova = one_way_anova(table.groups())
     within = repeated_measures(table.subjects, table.values)
     comparisons = compare_all(anova, CONFIDENCE)
     primary = primary_analysis(count_answers(tested, table.frequencies_hz), rule.cap_n)
-    means = _mean_contrasts(rows, protocol)
+    means, cues = _mean_contrasts(rows, protocol), cue_findings(tested)
     return StudyAnalysis(
         protocol=protocol,
         population=population,
@@ -162,13 +164,14 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
         compared=comparison_text(primary, means, comparisons, table, rule),
         warnings=(
             *study_warnings(tested, rows, table, protocol),
-            *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested))]),
+            *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested)), *cue_warnings(cues)]),
             *side_warnings(catches, detection, table, detection_table),
         ),
         detection=detection,
         detection_table=detection_table,
         catches=catches,
         practice=practice_runs(trials, protocol),
+        cues=cues,
     )
 
 
@@ -211,6 +214,7 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "mean_contrasts_db": [asdict(contrast) for contrast in analysis.mean_contrasts],
         "declared": asdict(analysis.protocol.analysis),
         "compared": analysis.compared,
+        "cues": [asdict(cue) for cue in analysis.cues],
         "warnings": list(analysis.warnings),
     }
 

@@ -6,6 +6,7 @@ from analysis.figures.picture import Picture
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.population import Population
 from analysis.psychophysics.study_analysis import StudyAnalysis
+from analysis.reports.cue_tables import cue_section
 from analysis.reports.methods_text import methods_text
 from analysis.reports.page import Page, Section, render_page
 from analysis.reports.primary_tables import primary_section
@@ -54,6 +55,7 @@ def render_study_report(
         *_results(analysis, by_name),
         *_side_sections(analysis),
         *_delivery(analysis, by_name),
+        *cue_section(analysis.cues),
         *_ellipsoids(ellipsoids, by_name),
         *_runs(analysis, pictures),
         Section("Methods", paragraphs=methods_text(analysis.protocol)),

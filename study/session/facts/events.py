@@ -79,6 +79,7 @@ FIELDS_SINCE: dict[str, object] = {
     "health": None,
     "late_ticks": None,
     "latest_s": None,
+    "harmonics_mps2": None,
 }
 """Fields that came after the first logs, as they are where a line does not say them: then they are not written."""
 
@@ -157,6 +158,7 @@ class TrialMeasured:
     delivered_mps2: Measured | None = None
     off_axis_mps2: Measured | None = None
     displacement_mm: Measured | None = None
+    harmonics_mps2: Magnitude | None = None
     missed_ticks: Count | None = None
     late_ticks: Count | None = None
     latest_s: Seconds | None = None

@@ -95,6 +95,7 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
         delivered_mps2=event.delivered_mps2,
         off_axis_mps2=event.off_axis_mps2,
         displacement_mm=event.displacement_mm,
+        harmonics_mps2=event.harmonics_mps2,
         missed_ticks=event.missed_ticks,
         late_ticks=event.late_ticks,
         latest_s=event.latest_s,

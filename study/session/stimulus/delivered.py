@@ -1,5 +1,6 @@
-"""Delivered stimulus of a trial: acceleration along and across the direction, and displacement."""
+"""Delivered stimulus of a trial: acceleration along and across the direction, its harmonics, and displacement."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,9 @@ import numpy as np
 from equalizer.signals.lockin import covers_a_period, phasors
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+
+HIGHEST_HARMONIC = 5
+"""As for acceleration ellipses: beyond it a mechanism passes on little of what its friction and drives add."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,6 +20,9 @@ class Delivered:
     along_mps2: float
     off_axis_mps2: float
     displacement_mm: float
+    harmonics_mps2: float | None = None
+    """Root of the summed squares of the amplitudes at 2 to 5 times the frequency, over all axes, as far as they lie
+    below half the sample rate; None where not even the second does."""
 
 
 def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_hz: float) -> Delivered | None:
@@ -32,4 +39,15 @@ def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_h
         off_axis_mps2=float(np.linalg.norm(off_axis)),
         # Of the handle, as the accelerometer sees it: encoders sit behind cables that give way.
         displacement_mm=1000.0 * float(np.abs(along)) / (2 * np.pi * frequency_hz) ** 2,
+        harmonics_mps2=_harmonics(recording, frequency_hz),
     )
+
+
+def _harmonics(recording: Recording, frequency_hz: float) -> float | None:
+    below = math.ceil(recording.sample_rate_hz / 2 / frequency_hz) - 1
+    highest = min(HIGHEST_HARMONIC, below)
+    if highest < 2:
+        return None
+    # A fit of its own: the fundamental of older sessions was fitted without harmonics, and stays as it was.
+    found = phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz, highest)
+    return float(np.linalg.norm(found[1:]))

@@ -27,4 +27,5 @@ TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "late_ticks": ("Ticks of the control loop whose work ended after the next was due; missed ones not counted", ""),
     "latest_s": ("Longest from when a tick of the control loop was due until its work was done", "s"),
     "onset_s": ("Wall-clock time right before the device moved, since the session was opened", "s"),
+    "harmonics_mps2": ("Measured amplitude of the acceleration at 2 to 5 times the frequency, all axes", "m/s^2"),
 }

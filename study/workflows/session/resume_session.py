@@ -207,6 +207,7 @@ def _from_recording(
         delivered_mps2=values.along_mps2 if values else None,
         off_axis_mps2=values.off_axis_mps2 if values else None,
         displacement_mm=values.displacement_mm if values else None,
+        harmonics_mps2=values.harmonics_mps2 if values else None,
         missed_ticks=recording.meta.get("missed_ticks"),
         late_ticks=recording.meta.get("late_ticks"),
         latest_s=recording.meta.get("latest_s"),

@@ -120,6 +120,7 @@ def trial_measured(present: Present, outcome: Outcome, state: SessionState, sitt
         delivered_mps2=values.along_mps2 if values else None,
         off_axis_mps2=values.off_axis_mps2 if values else None,
         displacement_mm=values.displacement_mm if values else None,
+        harmonics_mps2=values.harmonics_mps2 if values else None,
         missed_ticks=outcome.played.health.missed_ticks,
         late_ticks=outcome.played.health.late_ticks,
         latest_s=outcome.played.health.latest_s,

@@ -45,3 +45,20 @@ def test_a_recording_of_nothing_but_gaps_is_no_measurement():
 
 def test_less_than_a_period_is_no_measurement():
     assert measure_delivered(recording(30, 4.0, 0.0), DIRECTION, 25.0) is None
+
+
+def test_harmonics_are_measured_over_all_axes_and_not_where_there_are_none():
+    whole = recording(1000, 4.0, 1.5)
+    w = 2 * np.pi * 25.0 * np.arange(1000) / RATE_HZ
+    more = 0.3 * np.sin(2 * w)[:, None] * ACROSS + 0.4 * np.sin(5 * w + 1.0)[:, None] * DIRECTION
+    bent = replace(whole, response=replace(whole.response, samples=whole.response.samples + more))
+    values = measure_delivered(bent, DIRECTION, 25.0)
+    assert values.harmonics_mps2 == pytest.approx(0.5)
+    assert values.along_mps2 == pytest.approx(4.0, rel=1e-4)
+    assert measure_delivered(whole, DIRECTION, 25.0).harmonics_mps2 == pytest.approx(0.0, abs=1e-9)
+
+
+def test_harmonics_beyond_half_the_rate_are_left_out():
+    slow = recording(1000, 4.0, 0.0)
+    assert measure_delivered(slow, DIRECTION, 249.0).harmonics_mps2 is not None
+    assert measure_delivered(slow, DIRECTION, 250.0).harmonics_mps2 is None

@@ -1,0 +1,110 @@
+"""How well each cue alone could tell the directions: difference over what a participant can notice.
+
+A sensor parts two nearly repeatable stimuli however little they differ, so its own error says nothing about people. A
+participant has an internal noise, which is declared here, and adds to how much the delivery varied from trial to trial
+(a roved level does): d' = difference / sqrt(internal noise^2 + spread^2). At d' = 1 the difference is one just
+noticeable difference of that participant; the cue alone then makes Phi(1/2) = 69 % of the answers right.
+
+Friction makes what arrives depend on the level in a way that a participant knows at any level: differences and spread
+are those at the same level, which enters as a parabola in dB.
+
+Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapter 1.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from analysis.psychophysics.cues.delivered_cues import Cue, DeliveredTrials
+from equalizer.signals.signal import FloatArray
+
+INTERNAL_NOISE_DB = (0.5, 1.0, 2.0)
+"""A very keen, a usual and a dull judge of strength: difference limens of vibration are near 1 dB."""
+USUAL_NOISE_DB = 1.0
+NOTICEABLE = 1.0
+"""d' of one just noticeable difference."""
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class CueAbility:
+    """One cue of one participant at one frequency."""
+
+    subject: str
+    frequency_hz: float
+    cue: Cue
+    trials: int
+    difference_db: float
+    """First direction minus second, by angle, at the same level."""
+    lower_db: float
+    upper_db: float
+    """95 % interval of the difference, from how much trials vary."""
+    spread_db: float
+    """Standard deviation over trials of one direction at the same level."""
+
+    def ability(self, noise_db: float) -> float:
+        """d' of a participant with this internal noise who uses nothing but this cue."""
+        return abs(self.difference_db) / math.hypot(noise_db, self.spread_db)
+
+    @property
+    def noticeable(self) -> bool:
+        """Whether it is shown that a usual judge notices: by the end of the interval that is nearer to none."""
+        if self.lower_db <= 0.0 <= self.upper_db:
+            return False
+        nearest_db = min(abs(self.lower_db), abs(self.upper_db))
+        return nearest_db >= NOTICEABLE * math.hypot(USUAL_NOISE_DB, self.spread_db)
+
+
+def cue_abilities(trials: DeliveredTrials) -> tuple[CueAbility, ...]:
+    """By cue and participant; participants with too few trials for a spread are left out."""
+    found = []
+    for cue, values_db in trials.values_db.items():
+        for number, subject in enumerate(trials.subjects):
+            mine = trials.person == number
+            fit = same_level_difference(values_db[mine], trials.nominal_db[mine], trials.side[mine])
+            if fit is None:
+                continue
+            half = float(student.ppf(0.5 + CONFIDENCE / 2, fit.df)) * fit.error_db
+            found.append(
+                CueAbility(
+                    subject=subject,
+                    frequency_hz=trials.frequency_hz,
+                    cue=cue,
+                    trials=len(fit.residual_db),
+                    difference_db=fit.difference_db,
+                    lower_db=fit.difference_db - half,
+                    upper_db=fit.difference_db + half,
+                    spread_db=math.sqrt(float(fit.residual_db @ fit.residual_db) / fit.df),
+                )
+            )
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SameLevelFit:
+    difference_db: float
+    error_db: float
+    """Standard error."""
+    df: int
+    residual_db: FloatArray
+    """(n,): each trial against those of its direction at its level."""
+
+
+def same_level_difference(values_db: FloatArray, nominal_db: FloatArray, side: FloatArray) -> SameLevelFit | None:
+    """Least squares of one participant's values (n,) on a parabola of the level and the side (+1 or -1). None where
+    one direction is missing, or too few trials are left for a spread."""
+    if len(set(side.tolist())) < 2:
+        return None
+    away = nominal_db - nominal_db.mean()
+    design = np.column_stack([side / 2.0, np.ones(len(away)), away, away**2])
+    # Levels may be one or two: then the parabola is not determined, and need not be.
+    inverse = np.linalg.pinv(design)
+    df = len(away) - int(np.linalg.matrix_rank(design))
+    if df < 1:
+        return None
+    fitted = inverse @ values_db
+    residual = values_db - design @ fitted
+    spread = math.sqrt(float(residual @ residual) / df)
+    return SameLevelFit(float(fitted[0]), spread * float(np.linalg.norm(inverse[0])), df, residual)

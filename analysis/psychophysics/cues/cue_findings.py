@@ -1,0 +1,128 @@
+"""Was direction the cue? Per frequency and cue: what it could do, beside what the answers did."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from statistics import NormalDist, fmean, median
+
+from analysis.psychophysics.bias import response_bias
+from analysis.psychophysics.cues.answers_on_delivery import AnswersOnDelivery, answers_on_delivery
+from analysis.psychophysics.cues.cue_ability import (
+    INTERNAL_NOISE_DB,
+    USUAL_NOISE_DB,
+    CueAbility,
+    cue_abilities,
+)
+from analysis.psychophysics.cues.delivered_cues import Cue, DeliveredTrials, delivered_trials
+from analysis.psychophysics.group_contrasts import holm_correction
+from analysis.wording import conjoin, number, p_text, signed_number
+from protocols.trial import Trial
+
+LEVEL = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class CueFinding:
+    """One cue at one frequency."""
+
+    frequency_hz: float
+    cue: Cue
+    people: tuple[CueAbility, ...]
+    difference_db: float
+    """Median of the participants' differences, first direction minus second by angle."""
+    largest_db: float
+    """Largest of them, by size."""
+    spread_db: float
+    """Median of the standard deviations within a direction."""
+    abilities: tuple[float, ...]
+    """Median d' of the cue alone, for each internal noise of `INTERNAL_NOISE_DB`."""
+    observed_d_prime: float | None
+    """Mean d' of the answers at this frequency; includes the cue, if it was used."""
+    noticed_by: tuple[str, ...]
+    """Participants for whom it is shown that a usual judge would notice the difference."""
+    answers: AnswersOnDelivery
+    p_holm: float | None
+    """Of `answers`, corrected for all cues and frequencies."""
+
+    @property
+    def followed(self) -> bool:
+        return self.p_holm is not None and self.p_holm < LEVEL
+
+
+def cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
+    """By frequency and cue, over the test trials that were measured; empty where none was."""
+    parts = [
+        (group, cue_abilities(group), regressed)
+        for group in delivered_trials(trials)
+        for regressed in answers_on_delivery(group)
+    ]
+    tested = [regressed.p for _, _, regressed in parts if regressed.p is not None]
+    corrected = iter(holm_correction(tested))
+    found = []
+    for group, abilities, regressed in parts:
+        p_holm = next(corrected) if regressed.p is not None else None
+        if mine := tuple(each for each in abilities if each.cue is regressed.cue):
+            found.append(_finding(group, mine, regressed, p_holm))
+    return tuple(found)
+
+
+def _finding(
+    group: DeliveredTrials, people: tuple[CueAbility, ...], regressed: AnswersOnDelivery, p_holm: float | None
+) -> CueFinding:
+    return CueFinding(
+        frequency_hz=group.frequency_hz,
+        cue=regressed.cue,
+        people=people,
+        difference_db=median([each.difference_db for each in people]),
+        largest_db=max((each.difference_db for each in people), key=abs),
+        spread_db=median([each.spread_db for each in people]),
+        abilities=tuple(median([each.ability(noise) for each in people]) for noise in INTERNAL_NOISE_DB),
+        observed_d_prime=_observed_d_prime(group),
+        noticed_by=tuple(each.subject for each in people if each.noticeable),
+        answers=regressed,
+        p_holm=p_holm,
+    )
+
+
+def _observed_d_prime(group: DeliveredTrials) -> float | None:
+    """Mean over participants; None where none was shown both directions."""
+    found = []
+    for place in range(len(group.subjects)):
+        mine = group.person == place
+        shown = [1 if side > 0 else 2 for side in group.side[mine]]
+        bias = response_bias(shown, [bool(right) for right in (group.answer == group.side)[mine]])
+        if bias is not None:
+            found.append(bias.d_prime)
+    return fmean(found) if found else None
+
+
+def cue_warnings(found: Sequence[CueFinding]) -> tuple[str, ...]:
+    """What must be known before the thresholds are read; empty where nothing stands out."""
+    noticed = [_noticed_text(each) for each in found if each.noticed_by]
+    followed = [
+        f"{each.cue.value} at {each.frequency_hz:g} Hz ({signed_number(each.answers.slope or 0.0)} logits per dB, "
+        f"Holm's {p_text(each.p_holm)})"
+        for each in found
+        if each.followed
+    ]
+    sentences = []
+    if noticed:
+        sentences.append(
+            f"The two directions differed in more than their direction, by what a participant with an internal "
+            f"noise of {USUAL_NOISE_DB:g} dB notices: {conjoin(noticed)}. Those directions can be told unfelt."
+        )
+    if followed:
+        sentences.append(
+            f"Within a direction, answers followed what was delivered, so direction was not the only cue: "
+            f"{conjoin(followed)}."
+        )
+    return tuple(sentences)
+
+
+def _noticed_text(finding: CueFinding) -> str:
+    ability = finding.abilities[INTERNAL_NOISE_DB.index(USUAL_NOISE_DB)]
+    right = 100.0 * NormalDist().cdf(ability / 2.0)
+    return (
+        f"{finding.cue.value} at {finding.frequency_hz:g} Hz ({signed_number(finding.difference_db, 1)} dB at the "
+        f"median, {len(finding.noticed_by)} of {len(finding.people)} participants; alone d' {number(ability, 1)}, "
+        f"{right:.0f} % right; the answers' d' {number(finding.observed_d_prime, 1)})"
+    )

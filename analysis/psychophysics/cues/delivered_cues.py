@@ -1,0 +1,106 @@
+"""What differs between two directions as delivered, beside the direction: strength, spectrum, coupling.
+
+All in dB, so that they can be weighed against one internal noise. Harmonics and motion across the direction count by
+what they add to the amplitude where they are in phase with it: the most that they can change.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from equalizer.signals.signal import FloatArray
+from protocols.trial import Phase, Trial
+
+
+class Cue(StrEnum):
+    INTENSITY = "intensity"
+    """Delivered along the direction, over the level."""
+    SPECTRUM = "spectrum"
+    """What the harmonics add to it."""
+    COUPLING = "coupling"
+    """What the motion across the direction adds to it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DeliveredTrials:
+    """The counted and measured test trials at one frequency, (n,) each."""
+
+    frequency_hz: float
+    subjects: tuple[str, ...]
+    person: NDArray[np.intp]
+    """Places in `subjects`."""
+    side: FloatArray
+    """+1: the first direction of the two as angles in the plane; -1: the other. Labels may be swapped between people,
+    the device's directions are not. Without angles: label 1 and 2."""
+    answer: FloatArray
+    """The direction that was answered, in the same signs."""
+    nominal_db: FloatArray
+    """Level of the staircase, re 1 N."""
+    values_db: dict[Cue, FloatArray]
+    """Cues that every trial was measured for."""
+
+
+def delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
+    """By rising frequency; only what was measured."""
+    chosen = [t for t in trials if t.phase is Phase.TEST and t.counts and t.delivered_mps2 and t.level_n > 0]
+    turned = _turned_people(chosen)
+    found = []
+    for frequency_hz in sorted({trial.frequency_hz for trial in chosen}):
+        rows = [trial for trial in chosen if trial.frequency_hz == frequency_hz]
+        subjects = tuple(dict.fromkeys(trial.subject for trial in rows))
+        place = {subject: number for number, subject in enumerate(subjects)}
+        signs = np.array([-1.0 if trial.subject in turned else 1.0 for trial in rows])
+        found.append(
+            DeliveredTrials(
+                frequency_hz=frequency_hz,
+                subjects=subjects,
+                person=np.array([place[trial.subject] for trial in rows]),
+                side=signs * np.array([3.0 - 2.0 * trial.direction_shown for trial in rows]),
+                answer=signs * np.array([3.0 - 2.0 * (trial.answer or 0) for trial in rows]),
+                nominal_db=_db([trial.level_n for trial in rows]),
+                values_db={cue: _db(values) for cue, value in _VALUES.items() if (values := _all_known(rows, value))},
+            )
+        )
+    return tuple(found)
+
+
+def _turned_people(trials: list[Trial]) -> frozenset[str]:
+    """People for whom label 1 is the direction at the larger angle."""
+    angles: dict[str, dict[int, float]] = {}
+    for trial in trials:
+        if trial.angle_deg is not None:
+            angles.setdefault(trial.subject, {})[trial.direction_shown] = trial.angle_deg
+    return frozenset(name for name, known in angles.items() if len(known) == 2 and known[1] > known[2])
+
+
+def _all_known(rows: list[Trial], value: Callable[[Trial], float | None]) -> list[float]:
+    """Empty where one is missing or none is positive: a cue that only some trials tell would compare other trials."""
+    values = [value(trial) for trial in rows]
+    return [each for each in values if each is not None] if all(each is not None for each in values) else []
+
+
+def _intensity(trial: Trial) -> float | None:
+    return (trial.delivered_mps2 or math.nan) / trial.level_n
+
+
+def _spectrum(trial: Trial) -> float | None:
+    return None if trial.harmonics_mps2 is None else 1.0 + trial.harmonics_mps2 / (trial.delivered_mps2 or math.nan)
+
+
+def _coupling(trial: Trial) -> float | None:
+    return None if trial.off_axis_mps2 is None else 1.0 + trial.off_axis_mps2 / (trial.delivered_mps2 or math.nan)
+
+
+_VALUES: dict[Cue, Callable[[Trial], float | None]] = {
+    Cue.INTENSITY: _intensity,
+    Cue.SPECTRUM: _spectrum,
+    Cue.COUPLING: _coupling,
+}
+
+
+def _db(values: list[float]) -> FloatArray:
+    return 20.0 * np.log10(np.array(values, dtype=np.float64))

@@ -1,0 +1,104 @@
+"""A planted difference between the directions is named, a small one is not; labels and friction do not confuse it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.psychophysics.cues.cue_ability import INTERNAL_NOISE_DB
+from analysis.psychophysics.cues.cue_findings import cue_findings, cue_warnings
+from analysis.psychophysics.cues.delivered_cues import Cue
+from analysis.psychophysics.study_analysis import analyse_study, anova_document
+from analysis.reports.study_report import render_study_report
+
+SCATTER_DB = 0.3
+ABLE_N = (0.4, 0.4, 0.4, 0.4, 0.4)
+
+
+def delivered(trials, planted_db, cue=Cue.INTENSITY, at_hz=25.0, seed=5, per_newton=4.0):
+    """As a device delivers them: scattered from trial to trial, direction 1 by `planted_db` more at one frequency."""
+    random = np.random.default_rng(seed)
+    found = []
+    for trial in trials:
+        more = planted_db if trial.frequency_hz == at_hz and trial.direction_shown == 1 else 0.0
+        parts = {each: random.normal(0.0, SCATTER_DB) + (more if each is cue else 0.0) for each in Cue}
+        along = per_newton * trial.level_n * 10 ** (parts[Cue.INTENSITY] / 20)
+        beside = {each: abs(10 ** ((1.0 + parts[each]) / 20) - 1) * along for each in (Cue.COUPLING, Cue.SPECTRUM)}
+        found.append(
+            replace(
+                trial, delivered_mps2=along, off_axis_mps2=beside[Cue.COUPLING], harmonics_mps2=beside[Cue.SPECTRUM]
+            )
+        )
+    return found
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("cue", list(Cue))
+def test_a_planted_mismatch_of_3_db_is_named_where_it_is_and_nowhere_else(simulate_study, seed, cue):
+    found = cue_findings(delivered(simulate_study(4, ABLE_N, seed), 3.0, cue, seed=seed))
+    assert [(each.cue, each.frequency_hz) for each in found if each.noticed_by] == [(cue, 25.0)]
+    (named,) = (each for each in found if each.noticed_by)
+    assert named.difference_db == pytest.approx(3.0, abs=0.2)
+    assert named.spread_db == pytest.approx(SCATTER_DB, abs=0.05)
+    assert named.abilities == pytest.approx([3.0 / np.hypot(noise, SCATTER_DB) for noise in INTERNAL_NOISE_DB], rel=0.1)
+    assert len(named.noticed_by) == 4
+    (sentence,) = cue_warnings(found)
+    assert f"{cue.value} at 25 Hz (+" in sentence
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+def test_a_tenth_of_a_decibel_is_not_named_though_it_is_told_from_none(simulate_study, seed):
+    trials = delivered(simulate_study(4, ABLE_N, seed), 0.1, seed=seed)
+    found = cue_findings(trials)
+    assert cue_warnings(found) == ()
+    exact = cue_findings(delivered_exactly(trials, 0.1))
+    assert exact[0].people[0].lower_db == pytest.approx(exact[0].people[0].upper_db) == pytest.approx(0.1)
+    assert cue_warnings(exact) == ()
+
+
+def delivered_exactly(trials, difference_db):
+    return [
+        replace(trial, delivered_mps2=4.0 * trial.level_n * 10 ** ((trial.direction_shown == 1) * difference_db / 20))
+        for trial in trials
+    ]
+
+
+def test_friction_that_eats_weak_forces_is_no_spread_and_no_difference(simulate_study):
+    trials = [
+        replace(trial, delivered_mps2=4.0 * trial.level_n * 10 ** (-3.0 * (1.0 - np.log10(trial.level_n)) / 20))
+        for trial in simulate_study(3, ABLE_N, 8)
+    ]
+    for each in cue_findings(trials):
+        if each.cue is Cue.INTENSITY:
+            assert each.spread_db == pytest.approx(0.0, abs=1e-9)
+            assert each.difference_db == pytest.approx(0.0, abs=1e-9)
+
+
+def test_swapped_labels_do_not_cancel_a_difference_of_the_device(simulate_study):
+    """For every second participant direction 1 is at -45 degrees; the device is stronger at +45 degrees."""
+    trials = []
+    for trial in simulate_study(4, ABLE_N, 3):
+        swapped = int(trial.subject[1:]) % 2 == 0
+        plus = (trial.direction_shown == 1) != swapped
+        strength = 4.0 * trial.level_n * (2.0 if plus else 1.0)
+        trials.append(replace(trial, angle_deg=45.0 if plus else -45.0, delivered_mps2=strength))
+    first = next(each for each in cue_findings(trials) if each.cue is Cue.INTENSITY)
+    assert [each.difference_db for each in first.people] == pytest.approx([-20 * np.log10(2.0)] * 4)
+
+
+def test_without_measurements_nothing_is_said(simulate_study):
+    assert cue_findings([replace(trial, delivered_mps2=None) for trial in simulate_study(2, ABLE_N, 1)]) == ()
+
+
+def test_the_report_and_the_document_name_the_planted_mismatch(simulate_study, protocol):
+    trials = simulate_study(4, ABLE_N, 1)
+    pages = {}
+    for planted_db in (3.0, 0.1):
+        analysis = analyse_study(delivered(trials, planted_db), protocol)
+        pages[planted_db] = render_study_report(analysis, (), {}, "today")
+        assert len(anova_document(analysis)["cues"]) == 15
+    assert all("Was direction the cue?" in page for page in pages.values())
+    said = "The two directions differed in more than their direction"
+    assert pages[3.0].count(said) == 2 and "intensity at 25 Hz" in pages[3.0]
+    assert said not in pages[0.1]
+    assert "Too little varied within a direction" in pages[0.1]
