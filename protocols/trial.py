@@ -98,6 +98,13 @@ class Trial:
     opened, breaks included."""
     harmonics_mps2: float | None = None
     """Amplitude of the acceleration at 2 to 5 times the frequency, all axes together. None where none was measured."""
+    nominal_n: float | None = None
+    """Level of the staircase, where `level_n`, which was played, was drawn around it. None where nothing is roved."""
+
+    @property
+    def staircase_n(self) -> float:
+        """Level of the staircase (N): without roving that of the stimulus."""
+        return self.level_n if self.nominal_n is None else self.nominal_n
 
     @property
     def counts(self) -> bool:

@@ -28,7 +28,7 @@ def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
     """One panel per run, by frequency. runs: of one participant."""
     if not runs:
         return say_nothing_to_draw(new_figure(8.6, 2.0), "There is no run to draw.")
-    lowest_n = 0.75 * min([trial.level_n for run in runs for trial in run.answered], default=rule.start_n)
+    lowest_n = 0.75 * min([trial.staircase_n for run in runs for trial in run.answered], default=rule.start_n)
     columns = min(_COLUMNS, len(runs) + 1)
     lines = -(-(len(runs) + 1) // columns)
     figure = new_figure(8.6, 2.3 * lines)
@@ -52,7 +52,7 @@ def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
 
 def _draw_run(axes: Axes, run: Run, rule: StaircaseRule) -> None:
     plain_axes(axes)
-    levels = np.array([trial.level_n for trial in run.answered])
+    levels = np.array([trial.staircase_n for trial in run.answered])
     numbers = np.arange(1, len(levels) + 1)
     right = np.array([bool(trial.correct) for trial in run.answered], dtype=bool)
     reversals = np.array(run.state.reversal_trials, dtype=int)

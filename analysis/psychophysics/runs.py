@@ -89,9 +89,10 @@ def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule) -> Staircas
             _refuse_weak_catch_trial(trial, rule)
             continue
         expected_n = level_n(rule, state)
-        if not math.isclose(trial.level_n, expected_n, rel_tol=LEVEL_TOLERANCE):
+        if not math.isclose(trial.staircase_n, expected_n, rel_tol=LEVEL_TOLERANCE):
+            name = "level_n" if trial.nominal_n is None else "nominal_n"
             raise InconsistentTrialsError(
-                f"{_trial_text(trial)}: level_n is {trial.level_n:.6g} N, but the answers before it lead to "
+                f"{_trial_text(trial)}: {name} is {trial.staircase_n:.6g} N, but the answers before it lead to "
                 f"{expected_n:.6g} N under the protocol's staircase; the rows belong to another rule or were changed"
             )
         state = step(rule, state, trial.correct)

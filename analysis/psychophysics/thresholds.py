@@ -105,14 +105,23 @@ def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
         d_prime=bias.d_prime if bias else None,
         criterion=bias.criterion if bias else None,
         spoiled_trials=run.spoiled_trials,
-        threshold_mps2=_mean_of_measured([trial.delivered_mps2 for trial in turned]) if run.complete else None,
-        threshold_mm=_mean_of_measured([trial.displacement_mm for trial in turned]) if run.complete else None,
+        threshold_mps2=_mean_of_measured([_at_level(trial, trial.delivered_mps2) for trial in turned])
+        if run.complete
+        else None,
+        threshold_mm=_mean_of_measured([_at_level(trial, trial.displacement_mm) for trial in turned])
+        if run.complete
+        else None,
         measured_reversals=sum(trial.delivered_mps2 is not None for trial in turned),
         ended=_run_end(run, rule),
         repeats_at_will=run.repeats_at_will,
         repeat_rate=run.repeats_at_will / run.presentations if run.presentations else 0.0,
         asked_often=is_often(run.repeats_at_will, run.presentations),
     )
+
+
+def _at_level(trial: Trial, measured: float | None) -> float | None:
+    """What was measured, as it would be at the staircase's level: in proportion, where that level was roved."""
+    return None if measured is None else measured * trial.staircase_n / trial.level_n
 
 
 def is_censored(cap_reversals: int) -> bool:

@@ -83,6 +83,13 @@ def _stimulus(protocol: StudyProtocol) -> str:
         f"the answer, and fell over {stimulus.fade_out_s:g} s; the first half-wave went {polarity}. "
         + _LEVELS[stimulus.quantity]
         + (
+            f" Each amplitude was drawn, evenly in dB, from a range of {stimulus.rove_db:g} dB around the level of the "
+            "staircase, independently of the direction (roving). Thresholds by reversals are those of the staircase's "
+            "levels, the model of all answers takes the amplitudes that were played."
+            if stimulus.rove_db
+            else ""
+        )
+        + (
             f" A virtual spring of {protocol.spring.natural_frequency_hz:g} Hz kept the handle near the centre."
             if protocol.spring.natural_frequency_hz
             else ""

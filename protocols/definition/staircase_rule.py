@@ -37,7 +37,10 @@ class StaircaseRule:
 
     start_n: Annotated[float, Field(ge=0.001, le=3.0, description="Level of the first trial of every run, in newtons.")]
     cap_n: Annotated[
-        float, Field(gt=0, le=3.0, description="No trial is above this level, in newtons; 3 N at the most.")
+        float,
+        Field(
+            gt=0, le=3.0, description="No level is above this, in newtons; 3 N at the most. Only roving goes beyond it."
+        ),
     ]
     up_after_wrong: Annotated[int, Field(ge=1, le=10, description="Wrong answers in a row that raise the level.")]
     down_after_right: Annotated[int, Field(ge=1, le=10, description="Right answers in a row that lower the level.")]

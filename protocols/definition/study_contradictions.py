@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from protocols.definition.problem import Problem
@@ -9,6 +10,8 @@ from protocols.definition.problem import Problem
 if TYPE_CHECKING:
     from protocols.definition.preparation import DemoSettings, PracticeSettings
     from protocols.definition.study_protocol import StudyProtocol
+
+ROUNDING_N = 1e-9
 
 
 def contradictions(protocol: StudyProtocol) -> list[Problem]:
@@ -21,6 +24,11 @@ def _levels(protocol: StudyProtocol) -> list[Problem]:
     if protocol.safety.stimulus_cap_n < cap_n:
         wrong = f"is {protocol.safety.stimulus_cap_n} N, below staircase.cap_n: the highest levels could not be played"
         problems.append(Problem("safety.stimulus_cap_n", wrong, f"at least {cap_n} N, the staircase's cap"))
+    elif (highest_n := _roved_up_n(cap_n, protocol.stimulus.rove_db)) > protocol.safety.stimulus_cap_n + ROUNDING_N:
+        wrong = f"is {cap_n:g} N, and roving (stimulus.rove_db) adds up to {highest_n - cap_n:.3g} N to it"
+        room_n = _roved_up_n(protocol.safety.stimulus_cap_n, -protocol.stimulus.rove_db)
+        allowed = f"at most {math.floor(1000 * room_n) / 1000:g} N, so that none is above safety.stimulus_cap_n"
+        problems.append(Problem("staircase.cap_n", wrong, allowed))
     levels = {
         "demo.level_n": _highest_n(protocol.demo),
         "practice.level_n": _highest_n(protocol.practice) if protocol.practice.frequencies_hz else 0.0,
@@ -35,7 +43,11 @@ def _levels(protocol: StudyProtocol) -> list[Problem]:
 
 def _highest_n(settings: DemoSettings | PracticeSettings) -> float:
     """Highest level of a roved stimulus (N): half of the range in dB lies above `level_n`."""
-    return settings.level_n * float(10.0 ** (settings.rove_db / 40.0))
+    return _roved_up_n(settings.level_n, settings.rove_db)
+
+
+def _roved_up_n(level_n: float, rove_db: float) -> float:
+    return level_n * float(10.0 ** (rove_db / 40.0))
 
 
 def _times(protocol: StudyProtocol) -> list[Problem]:

@@ -64,6 +64,18 @@ class StimulusSettings:
             "tell the direction."
         ),
     ] = "random"
+    rove_db: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=20,
+            description="Width of the range, the staircase's level in its middle, from which the amplitude of every "
+            "trial of a staircase on directions is drawn evenly in dB, for both directions alike: the control against "
+            "telling them by strength. A difference of d dB between the directions then tells at most 50 + 50 d / r % "
+            "of the trials. Half of the range lies above the level, so staircase.cap_n must leave room below "
+            "safety.stimulus_cap_n. Default 0: each trial at the staircase's level, as published.",
+        ),
+    ] = 0.0
 
     @model_validator(mode="after")
     def _distinct(self) -> Self:

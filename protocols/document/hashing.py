@@ -31,7 +31,7 @@ the hash, so that old hashes stay valid."""
 
 SAFETY_SINCE: dict[str, Untouched] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": UNTOUCHED}
 
-ROVE_SINCE: dict[str, Untouched] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0}
+ROVE_SINCE: dict[str, Untouched] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0, "stimulus.rove_db": 0.0}
 
 TIMING_SINCE: dict[str, Untouched] = {"measurement.late_ticks_limit": 1.0, "measurement.longest_late_ms": 1000.0}
 

@@ -120,6 +120,11 @@ def practice_level_n(settings: PracticeSettings, seed: int, run: int, trial: int
     return _draw_level_n(settings.level_n, settings.rove_db, seed, (run, trial, attempt, _ROVE))
 
 
+def roved_level_n(nominal_n: float, rove_db: float, seed: int, run: int, trial: int, attempt: int) -> float:
+    """Amplitude (N) of a staircase trial around the level of its staircase, drawn independently of the direction."""
+    return _draw_level_n(nominal_n, rove_db, seed, (run, trial, attempt, _ROVE))
+
+
 def demo_level_n(settings: DemoSettings, seed: int, played: int) -> float:
     """Amplitude (N) of a demonstration. played: number of earlier ones in the session."""
     return _draw_level_n(settings.level_n, settings.rove_db, seed, (played,))

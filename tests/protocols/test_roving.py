@@ -1,4 +1,4 @@
-"""The level of practice and demonstration varies: how strong a stimulus is must not tell its direction."""
+"""Levels that vary at random: how strong a stimulus is must not tell its direction."""
 
 from dataclasses import replace
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from protocols.definition.preparation import DemoSettings, PracticeSettings
+from protocols.document.hashing import protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
-from protocols.procedure.schedule import demo_level_n, draw_trial, practice_level_n
+from protocols.procedure.schedule import demo_level_n, draw_trial, practice_level_n, roved_level_n
 from protocols.procedure.staircase import to_db
 
 ROVED = PracticeSettings(frequencies_hz=(25.0,), level_n=2.0, rove_db=6.0)
@@ -74,3 +75,41 @@ def shipped(request):
     from study.store.formats.protocol_files import read_study_protocol
 
     return read_study_protocol(request.param).protocol
+
+
+def test_staircase_trials_are_roved_around_the_staircases_level_for_both_directions_alike(small_protocol):
+    places = [(seed, trial) for seed in range(40) for trial in range(50)]
+    levels = np.array([to_db(roved_level_n(1.2, 6.0, seed, 2, trial, 0) / 1.2) for seed, trial in places])
+    sides = [draw_trial(small_protocol.schedule, "random", seed, 2, trial, 0).direction for seed, trial in places]
+    assert -3.0 <= levels.min() < -2.9 and 2.9 < levels.max() <= 3.0
+    assert abs(np.corrcoef(levels, sides)[0, 1]) < 4 / np.sqrt(len(levels))
+    assert roved_level_n(1.2, 0.0, 7, 2, 3, 0) == 1.2
+    assert len({roved_level_n(1.2, 6.0, 7, 2, 3, attempt) for attempt in range(5)}) == 5
+
+
+def roved(text, rove_db, cap_n):
+    changed = text.replace("fade_in_s = 0.1", f"fade_in_s = 0.1\nrove_db = {rove_db}")
+    return changed.replace("cap_n = 3.0\nup", f"cap_n = {cap_n}\nup")
+
+
+@pytest.mark.parametrize(
+    ("rove_db", "cap_n", "highest_n"), [(6.0, 3.0, "2.123"), (6.0, 2.13, "2.123"), (0.1, 3.0, "2.982")]
+)
+def test_a_range_that_would_pass_the_force_cap_is_refused_with_the_cap_that_would_do(
+    small_text, rove_db, cap_n, highest_n
+):
+    with pytest.raises(ProtocolError, match=rf"staircase.cap_n is {cap_n:g} N, .* at most {highest_n} N"):
+        load_protocol(roved(small_text, rove_db, cap_n), "mine.toml")
+    load_protocol(roved(small_text, rove_db, highest_n), "mine.toml")
+
+
+def test_roving_counts_in_the_fingerprint_only_where_it_is_used(small_text):
+    plain = protocol_hash(load_protocol(small_text, "mine.toml"))
+    assert protocol_hash(load_protocol(roved(small_text, 0.0, 3.0), "mine.toml")) == plain
+    lower = small_text.replace("cap_n = 3.0\nup", "cap_n = 2.0\nup")
+    with_range = protocol_hash(load_protocol(roved(small_text, 6.0, 2.0), "mine.toml"))
+    assert with_range != protocol_hash(load_protocol(lower, "mine.toml"))
+
+
+def test_shipped_studies_play_the_staircases_level(shipped):
+    assert shipped.stimulus.rove_db == 0.0

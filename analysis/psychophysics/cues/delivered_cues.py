@@ -18,7 +18,7 @@ from protocols.trial import Phase, Trial
 
 class Cue(StrEnum):
     INTENSITY = "intensity"
-    """Delivered along the direction, over the level."""
+    """Delivered along the direction, over the level of the staircase; varies as a roved level does."""
     SPECTRUM = "spectrum"
     """What the harmonics add to it."""
     COUPLING = "coupling"
@@ -61,7 +61,7 @@ def delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
                 person=np.array([place[trial.subject] for trial in rows]),
                 side=signs * np.array([3.0 - 2.0 * trial.direction_shown for trial in rows]),
                 answer=signs * np.array([3.0 - 2.0 * (trial.answer or 0) for trial in rows]),
-                nominal_db=_db([trial.level_n for trial in rows]),
+                nominal_db=_db([trial.staircase_n for trial in rows]),
                 values_db={cue: _db(values) for cue, value in _VALUES.items() if (values := _all_known(rows, value))},
             )
         )
@@ -84,7 +84,7 @@ def _all_known(rows: list[Trial], value: Callable[[Trial], float | None]) -> lis
 
 
 def _intensity(trial: Trial) -> float | None:
-    return (trial.delivered_mps2 or math.nan) / trial.level_n
+    return (trial.delivered_mps2 or math.nan) / trial.staircase_n
 
 
 def _spectrum(trial: Trial) -> float | None:

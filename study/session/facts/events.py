@@ -80,6 +80,7 @@ FIELDS_SINCE: dict[str, object] = {
     "late_ticks": None,
     "latest_s": None,
     "harmonics_mps2": None,
+    "nominal_n": None,
 }
 """Fields that came after the first logs, as they are where a line does not say them: then they are not written."""
 
@@ -139,6 +140,8 @@ class TrialPresented:
     polarity: Literal[-1, 1]
     wanted_mps2: Magnitude | None = None
     """The acceleration that the level stands for; null where levels are commanded forces."""
+    nominal_n: ForceN | None = None
+    """Level of the staircase, around which the amplitude was drawn; null where nothing is roved."""
     monotonic_s: Seconds | None = None
     event: Literal["trial_presented"] = "trial_presented"
 

@@ -26,6 +26,7 @@ def check_draw(event: TrialPresented, expected: Present) -> None:
         "angle_deg": (event.angle_deg, expected.angle_deg),
         "polarity": (event.polarity, expected.polarity),
         "wanted_mps2": (event.wanted_mps2, expected.wanted_mps2),
+        "nominal_n": (event.nominal_n, expected.nominal_n),
     }
     wrong = [f"{name} {logged} where {due} is due" for name, (logged, due) in given.items() if not _same(logged, due)]
     if wrong:

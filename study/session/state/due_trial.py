@@ -12,6 +12,7 @@ from protocols.procedure.schedule import (
     label_of,
     labels_swapped,
     practice_level_n,
+    roved_level_n,
 )
 from protocols.procedure.staircase import StaircaseState, level_n, to_db
 from protocols.trial import Phase
@@ -19,6 +20,9 @@ from study.session.facts.events import SessionOpened
 from study.session.facts.level_scale import acceleration_of_level
 from study.session.state.rules import same_stimulus_again
 from study.session.stimulus.stimulus import direction_angle_deg
+
+_ROVED = (Phase.TRAINING, Phase.TEST)
+"""Of staircases on directions. Catch trials are at full level, and a detection trial asks for no direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +44,8 @@ class Present:
     polarity: int
     wanted_mps2: float | None = None
     """The acceleration that the level stands for; None where levels are commanded forces."""
+    nominal_n: float | None = None
+    """Level of the staircase, around which `level_n` was drawn; None where nothing is roved."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +74,12 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
         level_db = to_db(newton)
     elif run.phase is Phase.TEST and is_catch_trial(protocol.catch, opened.seed, run.index, place.trial):
         phase, newton, level_db = Phase.CATCH, rule.cap_n, to_db(rule.cap_n)
+    nominal_n = None
+    if protocol.stimulus.rove_db and phase in _ROVED and not run.practice:
+        nominal_n = newton
+        drawn_n = roved_level_n(newton, protocol.stimulus.rove_db, opened.seed, run.index, place.trial, draws)
+        newton = min(drawn_n, protocol.safety.stimulus_cap_n)
+        level_db = to_db(newton)
     return Present(
         run=run.index,
         trial=place.trial,
@@ -81,6 +93,7 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
         angle_deg=direction_angle_deg(protocol.directions, direction),
         polarity=draw.polarity,
         wanted_mps2=acceleration_of_level(opened.equalized, newton, run.frequency_hz),
+        nominal_n=nominal_n,
     )
 
 

@@ -65,6 +65,7 @@ def _trial_row(
         wanted_mps2=event.wanted_mps2,
         repeat_cause=repeat_cause,
         onset_s=seconds_between(opened.utc, event.utc),
+        nominal_n=event.nominal_n,
     )
 
 

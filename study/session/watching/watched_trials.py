@@ -29,7 +29,7 @@ def points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
     if run is None:
         return ()
     closed = [t for t in _select_counted(state, run) if t.phase is not Phase.CATCH and not _is_open(state, t)]
-    return tuple(StaircasePoint(t.trial, t.level_n, bool(t.correct), t.reversal) for t in closed)
+    return tuple(StaircasePoint(t.trial, t.staircase_n, bool(t.correct), t.reversal) for t in closed)
 
 
 def _is_open(state: SessionState, trial: Trial) -> bool:

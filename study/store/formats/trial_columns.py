@@ -8,7 +8,7 @@ TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "attempt": ("Number of the presentation of this trial, from 0; above 0 where an earlier one was void", ""),
     "phase": ("Part of the session: training, test, detection, or catch trials within the test", ""),
     "frequency_hz": ("Frequency of the sinusoidal force", "Hz"),
-    "level_n": ("Commanded amplitude of the force; the level of the staircase", "N"),
+    "level_n": ("Commanded amplitude of the force; the level of the staircase where nothing is roved", "N"),
     "direction_shown": ("Which of the two directions was played: 1 or 2", ""),
     "answer": ("Which direction was answered: 1 or 2; empty without an answer", ""),
     "correct": ("Whether the answer is right; empty without an answer", ""),
@@ -28,4 +28,5 @@ TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "latest_s": ("Longest from when a tick of the control loop was due until its work was done", "s"),
     "onset_s": ("Wall-clock time right before the device moved, since the session was opened", "s"),
     "harmonics_mps2": ("Measured amplitude of the acceleration at 2 to 5 times the frequency, all axes", "m/s^2"),
+    "nominal_n": ("Level of the staircase, around which level_n was drawn; empty where nothing is roved", "N"),
 }

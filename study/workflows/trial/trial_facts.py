@@ -44,6 +44,7 @@ def trial_presented(present: Present, sitting: Sitting) -> TrialPresented:
         angle_deg=present.angle_deg,
         polarity=1 if present.polarity > 0 else -1,
         wanted_mps2=present.wanted_mps2,
+        nominal_n=present.nominal_n,
     )
 
 

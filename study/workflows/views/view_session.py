@@ -136,7 +136,7 @@ def _staircase(state: SessionState, run: Run, row: Threshold | None) -> Staircas
     over = run.index < state.run
     return Staircase(
         title=f"Run {run.index + 1}: {run.frequency_hz:g} Hz, {run.phase.value}{'' if over else ', not complete'}",
-        levels_n=tuple(trial.level_n for trial in counted),
+        levels_n=tuple(trial.staircase_n for trial in counted),
         correct=tuple(bool(trial.correct) for trial in counted),
         reversals=tuple(trial.reversal for trial in counted),
         threshold_n=row.threshold_n if row is not None else None,

@@ -175,7 +175,7 @@ def test_all_problems_are_listed_and_numbered(threshold_text):
     assert str(error).splitlines() == [
         "mine.toml has 3 problems:",
         "  1. stimulus.fade_shapes is no key of [stimulus]; did you mean fade_shape. "
-        "Allowed: frequencies_hz, quantity, fade_in_s, fade_out_s, fade_shape, onset_polarity.",
+        "Allowed: frequencies_hz, quantity, fade_in_s, fade_out_s, fade_shape, onset_polarity, rove_db.",
         "  2. staircase.cap_n is 5, which is too large. Allowed: a number above 0 up to 3, in newtons.",
         '  3. staircase.steps[2].step_db is "1", a text. Allowed: a number above 0 up to 20, in decibels.',
     ]
