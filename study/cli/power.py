@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +15,18 @@ from study.errors import WrongUseError
 if TYPE_CHECKING:
     from analysis.psychophysics.power.simulated_study import Crowd
     from protocols.definition.study_protocol import StudyProtocol
+
+CurveOption = Annotated[
+    str, typer.Option(help="Curve of the people: weibull, logistic or gauss; the analysis assumes weibull.")
+]
+LapseOption = Annotated[float, typer.Option(min=0, max=0.3, help="Lapse rate of the people.")]
+PeopleOption = Annotated[
+    str,
+    typer.Option(
+        help="attentive; some-guess (one in ten guesses); repeating (all ask again when unsure, as often as the "
+        "protocol allows); criterion-drift (the liking for one answer drifts)."
+    ),
+]
 
 
 def power(
@@ -32,6 +44,9 @@ def power(
     ] = None,
     protocol: Annotated[str, typer.Option(help="Protocol with staircase and frequencies.")] = "direction_threshold",
     out: Annotated[Path, typer.Option(help="Folder of the results; a broken run goes on there.")] = Path("power"),
+    curve: CurveOption = "weibull",
+    lapse: LapseOption = 0.02,
+    people: PeopleOption = "attentive",
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of all draws.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -43,7 +58,7 @@ def power(
     from study.workflows.worker_processes import worker_processes
 
     chosen = read_study_protocol(protocol, Path()).protocol
-    crowd = _crowd(chosen, threshold_n, effect_db)
+    crowd = _with_habits(_crowd(chosen, threshold_n, effect_db), people, curve, lapse, chosen.trial.repeats_per_run)
     sizes = sample_sizes(subjects)
     plan = PowerPlan(crowd, chosen.staircase, sizes, studies, seed)
     title = f"{studies} studies of each of {len(sizes)} sizes"
@@ -53,9 +68,7 @@ def power(
     if as_json:
         typer.echo(json.dumps([asdict(point) for point in points], indent=2))
         return
-    for line in power_lines(points):
-        typer.echo(line)
-    typer.echo(f"\nFigure: {out / 'figures' / 'power.png'}")
+    typer.echo("\n".join((*power_lines(points), "", f"Figure: {out / 'figures' / 'power.png'}")))
 
 
 def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":
@@ -71,6 +84,22 @@ def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "
         )
     raised_n = threshold_n * 10.0 ** (effect_db / 20.0)
     return Crowd(frequencies_hz, (*[threshold_n] * (len(frequencies_hz) - 1), raised_n))
+
+
+def _with_habits(crowd: "Crowd", people: str, curve: str, lapse: float, repeats: int) -> "Crowd":
+    """Raises WrongUseError for an unknown curve or kind of people."""
+    from analysis.psychophysics.hierarchy.curve import Family
+
+    habits: dict[str, Crowd] = {
+        "attentive": crowd,
+        "some-guess": replace(crowd, guessers=0.1),
+        "repeating": replace(crowd, unsure=0.5, repeats=repeats),
+        "criterion-drift": replace(crowd, criterion_drift_sd=0.3),
+    }
+    for said, name, known in (("--people", people, list(habits)), ("--curve", curve, [each.value for each in Family])):
+        if name not in known:
+            raise WrongUseError("There are no such people", f"{said} is {name}.", f"Choose one of {', '.join(known)}.")
+    return replace(habits[people], family=Family(curve), lapse=lapse)
 
 
 def sample_sizes(text: str) -> tuple[int, ...]:

@@ -17,6 +17,14 @@ def rehearse(
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the population and of all draws.")] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     model: ModelOption = None,
+    observer: Annotated[
+        str,
+        typer.Option(
+            help="Who takes it: person (a population with individual thresholds), the same people as delivered (they "
+            "feel what the device delivers), repeating (ask again when unsure) or criterion_drift; or one observer of "
+            "hapteq study for all."
+        ),
+    ] = "person",
     as_json: JsonOption = False,
 ) -> None:
     """Simulated participants take the whole study, ending with the report. Interrupted, the same command goes on."""
@@ -25,11 +33,14 @@ def rehearse(
     from study.workflows.results.analysis_files import ANALYSIS_NAME
     from study.workflows.results.analyze_data import analyze_data
     from study.workflows.session.equalize_stimuli import check_playable
-    from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
+    from study.workflows.session.rehearse_study import Rehearsal, rehearse_study, rehearsed_observer
 
     source = read_study_protocol(protocol_or_default(protocol, model), out)
     check_playable(source.protocol, model)
-    rehearsal = Rehearsal(source.protocol, source.text, subjects=subjects, seed=seed, data=out, model=model)
+    rehearsal = Rehearsal(
+        source.protocol, source.text, subjects=subjects, seed=seed, data=out, model=model, observer=observer
+    )
+    rehearsed_observer(rehearsal, 0)
     with bar(f"{subjects} simulated participants", total=subjects) as advance:
         rehearse_study(rehearsal, workers=workers, on_finished=advance)
     show(analyze_data(out, out / ANALYSIS_NAME), as_json)

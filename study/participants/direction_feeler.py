@@ -36,6 +36,8 @@ class DirectionFeeler:
     """c of Macmillan and Creelman, as in `psychophysics.bias`: positive, a tendency to answer 2; negative, to 1."""
     drift_db_per_100_trials: float = 0.0
     """Rise of the thresholds during the session."""
+    criterion_per_100_trials: float = 0.0
+    """Drift of the criterion during the session."""
     numb_above_hz: float = math.inf
     """Above this frequency the direction is not felt; the vibration is."""
     detection_n: tuple[tuple[float, float], ...] = TYPICAL_DETECTION_N
@@ -50,7 +52,7 @@ class DirectionFeeler:
     def share_of_1(self, felt: Felt) -> float:
         """Probability of answer 1."""
         sign = 1.0 if felt.direction_shown == 1 else -1.0
-        certain = _NORMAL.cdf(sign * self._d_prime(felt) / 2 - self.criterion)
+        certain = _NORMAL.cdf(sign * self.d_prime(felt) / 2 - self.criterion_at(felt))
         return self.lapse + (1.0 - 2.0 * self.lapse) * certain
 
     def share_right(self, felt: Felt) -> float:
@@ -58,7 +60,12 @@ class DirectionFeeler:
         share_of_1 = self.share_of_1(felt)
         return share_of_1 if felt.direction_shown == 1 else 1.0 - share_of_1
 
-    def _d_prime(self, felt: Felt) -> float:
+    def criterion_at(self, felt: Felt) -> float:
+        """c at this trial."""
+        return self.criterion + self.criterion_per_100_trials * felt.trials_before / 100.0
+
+    def d_prime(self, felt: Felt) -> float:
+        """Sensitivity to this stimulus."""
         detection = felt.phase is Phase.DETECTION
         if felt.frequency_hz > self.numb_above_hz and not detection:
             return 0.0

@@ -7,7 +7,8 @@ assumed perfect: an upper bound of this cue.
 Model: the felt strength in dB is normal around +difference_db/2 (direction 1) or -difference_db/2 (direction 2)
 relative to the memory, with standard deviation noise_db sqrt(1 + (detection_n / level)^2): a constant Weber fraction
 well above the detection level, and rising noise towards it. So d' = difference_db / standard deviation; without a
-difference the answers are at chance.
+difference the answers are at chance. A level that was roved adds to the felt strength, while the memory is that of the
+staircase's level: then the strength tells of the draw as much as of the direction.
 
 Detection is that of other participants, with `detection_n` as threshold.
 """
@@ -39,9 +40,18 @@ class IntensityCue:
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         detection = WeibullCurve(self.detection_n, DETECTION_SLOPE)
         distance = detection.distance if felt.phase is Phase.DETECTION else self.d_prime
-        share_of_1 = NormalDist().cdf(sign * distance(felt.level_n) / 2)
+        share_of_1 = NormalDist().cdf(sign * distance(felt.level_n) / 2 + self._roved(felt))
         return Reply(1 if luck < share_of_1 else 2, response_time_s(delay))
+
+    def _roved(self, felt: Felt) -> float:
+        """Felt strength beyond the memory, in standard deviations; a detection trial asks for no direction."""
+        if felt.nominal_n is None or felt.phase is Phase.DETECTION:
+            return 0.0
+        return 20.0 * math.log10(felt.level_n / felt.nominal_n) / self._noise_db(felt.level_n)
+
+    def _noise_db(self, level_n: float) -> float:
+        return self.noise_db * math.hypot(1.0, self.detection_n / level_n)
 
     def d_prime(self, level_n: float) -> float:
         """Sensitivity d' at this level (N)."""
-        return self.difference_db / (self.noise_db * math.hypot(1.0, self.detection_n / level_n))
+        return self.difference_db / self._noise_db(level_n)

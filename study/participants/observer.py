@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from protocols.trial import Phase
+from study.session.stimulus.delivered import Delivered
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +21,10 @@ class Felt:
     """Its number on the screen, 1 or 2; in a detection trial, of the interval in which it shook."""
     trials_before: int
     """Trials answered so far in this session, training included."""
+    nominal_n: float | None = None
+    """Level of the staircase, where `level_n` was roved around it."""
+    delivered: Delivered | None = None
+    """What the device made of it; None where that was not felt or nothing was measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +33,8 @@ class Reply:
     """1 or 2."""
     response_time_s: float
     """From the onset to the answer."""
+    ask_again: bool = False
+    """The same trial is asked for once more, if that is allowed; else the answer counts."""
 
 
 class Observer(Protocol):

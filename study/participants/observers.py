@@ -4,11 +4,13 @@ import re
 from difflib import get_close_matches
 
 from study.errors import WrongUseError
+from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.intensity_cue import IntensityCue
 from study.participants.observer import Observer
-from study.participants.population import TYPICAL_THRESHOLDS_N, person
+from study.participants.population import KINDS, TYPICAL_THRESHOLDS_N, member, person
 from study.participants.strategies import Alternator, Constant, Guesser, Scripted
+from study.participants.unsure import UnsureRepeater
 
 OBSERVERS = {
     "ideal": "feels directions as the median participant does, never lapses",
@@ -20,21 +22,25 @@ OBSERVERS = {
     "always_2": "says 2 every time",
     "vibration_only": "like ideal up to 20 Hz; above that, vibration without a direction",
     "intensity_cue": "feels no direction, but notices that direction 1 is delivered 3 dB stronger",
+    "delivered": "like ideal, but feels what the device delivered: motion across, harmonics, and numbing count",
+    "repeating": "like ideal, but asks for the same trial again when unsure",
+    "criterion_drift": "like ideal, but comes to like answer 2 more and more",
     "drifting": "like ideal, but thresholds rise by 1 dB every 100 trials",
     "scripted": "right or wrong by the trial's number alone",
     "person": "one of the simulated population, picked by the seed",
 }
-"""Name and one line about it, for help texts. Beside these, person_7_seed_1 is the seventh of population 1."""
+"""Name and one line about it, for help texts. Beside these, person_7_seed_1 is the seventh of population 1,
+and so are delivered_7_seed_1, repeating_7_seed_1 and criterion_drift_7_seed_1, with the same thresholds."""
 
-_MEMBER = re.compile(r"person_(?P<number>[1-9]\d*)_seed_(?P<seed>\d+)")
+_MEMBER = re.compile(rf"(?P<kind>{'|'.join(KINDS)})_(?P<number>[1-9]\d*)_seed_(?P<seed>\d+)")
 
 
 def observer_named(name: str, seed: int) -> Observer:
     """The simulated participant of this name. seed: chooses the person for "person" only. Raises WrongUseError for
     an unknown name."""
     known = name.replace("-", "_")
-    if member := _MEMBER.fullmatch(known):
-        return person(int(member["number"]), int(member["seed"]))
+    if found := _MEMBER.fullmatch(known):
+        return member(found["kind"], int(found["number"]), int(found["seed"]))
     typical = DirectionFeeler(known, TYPICAL_THRESHOLDS_N)
     observers: dict[str, Observer] = {
         "ideal": typical,
@@ -46,6 +52,9 @@ def observer_named(name: str, seed: int) -> Observer:
         "always_2": Constant(known, 2),
         "vibration_only": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, numb_above_hz=20.0),
         "intensity_cue": IntensityCue(known),
+        "delivered": DeliveredFeeler(known, typical),
+        "repeating": UnsureRepeater(known, typical),
+        "criterion_drift": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, criterion_per_100_trials=0.3),
         "drifting": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, drift_db_per_100_trials=1.0),
         "scripted": Scripted(known),
         "person": person(1, seed),

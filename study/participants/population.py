@@ -5,10 +5,14 @@ at 5 Hz, a significant rise at 35 Hz, some participants at the cap there, 45 Hz 
 is copied.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
+from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.direction_feeler import DirectionFeeler
+from study.participants.unsure import UnsureRepeater
 
 TYPICAL_THRESHOLDS_N = ((5.0, 0.35), (15.0, 0.6), (25.0, 0.85), (35.0, 2.2), (45.0, 2.2))
 """(Hz, N): the median participant. A quarter of the participants is above the cap of 3 N at 35 Hz."""
@@ -25,6 +29,30 @@ thresholds."""
 def population(n: int, seed: int) -> tuple[DirectionFeeler, ...]:
     """n participants; the first ones do not change when n grows."""
     return tuple(person(number, seed) for number in range(1, n + 1))
+
+
+KINDS = ("person", "delivered", "repeating", "criterion_drift")
+"""What a population can be made of: as they are; feeling what was delivered; asking again when unsure; with a criterion
+that drifts."""
+CRITERION_DRIFT_SD = 0.3
+"""Per 100 trials, between participants: a session of 350 trials moves a criterion by about 1."""
+
+
+def member(kind: str, number: int, seed: int) -> DirectionFeeler | DeliveredFeeler | UnsureRepeater:
+    """Participant `number` (from 1) of the population of this seed, made `kind` of `KINDS`, with the same thresholds.
+    The name contains all three."""
+    one, name = person(number, seed), f"{kind}_{number}_seed_{seed}"
+    match kind:
+        case "person":
+            return one
+        case "delivered":
+            return DeliveredFeeler(name, one)
+        case "repeating":
+            return UnsureRepeater(name, one)
+        case "criterion_drift":
+            drift = CRITERION_DRIFT_SD * float(np.random.default_rng([seed, number, 1]).standard_normal())
+            return replace(one, name=name, criterion_per_100_trials=drift)
+    raise ValueError(f"a population is made of {', '.join(KINDS)}, not of {kind}")
 
 
 def person(number: int, seed: int) -> DirectionFeeler:

@@ -4,13 +4,23 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.psychophysics.hierarchy.answers import Answers, tally
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, USUAL_SLOPE, Family
-from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack, play_run
+from analysis.psychophysics.power.staircase_kernel import (
+    MOST_TRIALS,
+    PackedRule,
+    Participant,
+    Track,
+    pack,
+    play_run,
+)
 from equalizer.signals.signal import FloatArray
 from protocols.definition.staircase_rule import StaircaseRule
 
+_HABITS = 0x4AB1
+"""Separates the draws of habits from the others, which stay those of studies without any."""
 FAMILIES = (Family.WEIBULL, Family.LOGISTIC, Family.GAUSS)
 
 
@@ -32,6 +42,14 @@ class Crowd:
     lapse: float = 0.02
     criterion_sd: float = 0.15
     family: Family = Family.WEIBULL
+    guessers: float = 0.0
+    """Share of people who guess."""
+    criterion_drift_sd: float = 0.0
+    """Of criteria per 100 trials, between people; the runs then come in random order."""
+    unsure: float = 0.0
+    """All ask for the same trial again within so many standard errors of their criterion, see `Participant`."""
+    repeats: int = 0
+    """At most so often in a run."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,17 +75,15 @@ def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[i
     slopes = (crowd.slope or USUAL_SLOPE[crowd.family]) * np.exp(crowd.slope_log_sd * rng.standard_normal(people))
     criteria = crowd.criterion_sd * rng.standard_normal(people)
     seeds = rng.integers(0, 2**32, size=(people, k), dtype=np.uint64)
-    levels, sides, rights = (np.empty((people * k, MOST_TRIALS)) for _ in range(3))
-    counts, turns = np.zeros(people * k, dtype=np.intp), np.zeros(people * k, dtype=np.intp)
-    peaks = np.full((people * k, rule.reversals), np.nan)
     t0, family = AT_THRESHOLD[crowd.family], FAMILIES.index(crowd.family)
-    for run in range(people * k):
-        person, place = divmod(run, k)
-        participant = Participant(
-            t0, slopes[person] * NEPER_PER_DB, true_db[person, place], crowd.lapse, criteria[person], family
-        )
-        track = Track(levels[run], sides[run], rights[run], peaks[run])
-        counts[run], turns[run] = play_run(packed, participant, int(seeds[person, place]), track)
+    participants = [
+        Participant(t0, slopes[person] * NEPER_PER_DB, true_db[person, place], crowd.lapse, criteria[person], family)
+        for person in range(people)
+        for place in range(k)
+    ]
+    tracks = _empty_tracks(people * k, rule.reversals)
+    counts, turns = _play_sessions(crowd, packed, participants, seeds.ravel(), tracks, (*seed, _HABITS))
+    levels, sides, rights, peaks = tracks
     played = np.arange(MOST_TRIALS) < counts[:, None]
     answers = tally(
         tuple(f"S{number + 1:03d}" for number in range(people)),
@@ -89,3 +105,36 @@ def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[i
         trials=int(counts.sum()),
         true_db=true_db,
     )
+
+
+def _empty_tracks(runs: int, reversals: int) -> Track:
+    """Of all runs together, each with a leading axis (runs,)."""
+    levels, sides, rights = (np.empty((runs, MOST_TRIALS)) for _ in range(3))
+    return Track(levels, sides, rights, np.full((runs, reversals), np.nan))
+
+
+def _play_sessions(
+    crowd: Crowd,
+    packed: PackedRule,
+    participants: list[Participant],
+    seeds: NDArray[np.uint64],
+    tracks: Track,
+    key: tuple[int, ...],
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Fills the tracks, person by person with their habits. Returns trials and reversals of each run (runs,)."""
+    habits, k = np.random.default_rng(key), len(crowd.frequencies_hz)
+    counts, turns = (np.zeros(len(participants), dtype=np.intp) for _ in range(2))
+    for first in range(0, len(participants), k):
+        guesses, drift = habits.random() < crowd.guessers, 0.01 * crowd.criterion_drift_sd * habits.standard_normal()
+        before = 0
+        for place in habits.permutation(k):
+            run = first + int(place)
+            participant = participants[run]._replace(
+                criterion_per_trial=drift, trials_before=before, unsure=crowd.unsure, repeats=crowd.repeats
+            )
+            if guesses:
+                participant = participant._replace(lapse=0.5)
+            track = Track(*(rows[run] for rows in tracks))
+            counts[run], turns[run] = play_run(packed, participant, int(seeds[run]), track)
+            before += int(counts[run])
+    return counts, turns

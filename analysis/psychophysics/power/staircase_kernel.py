@@ -66,6 +66,13 @@ class Participant(NamedTuple):
     lapse: float
     criterion: float
     family: int
+    criterion_per_trial: float = 0.0
+    trials_before: int = 0
+    """In the session, before this run: a drifting criterion is begun with them."""
+    unsure: float = 0.0
+    """Asks for the same trial again where the average of all looks lies within so many standard errors."""
+    repeats: int = 0
+    """Of this run at the most."""
 
 
 class Track(NamedTuple):
@@ -99,20 +106,38 @@ def evidence(t: float, family: int) -> float:
     return q
 
 
+MOST_LOOKS = 5
+"""At one trial, as `study.participants.unsure`."""
+
+
+@njit(cache=True)
+def look_again(middle: float, lapse: float, unsure: float, left: int) -> tuple[bool, int]:
+    """Whether the answer is right, and how many repeats are left. middle: mean of the evidence for what was shown."""
+    if np.random.random() < 2.0 * lapse:
+        return np.random.random() < 0.5, left
+    looks, total = 1, middle + np.random.normal()
+    while abs(total) < unsure * math.sqrt(looks) and left > 0 and looks < MOST_LOOKS:
+        looks, total, left = looks + 1, total + middle + np.random.normal(), left - 1
+    return total > 0.0, left
+
+
 @njit(cache=True)
 def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> tuple[int, int]:
     """Plays until the run ends, and fills the track. Returns how many trials and reversals there were."""
     np.random.seed(seed)
     level, heading, good, bad, trials, reversals = rule.start_db, 0, 0, 0, 0, 0
+    left = person.repeats
     limit = min(rule.trial_limit, MOST_TRIALS) if rule.trial_limit > 0 else MOST_TRIALS
     while reversals < rule.reversals and trials < limit:
         s = 1.0 if np.random.random() < 0.5 else -1.0
-        a = (
-            evidence(person.t0 + person.pace_per_db * (level - person.threshold_db), person.family)
-            - s * person.criterion
+        a = evidence(person.t0 + person.pace_per_db * (level - person.threshold_db), person.family) - s * (
+            person.criterion + person.criterion_per_trial * (person.trials_before + trials)
         )
-        p = person.lapse + (1.0 - 2.0 * person.lapse) * 0.5 * math.erfc(-a / math.sqrt(2.0))
-        answer = np.random.random() < p
+        if person.unsure > 0.0:
+            answer, left = look_again(a, person.lapse, person.unsure, left)
+        else:
+            p = person.lapse + (1.0 - 2.0 * person.lapse) * 0.5 * math.erfc(-a / math.sqrt(2.0))
+            answer = np.random.random() < p
         track.level_db[trials], track.side[trials], track.right[trials] = level, s, answer
         trials += 1
         good, bad = (good + 1, 0) if answer else (0, bad + 1)

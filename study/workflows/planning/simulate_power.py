@@ -26,6 +26,8 @@ from study.workflows.picture_files import write_pictures
 
 CHUNK = 10
 """Studies per piece of work: some seconds, so that little is lost when a worker dies."""
+HABITS_SINCE = ("guessers", "criterion_drift_sd", "unsure", "repeats")
+"""Of a crowd; without them a folder that was begun earlier goes on."""
 FINISHED_NAME, RESULT_NAME = "studies.jsonl", "power.json"
 
 
@@ -96,6 +98,9 @@ def _plan_facts(plan: PowerPlan) -> dict[str, object]:
 
     rule = TypeAdapter(StaircaseRule).dump_python(plan.rule, mode="json")
     crowd = json.loads(json.dumps(asdict(plan.crowd)))
+    for habit in HABITS_SINCE:
+        if not crowd[habit]:
+            del crowd[habit]
     return {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
 
 

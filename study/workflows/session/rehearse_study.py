@@ -11,7 +11,9 @@ from pathlib import Path
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
 from study.errors import LeftError, StudyError
-from study.participants.population import population
+from study.participants.observer import Observer
+from study.participants.observers import observer_named
+from study.participants.population import KINDS, member
 from study.store.disk.provenance import sha256_of
 from study.store.sessions.archive import SessionFolder, session_folders
 from study.workflows.results.fold_session import fold_session
@@ -34,6 +36,16 @@ class Rehearsal:
     data: Path
     model: Path | None = None
     """Identified model that equalizes the stimuli."""
+    observer: str = "person"
+    """A kind of population (`study.participants.population.KINDS`), or an observer that all of them are."""
+
+
+def rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
+    """Participant `number` (from 0). Raises StudyError for an unknown name."""
+    kind = rehearsal.observer.replace("-", "_")
+    if kind in KINDS:
+        return member(kind, number + 1, rehearsal.seed)
+    return observer_named(kind, rehearsal.seed)
 
 
 def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[int], None]) -> None:
@@ -84,7 +96,7 @@ def subject_seed(seed: int, number: int) -> int:
 
 
 def _sit(rehearsal: Rehearsal, number: int) -> None:
-    observer = population(rehearsal.subjects, rehearsal.seed)[number]
+    observer = rehearsed_observer(rehearsal, number)
     seed = subject_seed(rehearsal.seed, number)
     if any(f.withdrawn for f in session_folders(rehearsal.data) if f.subject == subject_code(number)):
         return
@@ -144,6 +156,13 @@ def _check_same(rehearsal: Rehearsal) -> None:
                 "This folder holds another rehearsal",
                 f"{folder.name} in {rehearsal.data} was begun with another --model.",
                 "Choose another folder with --out, or the same --model to go on.",
+                saved="Nothing was changed.",
+            )
+        if opened.observer != rehearsed_observer(rehearsal, number).name:
+            raise StudyError(
+                "This folder holds another rehearsal",
+                f"{folder.name} in {rehearsal.data} was begun with the observer {opened.observer}.",
+                "Choose another folder with --out, or the same --observer and --seed to go on.",
                 saved="Nothing was changed.",
             )
         if opened.seed != subject_seed(rehearsal.seed, number) or opened.protocol_text != rehearsal.protocol_text:

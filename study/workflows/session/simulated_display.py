@@ -1,8 +1,9 @@
 """Simulated participant at display and handle: feels the stimulus and answers after a response time."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
-from protocols.trial import VoidCause
+from protocols.trial import Phase, VoidCause
 from study.devices.clock import Clock
 from study.participants.observer import Felt, Observer
 from study.session.state.due_trial import Present
@@ -25,6 +26,7 @@ from study.session.views.views import (
     Unanswered,
     Welcome,
 )
+from study.workflows.session.simulated_touch import SimulatedTouch
 from study.workflows.trial.display import SignOfLife
 
 GLANCE_S = 0.1
@@ -38,15 +40,24 @@ CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
 
 class SimulatedDisplay:
     def __init__(
-        self, observer: Observer, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
+        self,
+        observer: Observer,
+        seed: int,
+        clock: Clock,
+        on_question: Callable[[Question], None] | None = None,
+        touch: SimulatedTouch | None = None,
     ) -> None:
+        """touch: for an observer who feels what is delivered."""
         self._observer = observer
         self._seed = seed
         self._clock = clock
         self._on_question = on_question
+        self._touch = touch
         self._felt: Felt | None = None
+        self._stimulus: Present | None = None
 
     def feel(self, stimulus: Present, answers_before: int) -> None:
+        self._stimulus = stimulus
         self._felt = Felt(
             run=stimulus.run,
             trial=stimulus.trial,
@@ -56,6 +67,7 @@ class SimulatedDisplay:
             level_n=stimulus.level_n,
             direction_shown=stimulus.label,
             trials_before=answers_before,
+            nominal_n=stimulus.nominal_n,
         )
 
     def fill_in(self, form: Form) -> FormReply:
@@ -87,13 +99,28 @@ class SimulatedDisplay:
             self._on_question(question)
         if self._felt is None:
             raise RuntimeError("a simulated participant was asked before anything was felt")
-        reply = self._observer.reply(self._felt, self._seed)
-        too_slow = 0 < question.time_limit_s < reply.response_time_s
-        if not self._wait(question.time_limit_s if too_slow else reply.response_time_s, sign_of_life):
+        # How long it takes depends on the trial's luck alone; what is answered may depend on what was delivered.
+        seconds = self._observer.reply(self._felt, self._seed).response_time_s
+        too_slow = 0 < question.time_limit_s < seconds
+        felt = self._wait_and_feel(self._felt, question.time_limit_s if too_slow else seconds, sign_of_life)
+        if felt is None:
             return CUT_SHORT
         if too_slow:
             return Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
+        reply = self._observer.reply(felt, self._seed)
+        if reply.ask_again and question.repeats_left != 0:
+            return Unanswered("asked to repeat", leave=False, asked=True)
         return Answered(reply.answer, self._clock.now_s())
+
+    def _wait_and_feel(self, felt: Felt, seconds: float, sign_of_life: SignOfLife) -> Felt | None:
+        """None where the sign of life ended the wait. A detection trial is over when the question comes."""
+        touch, stimulus = self._touch, self._stimulus
+        if touch is None or stimulus is None or felt.phase is Phase.DETECTION:
+            return felt if self._wait(seconds, sign_of_life) else None
+        if not self._wait(max(0.0, seconds - touch.seconds(stimulus)), sign_of_life):
+            return None
+        delivered = touch.feel(stimulus, sign_of_life)
+        return replace(felt, delivered=delivered) if sign_of_life() else None
 
     def feedback(self, correct: bool) -> None:
         return None

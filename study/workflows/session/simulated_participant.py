@@ -3,11 +3,13 @@
 from collections.abc import Callable
 
 from study.devices.clock import Clock
+from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.observer import Observer
 from study.participants.observers import observer_named
 from study.session.views.views import Question
 from study.workflows.session.conduct_session import Participant
 from study.workflows.session.simulated_display import SimulatedDisplay
+from study.workflows.session.simulated_touch import SimulatedTouch
 
 
 def make_simulated_participant(
@@ -21,5 +23,9 @@ def seat_observer(
     observer: Observer, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
 ) -> Participant:
     """A participant that answers as this observer."""
-    display = SimulatedDisplay(observer, seed, clock, on_question)
-    return Participant(display=display, hand=display, clock=clock)
+    if not isinstance(observer, DeliveredFeeler):
+        display = SimulatedDisplay(observer, seed, clock, on_question)
+        return Participant(display=display, hand=display, clock=clock)
+    touch = SimulatedTouch(clock)
+    display = SimulatedDisplay(observer, seed, clock, on_question, touch)
+    return Participant(display=display, hand=display, clock=clock, on_opened=touch.on_opened)

@@ -1,0 +1,56 @@
+"""The simulated hand's sense of touch: what the device delivers while a stimulus is held."""
+
+import numpy as np
+
+from equalizer.signals.lockin import covers_a_period
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+from protocols.definition.apparatus import TestDirections
+from study.devices.clock import Clock
+from study.devices.device import Device
+from study.session.state.due_trial import Present
+from study.session.stimulus.delivered import Delivered, measure_delivered
+from study.session.stimulus.stimulus import direction_vector
+from study.store.sessions.archive import SessionFolder
+from study.workflows.results.fold_session import fold_session
+from study.workflows.trial.display import SignOfLife
+
+PERIODS = 2.0
+"""So long is felt before the answer: friction and sensor noise vary from period to period."""
+TICKS_PER_SIGN = 50
+"""Between signs of life: 50 ms at 1 kHz."""
+
+
+class SimulatedTouch:
+    """Samples the accelerometer as the participant waits. Idle until a session is opened."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._device: Device | None = None
+        self._directions: TestDirections | None = None
+
+    def on_opened(self, folder: SessionFolder, device: Device) -> None:
+        """The device of the session, and how its directions lie."""
+        self._device, self._directions = device, fold_session(folder).state.protocol.directions
+
+    def seconds(self, stimulus: Present) -> float:
+        return PERIODS / stimulus.frequency_hz
+
+    def feel(self, stimulus: Present, sign_of_life: SignOfLife) -> Delivered | None:
+        """Takes `seconds(stimulus)`. None without a device, or where the sign of life ended it."""
+        if self._device is None or self._directions is None:
+            return None
+        rate_hz = self._device.info.sample_rate_hz
+        rows: list[tuple[float, float, float]] = []
+        for tick in range(round(self.seconds(stimulus) * rate_hz)):
+            self._clock.sleep(1.0 / rate_hz)
+            if tick % TICKS_PER_SIGN == 0 and not sign_of_life():
+                return None
+            rows.append(self._device.look().acceleration_mps2 or (np.nan, np.nan, np.nan))
+        felt = np.array(rows, dtype=np.float64)
+        if not covers_a_period(int(np.isfinite(felt).all(axis=1).sum()), rate_hz, stimulus.frequency_hz):
+            return None
+        vector = direction_vector(self._directions, stimulus.direction)
+        force = Signal(np.zeros_like(felt), rate_hz, "force", "N", ("fx", "fy", "fz"))
+        response = Signal(felt, rate_hz, "acceleration", "m/s^2", ("ax", "ay", "az"))
+        return measure_delivered(Recording(self._device.info.name, force, response), vector, stimulus.frequency_hz)

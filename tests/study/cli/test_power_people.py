@@ -1,0 +1,38 @@
+"""`hapteq power` for people that the analysis does not assume."""
+
+import json
+
+import pytest
+
+from study.cli.main import main
+from study.workflows.planning.simulate_power import FINISHED_NAME
+
+ASKED = ("power", "--subjects", "3", "--studies", "10", "--workers", "1", "--effect-db", "0", "--seed", "4")
+
+
+def plan_of(out, *more):
+    assert main([*ASKED, "--out", str(out), *more]) == 0
+    return json.loads((out / FINISHED_NAME).read_text().splitlines()[0])["plan"]["crowd"]
+
+
+def test_a_plan_without_habits_says_nothing_of_them_so_that_older_folders_go_on(tmp_path):
+    crowd = plan_of(tmp_path / "plain")
+    assert set(crowd) == {
+        "frequencies_hz", "medians_n", "person_sd_db", "frequency_sd_db", "slope", "slope_log_sd", "lapse",
+        "criterion_sd", "family",
+    }  # fmt: skip
+    assert (crowd["lapse"], crowd["family"]) == (0.02, "weibull")
+
+
+def test_curve_lapses_and_habits_reach_the_simulated_people(tmp_path):
+    crowd = plan_of(tmp_path / "other", "--people", "repeating", "--curve", "logistic", "--lapse", "0.05")
+    assert (crowd["unsure"], crowd["repeats"], crowd["family"], crowd["lapse"]) == (0.5, 3, "logistic", 0.05)
+
+
+@pytest.mark.parametrize(("option", "name"), [("--people", "robots"), ("--curve", "cauchy")])
+def test_unknown_people_are_refused_with_those_there_are(tmp_path, capsys, option, name):
+    assert main([*ASKED, "--out", str(tmp_path / "no"), option, name]) == 2
+    said = capsys.readouterr().err
+    assert f"{option} is {name}." in said
+    assert ("attentive, some-guess" in said) or ("weibull, logistic, gauss" in said)
+    assert not (tmp_path / "no").exists()

@@ -1,0 +1,72 @@
+"""A participant who feels what was delivered: coupling, strength, harmonics and numbing matter as they are said to."""
+
+from dataclasses import replace
+
+import pytest
+
+from protocols.trial import Phase
+from study.participants.delivered_feeler import DeliveredFeeler
+from study.participants.observer import Felt
+from study.participants.observers import observer_named
+from study.participants.population import TYPICAL_THRESHOLDS_N, member, person
+from study.session.stimulus.delivered import Delivered
+
+TARGET = 0.5 ** (1 / 3)
+PER_NEWTON = 2.7
+THRESHOLD_N = dict(TYPICAL_THRESHOLDS_N)[15.0]
+
+
+@pytest.fixture
+def observer():
+    return observer_named("delivered", 0)
+
+
+def felt(level_n=THRESHOLD_N, along=1.0, across=0.0, harmonics=0.0, trial=0):
+    """At 15 Hz; along: as a share of what a flawless device delivers, across and harmonics as shares of that."""
+    mps2 = PER_NEWTON * level_n * along
+    delivered = Delivered(mps2, across * mps2, 0.1, harmonics * mps2)
+    return Felt(0, trial, 0, Phase.TEST, 15.0, level_n, 1, trial, delivered=delivered)
+
+
+def test_a_flawless_delivery_is_felt_as_commanded(observer):
+    assert observer.share_right(felt()) == pytest.approx(TARGET)
+    answers = [observer.reply(replace(felt(), trial=0, run=run), 7) for run in range(50)]
+    plain = [observer.feeler.reply(replace(felt(), trial=0, run=run), 7) for run in range(50)]
+    assert answers == plain
+
+
+def test_half_the_strength_needs_twice_the_level(observer):
+    assert observer.share_right(felt(along=0.5)) < 0.65
+    assert observer.share_right(felt(2 * THRESHOLD_N, along=0.5)) == pytest.approx(TARGET)
+
+
+def test_motion_across_takes_the_direction_away_and_a_circle_has_none(observer):
+    shares = [observer.share_right(felt(3.0, across=across)) for across in (0.0, 0.5, 0.9, 0.99, 1.0, 1.5)]
+    assert shares[0] > 0.999 and shares == sorted(shares, reverse=True)
+    assert shares[-2:] == [0.5, 0.5]
+
+
+def test_harmonics_as_strong_as_the_threshold_raise_it_by_3_db(observer):
+    """Independent noises add in squares: sqrt(2)."""
+    raised = felt(THRESHOLD_N * 2**0.5, harmonics=0.5**0.5)
+    assert observer.share_right(raised) == pytest.approx(TARGET)
+    deaf = replace(observer, masking=0.0)
+    assert deaf.share_right(felt(harmonics=3.0)) == pytest.approx(TARGET)
+
+
+def test_a_long_run_numbs_by_a_decibel_and_a_new_one_begins_afresh(observer):
+    late = felt(THRESHOLD_N * 10 ** (1 / 20), trial=2000)
+    assert observer.share_right(replace(late, trials_before=0)) == pytest.approx(TARGET, abs=1e-6)
+    assert observer.share_right(replace(felt(trial=0), trials_before=300)) == pytest.approx(TARGET)
+
+
+def test_the_delivered_population_has_the_thresholds_of_the_population(observer):
+    found = member("delivered", 3, 5)
+    assert isinstance(found, DeliveredFeeler)
+    assert (found.feeler, found.name) == (person(3, 5), "delivered_3_seed_5")
+    assert observer_named("delivered_3_seed_5", 0) == found
+
+
+def test_detection_and_what_was_not_measured_go_by_the_command(observer):
+    assert observer.felt_n(replace(felt(1.2, along=0.1), delivered=None)) == 1.2
+    assert observer.felt_n(replace(felt(1.2, along=0.1), phase=Phase.DETECTION)) == 1.2
