@@ -147,8 +147,13 @@ def test_wake_ups_are_measured_as_the_loop_of_that_device_has_them(rigs, setting
 
     monkeypatch.setattr("study.workflows.checks.check_timing.before_others", noted)
     rig = rigs.HeldForceRig() if real else rigs.compiled_rig()
-    _, found = timed(SafeDevice(rig, settings, RealClock()), RealClock(), 0.2)
+    attended: list[threading.Thread] = []
+    with contextlib.closing(SafeDevice(rig, settings, RealClock())) as device:
+        timing = check_timing(device, RealClock(), 0.2, lambda done: attended.append(threading.current_thread()))
+    found = {finding.name for finding in timing.findings}
     assert [name.startswith("timing") for name in first] == ([True] if real else [])
+    # What is asked of the device meanwhile must not make the wake-ups late.
+    assert set(attended) == {threading.current_thread()}
     assert ("Late ticks" in found) == real
 
 
