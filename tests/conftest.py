@@ -167,25 +167,26 @@ def vendor() -> ModuleType:
 
 
 @pytest.fixture(scope="session")
+def served() -> ModuleType:
+    """`tests/served_device.py`, a device behind the pipes of the loop's process. Imported late: it compiles."""
+    return _module_at(Path(__file__).parent / "served_device.py")
+
+
+@pytest.fixture(scope="session")
 def compiled_stub(vendor, tmp_path_factory) -> Path:
     return vendor.compile_stub(tmp_path_factory.mktemp("stub") / vendor.FILE)
 
 
 @pytest.fixture
 def stub(vendor, compiled_stub, tmp_path, monkeypatch):
-    """A device of its own in wall time, which the driver finds as it finds the real library, and accepted for hands."""
+    """A device of its own in wall time, which the driver finds as it finds the real library, and accepted for hands. It
+    lives in a file: for the test and the process of the loop alike, and on when a program that drives it is killed."""
     monkeypatch.setenv("FDSDK", str(tmp_path / "sdk"))
+    monkeypatch.setenv("HAPTEQ_STUB_FILE", str(tmp_path / "device"))
     monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "none.toml"))
     vendor.accept("omega.3")
     with vendor.copied(compiled_stub, tmp_path / "sdk") as device:
         yield device
-
-
-@pytest.fixture
-def surviving_stub(stub, tmp_path, monkeypatch):
-    """It lives on in a file when the program that drives it is killed."""
-    monkeypatch.setenv("HAPTEQ_STUB_FILE", str(tmp_path / "device"))
-    return stub
 
 
 @pytest.fixture

@@ -42,8 +42,9 @@ def needs_real_time(name: str) -> bool:
     return name not in SIMULATIONS and not name.startswith(REPLAY)
 
 
-def open_device(name: str, settings: DeviceSettings, clock: Clock, seed: int) -> Device:
-    """`seed` drives what is random in a simulated device. Raises `DeviceError`."""
+def open_device(name: str, settings: DeviceSettings, clock: Clock, seed: int, *, own_process: bool = True) -> Device:
+    """`seed` drives what is random in a simulated device. own_process: a real device's loop in a process of its own,
+    the only one that holds it; False is for that process, and for tests. Raises `DeviceError`."""
     if name not in SIMULATIONS and name not in REAL and not name.startswith(REPLAY):
         raise DeviceError(
             f"There is no device called {name!r}",
@@ -54,6 +55,10 @@ def open_device(name: str, settings: DeviceSettings, clock: Clock, seed: int) ->
         raise DeviceError(
             "A real device needs real time", f"'{name}' was to be played faster than time passes.", "Use a real clock."
         )
+    if name in REAL and own_process:
+        from study.devices.loop_process.remote_device import open_remotely
+
+        return open_remotely(name, settings, seed)
     from study.devices.rigs_by_name import rig_named
     from study.devices.safe import SafeDevice
 

@@ -14,7 +14,14 @@ from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 from study.store.formats.recording_file import write_recording
 
-KINDS = ("simulated omega.3", "compiled mass", "stepped mass", "driver on the stub", "replay of a recording")
+KINDS = (
+    "simulated omega.3",
+    "compiled mass",
+    "stepped mass",
+    "driver on the stub",
+    "driver behind pipes",
+    "replay of a recording",
+)
 
 
 @pytest.fixture
@@ -50,6 +57,10 @@ def device(request, rigs, clock, pressed):
     elif request.param == "driver on the stub":
         stub = request.getfixturevalue("stepped_stub")
         opened = SafeDevice(stub.rig(), rigs.SETTINGS, clock)
+    elif request.param == "driver behind pipes":
+        behind = SafeDevice(request.getfixturevalue("stepped_stub").rig(), rigs.SETTINGS, clock)
+        opened = request.getfixturevalue("served").remote(behind, rigs.SETTINGS)
+        opened._runner = behind._runner
     else:
         kind = rigs.compiled_rig if request.param == "compiled mass" else rigs.ScriptedRig
         rig = kind(pressed=pressed)

@@ -5,12 +5,12 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from study.cli.main import main
-from study.devices.force_dimension import watchdog_proof
 from study.store.formats.trials_file import read_trials
 
 pytestmark = pytest.mark.real_time
@@ -30,10 +30,9 @@ def short_file(tmp_path, small_text):
     return path
 
 
-def test_a_simulated_participant_takes_a_study_on_the_driver(stub, short_file, tmp_path, capsys, monkeypatch):
+def test_a_simulated_participant_takes_a_study_on_the_driver(stub, short_file, tmp_path, capsys):
     stub.set("stiffness", 150)  # a hand that holds the handle
-    stub.set("watchdog_stretch", 20)  # the computer of the tests is busier than that of a lab
-    monkeypatch.setattr(watchdog_proof, "MARGIN_S", 1.0)
+    stub.set("stretch_in_use", 20)  # the computer of the tests is busier than that of a lab
     data = ("--data", str(tmp_path / "data"), "--device", "omega3", "--json")
     code = main(["study", "--protocol", str(short_file), "--observer", "ideal", "--seed", "5", *data])
     resumed = 0
@@ -72,6 +71,12 @@ class Taking:
             time.sleep(0.001)
         return False
 
+    def loop_pid(self) -> int:
+        """Of the process that holds the device: the program starts no other."""
+        tasks = Path(f"/proc/{self.program.pid}/task").iterdir()
+        (pid,) = {pid for task in tasks for pid in (task / "children").read_text("ascii").split()}
+        return int(pid)
+
     def end(self) -> str:
         self.program.send_signal(signal.SIGCONT)
         return self.program.communicate(timeout=120)[0].decode()
@@ -86,8 +91,8 @@ def watch_it_let_go(stub) -> None:
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 22))])
-def test_a_program_that_is_killed_leaves_no_force_and_loses_no_answer(surviving_stub, short_file, tmp_path, seed):
-    random, stub = np.random.default_rng(seed), surviving_stub
+def test_a_program_that_is_killed_leaves_no_force_and_loses_no_answer(stub, short_file, tmp_path, seed):
+    random = np.random.default_rng(seed)
     data = ["--data", str(tmp_path / "data"), "--device", "omega3"]
     arguments = ["study", "--protocol", str(short_file), "--observer", "ideal", "--seed", str(seed), *data]
     log, before, killed = tmp_path / "data" / "ideal1_001" / "events.jsonl", b"", 0
@@ -107,15 +112,58 @@ def test_a_program_that_is_killed_leaves_no_force_and_loses_no_answer(surviving_
     assert killed, said
 
 
-def test_a_program_that_is_stopped_leaves_no_force_and_none_comes_back(surviving_stub, short_file, tmp_path):
-    stub = surviving_stub
+def test_a_program_that_is_stopped_leaves_no_force_and_none_comes_back(stub, short_file, tmp_path):
+    """Its loop hears no sign of life any more, and fades."""
+    stub.set("stretch_in_use", 1000)  # the loop lets go, not the firmware
     data = ["--data", str(tmp_path / "data"), "--device", "omega3"]
     taking = Taking(["study", "--protocol", str(short_file), "--observer", "ideal", "--seed", "3", *data], stub)
     assert taking.await_force(), taking.end()
     taking.program.send_signal(signal.SIGSTOP)
-    watch_it_let_go(stub)
-    time.sleep(0.5)
+    becomes(lambda: stays_zero(stub))
+    for _ in range(5):
+        time.sleep(0.1)
+        assert stays_zero(stub)
     taking.program.send_signal(signal.SIGCONT)
+    taking.program.send_signal(signal.SIGINT)
     said = taking.end()
     assert taking.program.returncode in (3, 130), said
     assert stub.safe
+    assert stub.get("peak_n") <= 4.5
+
+
+def becomes(true) -> None:
+    until_s = time.monotonic() + 30.0
+    while not true():
+        assert time.monotonic() < until_s
+        time.sleep(0.005)
+
+
+def stays_zero(stub) -> bool:
+    """Longer than a period of what was held."""
+    for _ in range(20):
+        if stub.get("last_write") != 0.0:
+            return False
+        time.sleep(0.003)
+    return True
+
+
+@pytest.mark.parametrize("how", [signal.SIGSTOP, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
+def test_a_loop_that_ends_leaves_no_force_and_the_study_ends_with_words_and_goes_on(stub, short_file, tmp_path, how):
+    data = ["--data", str(tmp_path / "data"), "--device", "omega3"]
+    arguments = ["study", "--protocol", str(short_file), "--observer", "ideal", "--seed", "3", *data]
+    for _ in range(3):
+        taking = Taking(arguments, stub)
+        if taking.await_force():
+            break
+        taking.end()
+        arguments = ["resume", "ideal1_001", *data]
+    os.kill(taking.loop_pid(), how)
+    watch_it_let_go(stub)
+    said = taking.end()
+    assert taking.program.returncode == 3, said
+    assert stub.safe
+    assert "hapteq resume" in said
+    if how == signal.SIGKILL:
+        stub.set("stretch_in_use", 20)
+        assert main(["resume", "ideal1_001", *data]) in (0, 3, 130)
+        assert stub.safe

@@ -1,7 +1,8 @@
 /* A stand-in for the vendor's device library, for tests only: ours, made from the public names and types of its
  * functions. Behind them a mass on a damper and a spring in wall time or stepped time, a firmware with watchdog and
  * brakes, and faults by switch: stub_set("name", value), or HAPTEQ_STUB="name=value,name=value" in the environment.
- * HAPTEQ_STUB_FILE names a file in which the device lives on when the program that drives it is killed.
+ * HAPTEQ_STUB_FILE names a file in which the device lives: for all programs that look at it, and on when the one that
+ * drives it is killed. stretch_in_use is as watchdog_stretch, from the first force after opening on.
  */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
@@ -16,6 +17,7 @@
 #define EXPORT __declspec(dllexport)
 #else
 #define EXPORT
+#include <errno.h>
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -27,7 +29,7 @@
   X(watchdog_works, 1) X(watchdog_settable, 1) X(watchdog_stretch, 1) X(latches, 1) X(force_enables, 1)                \
   X(unplugged, 0) X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
   X(late_every, 0) X(late_s, 0) X(write_fails, 0) X(read_fails, 0) X(stop_fails, 0) X(buttons, 0)                      \
-  X(off_by, 0) X(reset_after_s, 0)                                                                                     \
+  X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
   /* What a test may ask for. */                                                                                       \
   X(force_on, 0) X(brake, 1) X(cause, 0) X(fx, 0) X(fy, 0) X(fz, 0) X(peak_n, 0) X(writes, 0) X(opened, 0)             \
   X(stops, 0) X(closes, 0) X(reads, 0) X(watchdog, 0) X(cap_n, -1) X(effector, 0) X(gravity, 1) X(guard, 1)            \
@@ -39,6 +41,7 @@
 enum { SWITCHES(AS_ENUM) COUNT };
 typedef struct {
   double values[COUNT], position[3], velocity[3], commanded[3], told[3], started, integrated, commanded_at, reset_at;
+  double used; /* Since it was opened, a force was sent. */
 } Device;
 static Device own = {.values = {SWITCHES(AS_VALUE)}, .started = -1};
 static Device *device = &own;
@@ -68,8 +71,30 @@ static double wall_s(void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static void lock(void) { while (atomic_flag_test_and_set(&busy)) {} }
-static void unlock(void) { atomic_flag_clear(&busy); }
+/* Programs that share the device take turns, a call each. The system takes the lock from one that was killed; one that
+ * was stopped in the middle of a call is not waited for. */
+static int shared_file = -1;
+#ifdef _WIN32
+enum { F_WRLCK, F_UNLCK };
+#endif
+static int turn(short kind) {
+#ifndef _WIN32
+  struct flock whole = {.l_type = kind, .l_whence = SEEK_SET};
+  return fcntl(shared_file, F_SETLK, &whole) == 0 || (errno != EAGAIN && errno != EACCES);
+#else
+  return kind == kind;
+#endif
+}
+static void lock(void) {
+  while (atomic_flag_test_and_set(&busy)) {}
+  if (shared_file < 0) return;
+  double until_s = wall_s() + 0.02;
+  while (!turn(F_WRLCK) && wall_s() < until_s) {}
+}
+static void unlock(void) {
+  if (shared_file >= 0) turn(F_UNLCK);
+  atomic_flag_clear(&busy);
+}
 static int find(const char *name, size_t length) {
   for (int i = 0; i < COUNT; i++)
     if (strlen(names[i]) == length && !strncmp(names[i], name, length)) return i;
@@ -83,8 +108,8 @@ static void share(void) {
   if (file < 0) return;
   int fresh = lseek(file, 0, SEEK_END) == 0;
   void *place = ftruncate(file, sizeof own) ? MAP_FAILED : mmap(0, sizeof own, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
-  close(file);
   if (place == MAP_FAILED) abort();
+  shared_file = file;
   device = place;
   if (fresh) *device = own;
 #endif
@@ -112,7 +137,7 @@ static void drop(int cause_of_drop) {
 static void step(double dt) {
   double norm = 0;
   if (p[force_on] && p[watchdog] > 0 && p[watchdog_works] &&
-      p[now] - last_command_s > p[watchdog] * 125e-6 * p[watchdog_stretch])
+      p[now] - last_command_s > p[watchdog] * 125e-6 * p[watchdog_stretch] * (device->used ? p[stretch_in_use] : 1))
     drop(3);
   if (p[off_by]) drop((int)p[off_by]);
   for (int i = 0; i < 3; i++) {
@@ -193,7 +218,7 @@ EXPORT int dhdOpenID(char id) {
   if (p[unplugged] || id >= p[devices]) code = fail(NO_DEVICE);
   else if (p[in_use]) code = fail(IN_USE);
   else if (p[open_fails]) code = fail((int)p[open_fails]);
-  else p[opened] = 1;
+  else p[opened] = 1, device->used = 0;
   return end(code ? code : id);
 }
 EXPORT int dhdClose(char id) { (void)id; PLAIN(p[opened] = 0; p[closes]++; drop(4)); }
@@ -251,6 +276,7 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
     double share = asked > most * (1 + 1e-9) ? most / asked : 1;
     command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
     p[writes]++, p[last_write] = asked, last_command_s = p[now];
+    if (asked > 0) device->used = 1;
     if (!p[latches] && !p[force_on] && p[cause] == 3) p[force_on] = 1, p[brake] = 0, p[cause] = 0;
     code = share < 1 ? 2 : 0;
     if (!p[wall_time]) run_to(integrated_s + 0.001);

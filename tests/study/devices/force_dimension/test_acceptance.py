@@ -25,7 +25,7 @@ def locked(stub):
 
 
 def open_for_a_hand(rigs) -> None:
-    open_device("omega3", rigs.SETTINGS, RealClock(), 1).close()
+    open_device("omega3", rigs.SETTINGS, RealClock(), 1, own_process=False).close()
 
 
 def refused(rigs) -> str:
@@ -41,7 +41,8 @@ def test_a_device_without_an_acceptance_record_opens_for_no_hand(locked, rigs, m
     assert locked.safe and locked.get("opened") == 0
     locked.set("watchdog_stretch", 20)  # a busy computer may be late for the watchdog itself
     monkeypatch.setattr(watchdog_proof, "MARGIN_S", 1.0)
-    with contextlib.closing(open_device("omega3", replace(rigs.SETTINGS, hand_on_handle=False), RealClock(), 1)):
+    settings = replace(rigs.SETTINGS, hand_on_handle=False)
+    with contextlib.closing(open_device("omega3", settings, RealClock(), 1, own_process=False)):
         assert locked.get("force_on")
 
 

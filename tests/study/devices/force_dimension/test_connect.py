@@ -18,7 +18,7 @@ from study.errors import DeviceError, ExitCode
 def opened(rigs):
     def opening(name: str = "omega3", hand: bool = True):
         settings = replace(rigs.SETTINGS, hand_on_handle=hand)
-        return contextlib.closing(open_device(name, settings, RealClock(), seed=1))
+        return contextlib.closing(open_device(name, settings, RealClock(), seed=1, own_process=False))
 
     return opening
 
@@ -133,7 +133,7 @@ def test_a_device_that_this_account_may_not_open_looks_as_if_it_were_not_there(s
 def test_settings_that_are_not_safe_close_it_again(stub, rigs):
     settings = replace(rigs.SETTINGS, limits=replace(rigs.LIMITS, stimulus_cap_n=3.5))
     with pytest.raises(DeviceError, match="limits are not safe"):
-        open_device("omega3", settings, RealClock(), seed=1)
+        open_device("omega3", settings, RealClock(), seed=1, own_process=False)
     assert stub.safe
     assert stub.get("opened") == 0
 

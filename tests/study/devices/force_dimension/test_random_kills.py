@@ -1,4 +1,6 @@
-"""Programs that hold a force, killed, stopped, stalled and blinded at random times: the force is off every time."""
+"""Programs that hold the device, killed, stopped, stalled and blinded at random times: the force is off every time.
+
+They have the loop in them, as the loop's process has; what happens to the caller of that: `loop_process`."""
 
 import contextlib
 import os
@@ -27,7 +29,7 @@ import study.devices.safe, study.devices.rigs_by_name
 def hold():
     alive = [True]
     signal.signal(signal.SIGUSR1, lambda number, frame: alive.clear())
-    device = open_device("omega3", rigs.SETTINGS, RealClock(), seed=1)
+    device = open_device("omega3", rigs.SETTINGS, RealClock(), seed=1, own_process=False)
     device.hold(rigs.sine(2.0, 25))
     while True:
         time.sleep(0.02)
@@ -51,7 +53,7 @@ for line in sys.stdin:
 
 
 @pytest.fixture
-def nursery(surviving_stub):
+def nursery(stub):
     process = subprocess.Popen(
         [sys.executable, "-c", NURSERY],
         env=os.environ | {"HAPTEQ_STUB": "stiffness=150"},
@@ -155,8 +157,8 @@ WAYS = (killed, stopped, stalled, blinded)
 
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("times", [8, pytest.param(200, marks=pytest.mark.slow)])
-def test_after_any_end_of_a_program_the_force_is_off_and_stayed_below_the_cap(surviving_stub, nursery, times):
-    draw, stub, done = np.random.default_rng(18), surviving_stub, dict.fromkeys(WAYS, 0)
+def test_after_any_end_of_a_program_the_force_is_off_and_stayed_below_the_cap(stub, nursery, times):
+    draw, done = np.random.default_rng(18), dict.fromkeys(WAYS, 0)
     for attempt in range(3 * times):
         child = nursery()
         if await_force(stub, child):
@@ -174,8 +176,7 @@ def test_after_any_end_of_a_program_the_force_is_off_and_stayed_below_the_cap(su
     assert all(done.values()), done
 
 
-def test_a_device_whose_watchdog_failed_since_it_was_opened_would_be_noticed(surviving_stub, nursery):
-    stub = surviving_stub
+def test_a_device_whose_watchdog_failed_since_it_was_opened_would_be_noticed(stub, nursery):
     child = next(child for child in (nursery() for _ in range(10)) if await_force(stub, child))
     stub.set("watchdog_works", 0)
     with pytest.raises(AssertionError):

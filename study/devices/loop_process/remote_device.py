@@ -1,0 +1,212 @@
+"""The device port over a device in the loop's process. No call waits without a bound.
+
+A process that ended, or that does not answer, is a lost device: it is killed where it still runs, so that no force
+comes back, and the device's own watchdog has dropped what it held.
+"""
+
+import contextlib
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from equalizer.signals.signal import Signal
+from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
+from study.devices.loop_process.line import Call, Line, LoopGoneError
+from study.devices.loop_process.start import LoopProcess
+from study.errors import DeviceError
+from study.session.stimulus.held_stimulus import HeldStimulus
+
+OPENING_S = 180.0
+"""To import everything, to compile it where that was never done, and to open the device."""
+
+ANSWER_S = 3.0
+"""Beyond what a busy computer is late by, and beyond the safety layer's own waits: its loop is given up after 0.1 s, a
+zero force is written within 0.1 s, and a device that does not become still is lost 1 s after its fades."""
+
+STOP_S = 0.5
+"""An emergency stop waits no longer: the process is killed."""
+
+CLOSE_S = 6.0
+"""Beyond the fade: a driver that hangs is left to itself after less."""
+
+SENT_S_PER_RECORDED_S = 0.05
+"""A recorded second is some 100 kB, which a pipe takes in 2 ms; a busy computer is slower."""
+
+NEVER_HELD = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
+
+
+def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevice":
+    """Raises what opening the device in the process raised, or `DeviceError` where that ended or hangs."""
+    process = LoopProcess()
+    opening = process.work.begin("open", name, settings, seed)
+    try:
+        info: DeviceInfo = opening.answer(OPENING_S)
+    except LoopGoneError as gone:
+        process.hang_up()
+        raise DeviceError(
+            "The device was not opened",
+            f"The process of its loop failed while it was opened: {gone}, {process.end(0.5)}.",
+            "Try again. If it happens again, report what was written above.",
+        ) from gone
+    except BaseException:
+        process.hang_up()
+        process.end(CLOSE_S)
+        raise
+    return RemoteDevice(process, info, settings)
+
+
+class RemoteDevice:
+    def __init__(self, process: LoopProcess, info: DeviceInfo, settings: DeviceSettings) -> None:
+        self._process = process
+        self._info = info
+        limits = settings.limits
+        self._fade_s = limits.release_s + limits.watchdog_s
+        self._keep_s = settings.keep_s
+        self._held: HeldStimulus | None = None
+        self._releasing: Call | None = None
+        self._health = NEVER_HELD
+        self._stopped = self._closed = False
+        self._losing = threading.Lock()
+        self._lost = ""
+        """How it was lost."""
+
+    @property
+    def info(self) -> DeviceInfo:
+        return self._info
+
+    def hold(self, stimulus: HeldStimulus) -> None:
+        self._must_be_there()
+        before, self._held = self._held, stimulus
+        try:
+            self._ask(self._process.work, "hold", stimulus)
+        except DeviceError:
+            self._held = before
+            raise
+
+    def keep_alive(self) -> None:
+        with contextlib.suppress(DeviceError):
+            self._ask_sign("keep_alive")
+
+    def fault(self) -> Fault:
+        try:
+            fault: Fault = self._ask_sign("fault")
+        except DeviceError:
+            fault = self._fault_of_the_lost()
+        return fault
+
+    def health(self) -> Health:
+        try:
+            self._health = self._ask_sign("health")
+        except DeviceError:
+            return self._health_of_the_lost()
+        return self._health
+
+    def release(self) -> Played:
+        if self._lost or self._closed:
+            if self._held is None:
+                self._must_be_there()
+            self._held = None
+            return Played(recording=None, health=self._health_of_the_lost())
+        fade_out_s = self._held.fade_out_s if self._held is not None else 0.0
+        # A caller that was interrupted while it waited asks for the same release once more.
+        self._releasing = self._releasing or self._process.work.begin("release")
+        try:
+            played: Played = self._releasing.answer(fade_out_s + self._patience_s(self._keep_s))
+        except LoopGoneError as gone:
+            self._lose(gone)
+            played = Played(recording=None, health=self._health_of_the_lost())
+        if self._releasing.over:
+            self._releasing, self._held = None, None
+        self._health = played.health
+        return played
+
+    def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
+        self._must_be_there()
+        call = self._process.work.begin("play", commands)
+        patience_s = self._patience_s(commands.duration_s)
+        try:
+            played: Played = call.answer(patience_s, on_progress)
+        except LoopGoneError as gone:
+            self._lose(gone)
+            raise self._lost_error() from gone
+        except BaseException:
+            if not call.over:
+                self._break_off(call, patience_s)
+            raise
+        self._health = played.health
+        return played
+
+    def look(self) -> Look:
+        with contextlib.suppress(DeviceError):
+            look: Look = self._ask(self._process.look, "look")
+            return look
+        return Look(None, None, sensor_clipped=False, buttons=frozenset(), missed_ticks=0)
+
+    def stop(self) -> None:
+        self._stopped = True
+        with contextlib.suppress(DeviceError):
+            self._ask(self._process.stop, "stop", patience_s=STOP_S)
+
+    def close(self) -> None:
+        if self._closed:
+            return
+        if not self._lost:
+            with contextlib.suppress(DeviceError):
+                self._health = self._ask(self._process.stop, "close", patience_s=self._fade_s + CLOSE_S)
+        self._closed = True
+        self._process.hang_up()
+        self._process.end(CLOSE_S)
+
+    def _patience_s(self, recorded_s: float) -> float:
+        return self._fade_s + ANSWER_S + SENT_S_PER_RECORDED_S * recorded_s
+
+    def _ask_sign(self, name: str) -> Any:
+        return self._ask(self._process.signs, name)
+
+    def _ask(self, line: Line, name: str, *arguments: Any, patience_s: float | None = None) -> Any:
+        """Raises `DeviceError` for a device that is lost or closed, and what was raised there."""
+        self._must_be_there()
+        try:
+            return line.begin(name, *arguments).answer(ANSWER_S if patience_s is None else patience_s)
+        except LoopGoneError as gone:
+            self._lose(gone)
+            raise self._lost_error() from gone
+
+    def _break_off(self, call: Call, patience_s: float) -> None:
+        try:
+            call.break_off(patience_s)
+        except LoopGoneError as gone:
+            self._lose(gone)
+        except BaseException:  # impatient: then without a fade
+            self.stop()
+            raise
+
+    def _lose(self, gone: LoopGoneError) -> None:
+        with self._losing:
+            if not self._lost and not self._closed:
+                self._process.hang_up()
+                # One that hung up may be letting go just now.
+                self._lost = f"{gone}, {self._process.end(0.0 if gone.hangs else self._fade_s + CLOSE_S)}"
+
+    def _must_be_there(self) -> None:
+        if self._closed:
+            raise DeviceError("The device cannot do this now", "The device is closed.", "Open it again.")
+        if self._lost:
+            raise self._lost_error()
+
+    def _lost_error(self) -> DeviceError:
+        return DeviceError(
+            "The device was lost",
+            f"The process of its loop is gone: {self._lost}.",
+            "Take the hand off the handle until you know that no force is on: the device's own watchdog drops it. Then "
+            "open the device again; a session goes on with `hapteq resume`.",
+        )
+
+    def _fault_of_the_lost(self) -> Fault:
+        if self._closed and not self._lost:
+            return self._health.fault
+        return Fault.STOPPED if self._stopped else Fault.LOST
+
+    def _health_of_the_lost(self) -> Health:
+        return replace(self._health, fault=self._fault_of_the_lost())

@@ -1,0 +1,161 @@
+"""What runs in the loop's process: a device behind its safety layer, and a thread for each line of its caller.
+
+A sign of life is always the caller's: `keep_alive` runs when it is called from there, and `play` goes on only as long
+as the caller answers its progress. When the caller's end of a pipe closes, for any reason, the force fades, the brakes
+hold, and the process ends.
+"""
+
+import contextlib
+import gc
+import os
+import pickle
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from types import FrameType
+from typing import Any
+
+from equalizer.signals.signal import Signal
+from study.devices.clock import RealClock
+from study.devices.device import Device, Played
+from study.devices.loop_process.line import ERROR, LINES, PROGRESS, VALUE, End
+from study.devices.opening import before_others, open_device
+
+LOOK_EVERY_S = 0.2
+"""Whether the caller's process is there still: a fork of it may hold its end of a pipe open."""
+
+LAST_ANSWER_S = 1.0
+
+
+class BrokenOffError(Exception):
+    """The caller wants no more of what is played."""
+
+
+class DeviceServer:
+    def __init__(
+        self,
+        device: Device,
+        ends: tuple[End, ...],
+        at_rest: Callable[[], object] = lambda: None,
+        before_others: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
+    ) -> None:
+        """ends: of `LINES`. at_rest: called after each stimulus. before_others: entered by the threads that a stop and
+        a sign of life wait for."""
+        self._device = device
+        self._at_rest = at_rest
+        self._before_others = before_others
+        self._closed = threading.Event()
+        self.ended = threading.Event()
+        """The caller is gone, or wants the device closed."""
+        work, signs, look, stop = ends
+        tables: tuple[tuple[End, dict[str, Callable[..., Any]]], ...] = (
+            (
+                work,
+                {"hold": device.hold, "release": device.release, "play": lambda commands: self._play(work, commands)},
+            ),
+            (signs, {"keep_alive": device.keep_alive, "fault": device.fault, "health": device.health}),
+            (look, {"look": device.look}),
+            (stop, {"stop": device.stop, "close": self._await_closed}),
+        )
+        self._threads = [
+            threading.Thread(target=self._serve, args=table, name=f"serve {name}", daemon=True)
+            for name, table in zip(LINES, tables, strict=True)
+        ]
+
+    def start(self) -> None:
+        for thread in self._threads:
+            thread.start()
+
+    def close(self) -> None:
+        """With a fade; then the caller hears that it is done. Never raises."""
+        self._device.close()
+        self._closed.set()
+        self._threads[-1].join(LAST_ANSWER_S)
+
+    def _serve(self, end: End, table: dict[str, Callable[..., Any]]) -> None:
+        urgent = "stop" in table or "keep_alive" in table
+        try:
+            with self._before_others() if urgent else contextlib.nullcontext():
+                while not self._closed.is_set():
+                    name, arguments = end.recv()
+                    end.send(_answer(table[name], arguments))
+                    if name in ("release", "play"):
+                        self._at_rest()
+        except (EOFError, OSError):
+            return
+        finally:
+            self.ended.set()
+
+    def _play(self, end: End, commands: Signal) -> Played:
+        def go_on(share: float) -> None:
+            end.send((PROGRESS, share))
+            if not end.recv():
+                raise BrokenOffError
+
+        return self._device.play(commands, go_on)
+
+    def _await_closed(self) -> Any:
+        self.ended.set()
+        self._closed.wait()
+        return self._device.health()
+
+
+def run(parent: int, *handles: int) -> None:
+    """The main function of the process. parent: the caller's process; handles: of the ends of `LINES`."""
+    told_to_end: list[int] = []
+    _leave_signals_to_the_caller(told_to_end)
+    ends = tuple(End(handle) for handle in handles)
+    with contextlib.suppress(EOFError, OSError):  # the caller is gone: what is open is closed all the same
+        _open_and_serve(parent, ends, told_to_end)
+
+
+def _open_and_serve(parent: int, ends: tuple[End, ...], told_to_end: list[int]) -> None:
+    name, settings, seed = ends[0].recv()[1]
+    try:
+        device = open_device(name, settings, RealClock(), seed, own_process=False)
+    except BaseException as error:  # noqa: BLE001 - the caller raises it
+        ends[0].send((ERROR, _sendable(error)))
+        return
+    with contextlib.closing(device):
+        # Nothing may stop the loop to look for garbage: what is there stays, what comes is looked at between stimuli.
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        ends[0].send((VALUE, device.info))
+        server = DeviceServer(device, ends, at_rest=gc.collect, before_others=before_others)
+        server.start()
+        while not (server.ended.wait(LOOK_EVERY_S) or told_to_end) and os.getppid() == parent:
+            pass
+        server.close()
+
+
+def _leave_signals_to_the_caller(told_to_end: list[int]) -> None:
+    """A terminal's Ctrl-C or end is the caller's business, which lets go with a fade. A SIGTERM for this process ends
+    it, with the same fade."""
+
+    def note(number: int, frame: FrameType | None) -> None:
+        told_to_end.append(number)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, note)
+    if hasattr(signal, "SIGHUP"):
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+
+def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[int, Any]:
+    try:
+        return VALUE, function(*arguments)
+    except (EOFError, ConnectionError):  # the caller went while it was asked whether to go on
+        raise
+    except BaseException as error:  # noqa: BLE001 - the caller raises it
+        return ERROR, _sendable(error)
+
+
+def _sendable(error: BaseException) -> Exception:
+    if isinstance(error, Exception):
+        with contextlib.suppress(Exception):
+            copy = pickle.loads(pickle.dumps(error))
+            if isinstance(copy, type(error)):
+                return error
+    return RuntimeError(f"{type(error).__name__}: {error}")
