@@ -38,7 +38,8 @@ def study(
         str | None,
         typer.Option(
             help="Let a simulated participant take it: ideal, lapsing, biased, guesser, alternator, always_1, "
-            "always_2, vibration_only, intensity_cue, drifting, scripted, or person (one of a simulated population)."
+            "always_2, vibration_only, intensity_cue, delivered, repeating, "
+            "criterion_drift, drifting, scripted, or person (one of a simulated population)."
         ),
     ] = None,
     model: ModelOption = None,
