@@ -1,0 +1,51 @@
+"""The primary analysis keeps its level and its intervals are right at every level, over whole simulated studies.
+
+Long runs of the same: `tests/references/primary_analysis_calibration.py`; docs/statistics.md has its numbers.
+"""
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from tests.references.primary_analysis_calibration import NULLS, drawn_crowd, judge
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
+STUDIES = 200
+
+
+@pytest.fixture(scope="module")
+def null_p_values():
+    """By null: p of the contrasts against 5 Hz, (studies, 4)."""
+    return {
+        name: np.array([judge(crowd, (91, place, number))["contrast"] for number in range(STUDIES)])
+        for place, (name, crowd) in enumerate(NULLS.items())
+    }
+
+
+@pytest.fixture(scope="module")
+def ranks():
+    """Of true contrasts in their confidence distributions, each study with a population of its own, (studies, 4)."""
+    return np.array([judge(drawn_crowd(number), (92, number))["rank of contrast"] for number in range(2 * STUDIES)])
+
+
+@pytest.mark.parametrize("name", NULLS)
+def test_a_null_is_rejected_as_seldom_as_stated(null_p_values, name):
+    """The highest frequency, as a protocol would declare it: binomial, 4 standard errors."""
+    found = np.mean(null_p_values[name][:, -1] < 0.05)
+    assert found == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 / STUDIES))
+
+
+def test_over_all_nulls_the_level_is_5_percent(null_p_values):
+    found = np.mean([p[:, -1] < 0.05 for p in null_p_values.values()])
+    assert found == pytest.approx(0.05, abs=3 * np.sqrt(0.05 * 0.95 / STUDIES / len(NULLS)))
+
+
+def test_ranks_of_the_true_contrasts_are_uniform(ranks):
+    for place in range(ranks.shape[1]):
+        assert kstest(ranks[:, place], "uniform").pvalue > 0.001
+
+
+def test_a_standard_error_that_is_a_third_too_small_would_be_seen(ranks):
+    """The control: as if thresholds of one person were those of two."""
+    narrowed = 0.5 + np.clip(1.5 * (ranks - 0.5), -0.5, 0.5)
+    assert all(kstest(narrowed[:, place], "uniform").pvalue < 0.001 for place in range(ranks.shape[1]))
