@@ -19,10 +19,11 @@ class ServedHere:
         pairs = [Pipe() for _ in LINES]
         self.theirs = tuple(theirs for _, theirs in pairs)
         self.lines = [Line(ours, name) for (ours, _), name in zip(pairs, LINES, strict=True)]
-        self.work, self.signs, self.look, self.stop = self.lines
+        self.work, self.signs, self.look, self.stop, self.close = self.lines
         self.server = DeviceServer(device, self.theirs)
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
+        self.killed = False
         self.patience_s: list[float] = []
         """Of each wait for its end."""
 
@@ -33,7 +34,11 @@ class ServedHere:
     def end(self, patience_s: float) -> str:
         self.patience_s.append(patience_s)
         self._thread.join(patience_s)
-        return "and was killed" if self._thread.is_alive() else "with code 0"
+        return "and was killed" if self.killed or self._thread.is_alive() else "with code 0"
+
+    def kill(self) -> None:
+        self.killed = True
+        self.die()
 
     def die(self) -> None:
         """As one that is killed: its ends of the pipes close."""

@@ -17,8 +17,9 @@ else:
 
     End = Connection
 
-LINES = ("work", "signs", "look", "stop")
-"""A pipe each: neither a long `release` or `play` nor a reading that hangs holds up a sign of life or a stop."""
+LINES = ("work", "signs", "look", "stop", "close")
+"""A pipe each: neither a long `release`, `play` or `close` nor a reading that hangs holds up a sign of life or a
+stop."""
 
 VALUE, ERROR, PROGRESS, GONE = range(4)
 """What a message is. After PROGRESS the other side waits for a bool: whether to go on."""
@@ -26,6 +27,9 @@ VALUE, ERROR, PROGRESS, GONE = range(4)
 
 GRACE_S = 0.5
 """When this process stood still, the other looks late too: it gets so long to answer."""
+
+CLOSE_S = 6.0
+"""Beyond the fade: a driver that hangs is left to itself after less."""
 
 
 class LoopGoneError(Exception):
@@ -46,10 +50,12 @@ class Call:
         self.over = False
         """Answered, or known to be never."""
 
-    def answer(self, patience_s: float, on_progress: Callable[[float], None] | None = None) -> Any:
-        """patience_s: for each message. Raises what was raised there, `LoopGoneError`, and what `on_progress` raises:
-        then the call is not `over`."""
-        while (message := self._next(patience_s))[0] == PROGRESS:
+    def answer(
+        self, patience_s: float, on_progress: Callable[[float], None] | None = None, grace_s: float | None = None
+    ) -> Any:
+        """patience_s, grace_s (`GRACE_S`): for each message. Raises what was raised there, `LoopGoneError`, and what
+        `on_progress` raises: then the call is not `over`."""
+        while (message := self._next(patience_s, grace_s))[0] == PROGRESS:
             if on_progress is not None:
                 on_progress(message[1])
             self.goes_on.put(True)
@@ -63,8 +69,8 @@ class Call:
         while not self.over:
             self._next(patience_s)
 
-    def _next(self, patience_s: float) -> tuple[int, Any]:
-        for wait_s in (patience_s, GRACE_S):
+    def _next(self, patience_s: float, grace_s: float | None = None) -> tuple[int, Any]:
+        for wait_s in (patience_s, GRACE_S if grace_s is None else grace_s):
             with contextlib.suppress(Empty):
                 message = self.said.get(timeout=wait_s)
                 break

@@ -4,7 +4,9 @@ A process that ended, or that does not answer, is a lost device: it is killed wh
 comes back, and the device's own watchdog has dropped what it held.
 """
 
+import atexit
 import contextlib
+import signal
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,7 +14,7 @@ from typing import Any
 
 from equalizer.signals.signal import Signal
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
-from study.devices.loop_process.line import Call, Line, LoopGoneError
+from study.devices.loop_process.line import CLOSE_S, Call, Line, LoopGoneError
 from study.devices.loop_process.start import LoopProcess
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
@@ -25,10 +27,7 @@ ANSWER_S = 3.0
 zero force is written within 0.1 s, and a device that does not become still is lost 1 s after its fades."""
 
 STOP_S = 0.5
-"""An emergency stop waits no longer: the process is killed."""
-
-CLOSE_S = 6.0
-"""Beyond the fade: a driver that hangs is left to itself after less."""
+"""An emergency stop waits no longer, without a grace: the process is killed."""
 
 SENT_S_PER_RECORDED_S = 0.05
 """A recorded second is some 100 kB, which a pipe takes in 2 ms; a busy computer is slower."""
@@ -38,11 +37,13 @@ NEVER_HELD = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
 
 def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevice":
     """Raises what opening the device in the process raised, or `DeviceError` where that ended or hangs."""
-    process = LoopProcess()
-    opening = process.work.begin("open", name, settings, seed)
+    process: LoopProcess | None = None
     try:
-        info: DeviceInfo = opening.answer(OPENING_S)
+        process = LoopProcess()
+        info: DeviceInfo = process.work.begin("open", name, settings, seed).answer(OPENING_S)
+        return RemoteDevice(process, info, settings)
     except LoopGoneError as gone:
+        assert process is not None
         process.hang_up()
         raise DeviceError(
             "The device was not opened",
@@ -50,10 +51,10 @@ def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevi
             "Try again. If it happens again, report what was written above.",
         ) from gone
     except BaseException:
-        process.hang_up()
-        process.end(CLOSE_S)
+        if process is not None:
+            process.hang_up()
+            process.end(CLOSE_S)
         raise
-    return RemoteDevice(process, info, settings)
 
 
 class RemoteDevice:
@@ -66,17 +67,23 @@ class RemoteDevice:
         self._held: HeldStimulus | None = None
         self._releasing: Call | None = None
         self._health = NEVER_HELD
-        self._stopped = self._closed = False
+        self._force_left = self._stopped = False
+        """Said there at least once: the end of the process changes nothing about it."""
+        self._closed = self._ended = False
+        """Nothing is asked any more; nor does the process run."""
         self._losing = threading.Lock()
         self._lost = ""
         """How it was lost."""
+        # Twice: an interruption that waits as the first begins ends it before its first line.
+        atexit.register(self._close_at_exit)
+        atexit.register(self._close_at_exit)
 
     @property
     def info(self) -> DeviceInfo:
         return self._info
 
     def hold(self, stimulus: HeldStimulus) -> None:
-        self._must_be_there()
+        self._must_be_idle()
         before, self._held = self._held, stimulus
         try:
             self._ask(self._process.work, "hold", stimulus)
@@ -86,21 +93,21 @@ class RemoteDevice:
 
     def keep_alive(self) -> None:
         with contextlib.suppress(DeviceError):
-            self._ask_sign("keep_alive")
+            self._ask(self._process.signs, "keep_alive")
 
     def fault(self) -> Fault:
         try:
-            fault: Fault = self._ask_sign("fault")
+            fault: Fault = self._ask(self._process.signs, "fault")
         except DeviceError:
-            fault = self._fault_of_the_lost()
+            return self._fault_of_the_lost()
+        self._force_left |= fault is Fault.FORCE_LEFT
         return fault
 
     def health(self) -> Health:
         try:
-            self._health = self._ask_sign("health")
+            return self._noted(self._ask(self._process.signs, "health"))
         except DeviceError:
             return self._health_of_the_lost()
-        return self._health
 
     def release(self) -> Played:
         if self._lost or self._closed:
@@ -116,13 +123,14 @@ class RemoteDevice:
         except LoopGoneError as gone:
             self._lose(gone)
             played = Played(recording=None, health=self._health_of_the_lost())
-        if self._releasing.over:
-            self._releasing, self._held = None, None
-        self._health = played.health
+        finally:
+            if self._releasing.over:
+                self._releasing, self._held = None, None
+        self._noted(played.health)
         return played
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
-        self._must_be_there()
+        self._must_be_idle()
         call = self._process.work.begin("play", commands)
         patience_s = self._patience_s(commands.duration_s)
         try:
@@ -134,7 +142,7 @@ class RemoteDevice:
             if not call.over:
                 self._break_off(call, patience_s)
             raise
-        self._health = played.health
+        self._noted(played.health)
         return played
 
     def look(self) -> Look:
@@ -144,25 +152,42 @@ class RemoteDevice:
         return Look(None, None, sensor_clipped=False, buttons=frozenset(), missed_ticks=0)
 
     def stop(self) -> None:
-        self._stopped = True
-        with contextlib.suppress(DeviceError):
-            self._ask(self._process.stop, "stop", patience_s=STOP_S)
+        if self._lost or self._ended:
+            return
+        try:
+            with contextlib.suppress(DeviceError):
+                self._process.stop.begin("stop").answer(STOP_S, grace_s=0.0)
+                self._stopped = True
+        except LoopGoneError as gone:
+            # Not in `_lose`, which waits where another call waits for the end of a process that may let go by itself.
+            self._process.kill()
+            self._lose(gone)
 
     def close(self) -> None:
-        if self._closed:
+        if self._ended:
             return
-        if not self._lost:
-            with contextlib.suppress(DeviceError):
-                self._health = self._ask(self._process.stop, "close", patience_s=self._fade_s + CLOSE_S)
-        self._closed = True
-        self._process.hang_up()
+        try:
+            if not (self._lost or self._closed):
+                with contextlib.suppress(DeviceError):
+                    self._noted(self._ask(self._process.close, "close", patience_s=self._fade_s + CLOSE_S))
+        finally:  # it lets go by itself then
+            self._closed = True
+            self._process.hang_up()
         self._process.end(CLOSE_S)
+        # Last, so that a close that was interrupted is made good for when the program ends.
+        self._ended = True
+        atexit.unregister(self._close_at_exit)
+
+    def _close_at_exit(self) -> None:
+        while not self._ended:
+            try:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+                self.close()
+            except KeyboardInterrupt:  # came before it was ignored
+                continue
 
     def _patience_s(self, recorded_s: float) -> float:
         return self._fade_s + ANSWER_S + SENT_S_PER_RECORDED_S * recorded_s
-
-    def _ask_sign(self, name: str) -> Any:
-        return self._ask(self._process.signs, name)
 
     def _ask(self, line: Line, name: str, *arguments: Any, patience_s: float | None = None) -> Any:
         """Raises `DeviceError` for a device that is lost or closed, and what was raised there."""
@@ -189,6 +214,16 @@ class RemoteDevice:
                 # One that hung up may be letting go just now.
                 self._lost = f"{gone}, {self._process.end(0.0 if gone.hangs else self._fade_s + CLOSE_S)}"
 
+    def _noted(self, health: Health) -> Health:
+        self._health = health
+        self._force_left |= health.fault is Fault.FORCE_LEFT
+        return health
+
+    def _must_be_idle(self) -> None:
+        self._must_be_there()
+        if self._releasing is not None:  # its answer is not that of the next stimulus
+            raise DeviceError("The device cannot do this now", "It is still playing.", "Call release first.")
+
     def _must_be_there(self) -> None:
         if self._closed:
             raise DeviceError("The device cannot do this now", "The device is closed.", "Open it again.")
@@ -204,6 +239,8 @@ class RemoteDevice:
         )
 
     def _fault_of_the_lost(self) -> Fault:
+        if self._force_left:
+            return Fault.FORCE_LEFT
         if self._closed and not self._lost:
             return self._health.fault
         return Fault.STOPPED if self._stopped else Fault.LOST

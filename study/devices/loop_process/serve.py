@@ -11,6 +11,7 @@ import os
 import pickle
 import signal
 import threading
+import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from types import FrameType
@@ -19,13 +20,19 @@ from typing import Any
 from equalizer.signals.signal import Signal
 from study.devices.clock import RealClock
 from study.devices.device import Device, Played
-from study.devices.loop_process.line import ERROR, LINES, PROGRESS, VALUE, End
+from study.devices.loop_process.line import CLOSE_S, ERROR, LINES, PROGRESS, VALUE, End
 from study.devices.opening import before_others, open_device
 
 LOOK_EVERY_S = 0.2
 """Whether the caller's process is there still: a fork of it may hold its end of a pipe open."""
 
 LAST_ANSWER_S = 1.0
+
+OPENING_GRACE_S = 1.0
+"""While the device is opened, no force of a stimulus is on that a fade would end: the process ends soon."""
+
+OVERDUE_S = CLOSE_S + 3.0
+"""Beyond the fade: only a process that hangs, in the driver or in an exit handler, takes so long to end."""
 
 
 class BrokenOffError(Exception):
@@ -48,7 +55,7 @@ class DeviceServer:
         self._closed = threading.Event()
         self.ended = threading.Event()
         """The caller is gone, or wants the device closed."""
-        work, signs, look, stop = ends
+        work, signs, look, stop, close = ends
         tables: tuple[tuple[End, dict[str, Callable[..., Any]]], ...] = (
             (
                 work,
@@ -56,7 +63,8 @@ class DeviceServer:
             ),
             (signs, {"keep_alive": device.keep_alive, "fault": device.fault, "health": device.health}),
             (look, {"look": device.look}),
-            (stop, {"stop": device.stop, "close": self._await_closed}),
+            (stop, {"stop": device.stop}),
+            (close, {"close": self._await_closed}),
         )
         self._threads = [
             threading.Thread(target=self._serve, args=table, name=f"serve {name}", daemon=True)
@@ -105,18 +113,43 @@ def run(parent: int, *handles: int) -> None:
     """The main function of the process. parent: the caller's process; handles: of the ends of `LINES`."""
     told_to_end: list[int] = []
     _leave_signals_to_the_caller(told_to_end)
+    lifetime = Lifetime(parent, told_to_end)
+    threading.Thread(target=lifetime.watch, name="lifetime", daemon=True).start()
     ends = tuple(End(handle) for handle in handles)
     with contextlib.suppress(EOFError, OSError):  # the caller is gone: what is open is closed all the same
-        _open_and_serve(parent, ends, told_to_end)
+        _open_and_serve(lifetime, ends)
 
 
-def _open_and_serve(parent: int, ends: tuple[End, ...], told_to_end: list[int]) -> None:
+class Lifetime:
+    """How long the process may run."""
+
+    def __init__(self, parent: int, told_to_end: list[int]) -> None:
+        self._parent = parent
+        self._told_to_end = told_to_end
+        self.patience_s = OPENING_GRACE_S
+        """From when the end is due."""
+
+    def is_over(self) -> bool:
+        return bool(self._told_to_end) or os.getppid() != self._parent
+
+    def watch(self) -> None:
+        """Ends the process where its main thread does not: the device's own watchdog then drops the force."""
+        while not self.is_over():
+            time.sleep(LOOK_EVERY_S)
+        due_s = time.monotonic()
+        while time.monotonic() < due_s + self.patience_s:
+            time.sleep(LOOK_EVERY_S)
+        os._exit(1)
+
+
+def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
     name, settings, seed = ends[0].recv()[1]
     try:
         device = open_device(name, settings, RealClock(), seed, own_process=False)
     except BaseException as error:  # noqa: BLE001 - the caller raises it
         ends[0].send((ERROR, _sendable(error)))
         return
+    lifetime.patience_s = settings.limits.release_s + settings.limits.watchdog_s + OVERDUE_S
     with contextlib.closing(device):
         # Nothing may stop the loop to look for garbage: what is there stays, what comes is looked at between stimuli.
         gc.collect()
@@ -125,7 +158,7 @@ def _open_and_serve(parent: int, ends: tuple[End, ...], told_to_end: list[int]) 
         ends[0].send((VALUE, device.info))
         server = DeviceServer(device, ends, at_rest=gc.collect, before_others=before_others)
         server.start()
-        while not (server.ended.wait(LOOK_EVERY_S) or told_to_end) and os.getppid() == parent:
+        while not (server.ended.wait(LOOK_EVERY_S) or lifetime.is_over()):
             pass
         server.close()
 

@@ -42,24 +42,38 @@ class LoopProcess:
         finally:
             for end in theirs:
                 end.close()
-        self.pid = self._process.pid
-        self.work, self.signs, self.look, self.stop = (
-            Line(ours, name) for (ours, _), name in zip(pairs, LINES, strict=True)
-        )
+        self._killed = False
+        try:
+            self.pid = self._process.pid
+            self.work, self.signs, self.look, self.stop, self.close = (
+                Line(ours, name) for (ours, _), name in zip(pairs, LINES, strict=True)
+            )
+        except BaseException:  # interrupted, or no more threads: nothing is held yet
+            self.kill()
+            raise
 
     def hang_up(self) -> None:
         """It lets go and ends by itself when it hears that."""
-        for line in (self.work, self.signs, self.look, self.stop):
+        for line in (self.work, self.signs, self.look, self.stop, self.close):
             line.end()
 
+    def kill(self) -> None:
+        """At once: the device's own watchdog then drops the force."""
+        self._killed = True
+        self._process.kill()
+
     def end(self, patience_s: float) -> str:
-        """How it ended. One that does not is killed: the device's own watchdog then drops the force."""
-        try:
-            code = self._process.wait(patience_s)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
+        """How it ended. A process that does not end by itself is killed."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(patience_s)
+        if self._process.returncode is None:
+            self.kill()
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(DEAD_S)
+        code = self._process.returncode
+        if code is None:
+            return "was killed, and has not ended even so"
+        if self._killed:
             return "and was killed"
         return f"by signal {_signal_name(-code)}" if code < 0 else f"with code {code}"
 

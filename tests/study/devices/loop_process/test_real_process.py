@@ -260,12 +260,12 @@ def ask() -> None:
     assert ours[0].recv()[0] == serve.VALUE
     print(gc.isenabled(), gc.get_freeze_count() > 0)
     print(*sorted({name.partition(".")[0] for name in sys.modules}))
-    ours[3].send(("close", ()))
-    assert ours[3].recv()[0] == serve.VALUE
+    ours[4].send(("close", ()))
+    assert ours[4].recv()[0] == serve.VALUE
 
 asking = threading.Thread(target=ask)
 asking.start()
-serve._open_and_serve(os.getppid(), tuple(end for _, end in pairs), [])
+serve._open_and_serve(serve.Lifetime(os.getppid(), []), tuple(end for _, end in pairs))
 asking.join()
 """
 

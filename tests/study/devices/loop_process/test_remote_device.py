@@ -11,44 +11,10 @@ from multiprocessing import Pipe
 import numpy as np
 import pytest
 
-from study.devices.clock import RealClock
 from study.devices.device import Fault
-from study.devices.loop_process import line, remote_device
+from study.devices.loop_process import line
 from study.devices.loop_process.serve import DeviceServer
-from study.devices.safe import SafeDevice
 from study.errors import DeviceError, WrongUseError
-
-
-@pytest.fixture
-def behind(rigs, rig):
-    """The device on the other side of the pipes."""
-    return SafeDevice(rig, rigs.SETTINGS, RealClock())
-
-
-@pytest.fixture
-def rig(rigs):
-    return rigs.HeldForceRig()
-
-
-@pytest.fixture
-def device(behind, served, rigs):
-    with contextlib.closing(served.remote(behind, rigs.SETTINGS)) as device:
-        yield device
-
-
-@pytest.fixture
-def impatient(monkeypatch):
-    for name in ("ANSWER_S", "STOP_S", "CLOSE_S"):
-        monkeypatch.setattr(remote_device, name, 0.2)
-    monkeypatch.setattr(line, "GRACE_S", 0.1)
-
-
-@pytest.fixture
-def hang():
-    """Blocks its caller until the test is over."""
-    event = threading.Event()
-    yield event
-    event.set()
 
 
 class OddError(Exception):
@@ -167,7 +133,7 @@ def check_it_is_lost(device, rigs, said: str) -> None:
         with pytest.raises(DeviceError, match=f"The device was lost.*{said}.*hapteq resume"):
             call()
     device.stop()
-    assert device.fault() is Fault.STOPPED
+    assert device.fault() is Fault.LOST  # no stop was answered
     assert not asked
 
 
