@@ -87,7 +87,7 @@ class RemoteDevice:
         before, self._held = self._held, stimulus
         try:
             self._ask(self._process.work, "hold", stimulus)
-        except DeviceError:
+        except Exception:
             self._held = before
             raise
 
@@ -123,21 +123,22 @@ class RemoteDevice:
         except LoopGoneError as gone:
             self._lose(gone)
             played = Played(recording=None, health=self._health_of_the_lost())
-        finally:
-            if self._releasing.over:
-                self._releasing, self._held = None, None
+        except Exception:  # was raised there. After an interruption the answer is asked for again.
+            self._releasing = self._held = None
+            raise
         self._noted(played.health)
+        self._releasing = self._held = None
         return played
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
         self._must_be_idle()
         call = self._process.work.begin("play", commands)
-        patience_s = self._patience_s(commands.duration_s)
+        patience_s = self._patience_s(0.0)
         try:
-            played: Played = call.answer(patience_s, on_progress)
+            played: Played = call.answer(patience_s, on_progress, sending_s=SENT_S_PER_RECORDED_S * commands.duration_s)
         except LoopGoneError as gone:
             self._lose(gone)
-            raise self._lost_error() from gone
+            raise self._absence() from gone
         except BaseException:
             if not call.over:
                 self._break_off(call, patience_s)
@@ -196,7 +197,7 @@ class RemoteDevice:
             return line.begin(name, *arguments).answer(ANSWER_S if patience_s is None else patience_s)
         except LoopGoneError as gone:
             self._lose(gone)
-            raise self._lost_error() from gone
+            raise self._absence() from gone
 
     def _break_off(self, call: Call, patience_s: float) -> None:
         try:
@@ -225,12 +226,12 @@ class RemoteDevice:
             raise DeviceError("The device cannot do this now", "It is still playing.", "Call release first.")
 
     def _must_be_there(self) -> None:
-        if self._closed:
-            raise DeviceError("The device cannot do this now", "The device is closed.", "Open it again.")
-        if self._lost:
-            raise self._lost_error()
+        if self._closed or self._lost:
+            raise self._absence()
 
-    def _lost_error(self) -> DeviceError:
+    def _absence(self) -> DeviceError:
+        if self._closed:
+            return DeviceError("The device cannot do this now", "The device is closed.", "Open it again.")
         return DeviceError(
             "The device was lost",
             f"The process of its loop is gone: {self._lost}.",

@@ -1,0 +1,133 @@
+"""This side of a pipe: what is kept of an answer, what cannot be sent or read, and what is begun too late."""
+
+import threading
+from multiprocessing import Pipe
+
+import pytest
+
+from study.devices.device import Fault
+from study.devices.loop_process import start
+from study.devices.loop_process.line import VALUE, Line, LoopGoneError
+from study.devices.loop_process.start import LoopProcess
+from study.errors import DeviceError
+
+
+@pytest.fixture
+def pipe():
+    """A line, and the other end of its pipe."""
+    ours, theirs = Pipe()
+    line = Line(ours, "test")
+    yield line, theirs
+    line.end()
+    theirs.close()
+
+
+def test_an_answer_that_comes_together_with_an_interruption_is_kept(pipe, monkeypatch):
+    line, theirs = pipe
+    call = line.begin("ask")
+    theirs.send((VALUE, 7))
+    take = call._next
+
+    def interrupted(*patience) -> None:
+        take(*patience)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(call, "_next", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        call.answer(20.0)
+    monkeypatch.setattr(call, "_next", take)
+    assert call.answer(0.0, grace_s=0.0) == 7
+
+
+def test_only_what_carries_much_is_waited_for_longer(pipe, monkeypatch):
+    call = pipe[0].begin("play")
+    shares = iter([0.0, 0.5, 1.0])
+    waited_s: list[float] = []
+
+    def take(patience_s: float, grace_s: float | None) -> float | None:
+        waited_s.append(patience_s)
+        if (share := next(shares, None)) is None:
+            call.hear((VALUE, 7))
+        return share
+
+    monkeypatch.setattr(call, "_next", take)
+    assert call.answer(3.0, sending_s=2.0) == 7
+    assert waited_s == [5.0, 3.0, 3.0, 5.0]
+
+
+def test_a_process_that_cannot_be_killed_is_not_said_to_be_gone(monkeypatch):
+    process = LoopProcess()
+    monkeypatch.setattr(start, "DEAD_S", 0.1)
+    monkeypatch.setattr(process._process, "kill", lambda: None)
+    try:
+        assert process.end(0.0) == "was killed, and has not ended even so"
+    finally:
+        monkeypatch.undo()
+        process.hang_up()
+        assert process.end(0.0) == "and was killed"
+
+
+def test_a_release_whose_answer_came_with_an_interruption_is_asked_for_again(device, rigs, monkeypatch):
+    device.hold(rigs.push())
+    device.keep_alive()
+    noted = device._noted
+
+    def interrupted(health) -> None:
+        monkeypatch.setattr(device, "_noted", noted)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(device, "_noted", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        device.release()
+    assert device.release().health.ticks > 0
+    with pytest.raises(DeviceError, match="Nothing is held"):
+        device.release()
+
+
+def test_what_cannot_be_sent_raises_where_it_was_asked_and_loses_nothing(device, rigs):
+    with pytest.raises(Exception, match="pickle"):
+        device.play(lambda: None)
+    with pytest.raises(Exception, match="pickle"):
+        device.hold(lambda: None)
+    assert device.fault() is Fault.NONE
+    device.hold(rigs.push())
+    device.keep_alive()
+    device.release()
+
+
+def test_why_an_answer_cannot_be_read_is_said(pipe):
+    line, theirs = pipe
+    call = line.begin("ask")
+    theirs.send_bytes(b"no pickle")
+    with pytest.raises(LoopGoneError, match=r"its answer cannot be read \(UnpicklingError: .+\)"):
+        call.answer(20.0)
+
+
+def test_a_call_after_the_end_of_its_line_is_refused_at_once(pipe, monkeypatch):
+    line, theirs = pipe
+    waiting = line.begin("ask")
+    line.end()
+    queued = line.begin("ask")
+    theirs.send((VALUE, 7))
+    assert waiting.answer(20.0) == 7
+    assert line._ended.wait(20.0)
+    for call in (queued, line.begin("ask")):
+        with pytest.raises(LoopGoneError, match="it was given up"):
+            call.answer(20.0)
+
+
+def test_a_call_that_races_with_a_close_says_that_the_device_is_closed(behind, served, rigs, hang, monkeypatch):
+    monkeypatch.setattr(behind, "hold", lambda stimulus: hang.wait())
+    device = served.remote(behind, rigs.SETTINGS)
+    errors: list[DeviceError] = []
+
+    def hold() -> None:
+        with pytest.raises(DeviceError) as refusal:
+            device.hold(rigs.push())
+        errors.append(refusal.value)
+
+    holding = threading.Thread(target=hold)
+    holding.start()
+    device.close()
+    holding.join()
+    assert "The device is closed" in str(errors[0])
