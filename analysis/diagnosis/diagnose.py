@@ -50,7 +50,7 @@ def diagnose(
     if settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.0)
         known = settings.balances
-        balances = known if known is not None else _balances(recordings, settings)
+        balances = known if known is not None else _balances(recordings, settings, map_)
         for number, look in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
             progress("fitting the named laws", 0.2 + 0.3 * number)
             context = search_context_of(recordings[0], look, settings, map_)
@@ -129,8 +129,8 @@ def _search_beside_clean(
     return _assemble(recordings, settings, look, replace(seen, result=result), ())
 
 
-def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings) -> tuple[Balance, ...]:
-    weighed = partial(find_balances, recordings, frozenset(settings.without), settings.time_left)
+def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper) -> tuple[Balance, ...]:
+    weighed = partial(find_balances, recordings, frozenset(settings.without), settings.time_left, map_)
     return settings.guard.part(BALANCE, "its weighing", weighed, ())
 
 

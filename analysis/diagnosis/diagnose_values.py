@@ -44,7 +44,7 @@ def diagnose_values(
     found, remarks = every.recordings[: len(given)], (*ready.remarks, *every.remarks)
     settings = replace(settings, names=names, clean=every.recordings[len(given) :])
     if model is None:
-        first = _first_model(found, settings, progress)
+        first = _first_model(found, settings, map_, progress)
         model, remarks = first.model, (*remarks, *first.remarks)
         settings = replace(settings, fitted=True, balances=first.balances)
     else:
@@ -53,9 +53,11 @@ def diagnose_values(
     return replace(findings, remarks=(*remarks, *findings.remarks))
 
 
-def _first_model(recordings: Sequence[Recording], settings: DiagnosisSettings, progress: Progress) -> FirstModel:
+def _first_model(
+    recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper, progress: Progress
+) -> FirstModel:
     if not settings.clean:
-        return first_model_of(recordings, settings.without, settings.time_left, progress)
+        return first_model_of(recordings, settings.without, settings.time_left, progress, map_)
     what = "fitting a linear model, as none was given"
     return FirstModel(
         *fit_first_linear_model(settings.clean, lambda share: progress(what, share), "the clean recordings")

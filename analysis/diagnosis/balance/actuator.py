@@ -11,6 +11,8 @@ of the motion beside it, and is named where it takes most of what any of them le
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import cast
 
 import numpy as np
 
@@ -33,7 +35,7 @@ from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import StructureSearch
-from analysis.diagnosis.types import TimeBudget
+from analysis.diagnosis.types import Mapper, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
@@ -55,6 +57,14 @@ class _InverseBalance:
     """A balance solved for the acceleration along its axis."""
 
     search: StructureSearch
+    map_: Mapper = map
+
+    def total_errors(self, laws: Sequence[CommandLaw], beside: Sequence[int]) -> list[float]:
+        """Of each law: its cross-validated sum of squares."""
+        return cast(list[float], list(self.map_(partial(self.total_error, beside=beside), laws)))
+
+    def total_error(self, law: CommandLaw, beside: Sequence[int]) -> float:
+        return float(self.errors(law, beside, False).sum())
 
     def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
         """(blocks,): sums of squares. judged: on what nothing was fitted to; else each fold's."""
@@ -108,12 +118,17 @@ class Actuator:
 
 
 def find_balance(
-    motions: Sequence[Motion], axis: int, rotational: bool, without: frozenset[str], time_left: TimeBudget
+    motions: Sequence[Motion],
+    axis: int,
+    rotational: bool,
+    without: frozenset[str],
+    time_left: TimeBudget,
+    map_: Mapper = map,
 ) -> Balance:
     """The balance of one axis: laws of the motion and, where one earns it, a law of the command, through which the
     commanded force is then passed before the laws of the motion are searched again."""
     balance = judge_laws(search_beside_linear(motions, axis, rotational, without, time_left))
-    actuator = find_actuator(balance, without) if balance.tested else None
+    actuator = find_actuator(balance, without, map_) if balance.tested else None
     if actuator is None:
         return balance
     judged = actuator.judged
@@ -138,7 +153,7 @@ def _pass_through_law(motion: Motion, axis: int, own: int, law: CommandLaw) -> M
     return replace(motion, force=force)
 
 
-def find_actuator(balance: Balance, without: frozenset[str]) -> Actuator | None:
+def find_actuator(balance: Balance, without: frozenset[str], map_: Mapper = map) -> Actuator | None:
     """The law of the command that leaves the smallest error; None where the balance has no clock, no command varies,
     or no law of the command is allowed."""
     search = balance.search
@@ -148,14 +163,14 @@ def find_actuator(balance: Balance, without: frozenset[str]) -> Actuator | None:
     laws = [law for law in known if law.effect not in without]
     if not np.isfinite(regression.motions[0].band_hz) or not laws or not np.any(commands):
         return None
-    turned = _InverseBalance(search)
+    turned = _InverseBalance(search, map_)
     instead = _in_place_of_motion(turned, laws, tuple(each.place for each in balance.named))
     if instead is not None:
         return instead
-    beside = min(_sums_to_try(search), key=lambda each: float(turned.errors(AS_COMMANDED, each, False).sum()))
+    beside = min(_sums_to_try(search), key=lambda each: turned.total_error(AS_COMMANDED, each))
     best = _best_of_each(turned, laws, beside)
     law = min(best, key=lambda each: each[0])[1]
-    alone, held = (float(turned.errors(law, each, False).sum()) for each in ((), beside))
+    alone, held = (turned.total_error(law, each) for each in ((), beside))
     rivals = [other for _, other in best if other is not law]
     judged = _judge_law(turned, law, rivals, (beside, beside))
     return Actuator(law, judged, bool(beside) and alone <= held / (1 - TOLD))
@@ -193,24 +208,30 @@ def _best_of_each(
     turned: _InverseBalance, laws: Sequence[CommandLaw], beside: tuple[int, ...]
 ) -> list[tuple[float, CommandLaw]]:
     best: dict[str, tuple[float, CommandLaw]] = {}
-    for law in laws:
-        error = float(turned.errors(law, beside, False).sum())
+    for law, error in zip(laws, turned.total_errors(laws, beside), strict=True):
         if law.effect not in best or error < best[law.effect][0]:
             best[law.effect] = error, law
-    refined = [_refine_law(turned, *found, beside) for found in best.values()]
+    moved = cast(
+        list[tuple[float, dict[str, float]]], list(turned.map_(partial(_refined_values, turned, beside), best.values()))
+    )
+    refined = [
+        (error, replace(law, values=values)) for (_, law), (error, values) in zip(best.values(), moved, strict=True)
+    ]
     plain = min((error for error, law in refined if not law.rich), default=np.inf)
     return [(error, law) for error, law in refined if not law.rich or error < (1 - TOLD) * plain]
 
 
-def _refine_law(
-    turned: _InverseBalance, error: float, law: CommandLaw, beside: tuple[int, ...]
-) -> tuple[float, CommandLaw]:
+def _refined_values(
+    turned: _InverseBalance, beside: tuple[int, ...], found: tuple[float, CommandLaw]
+) -> tuple[float, dict[str, float]]:
+    """Error and numbers of a law after moving each number for as long as that helps."""
+    error, law = found
     for _ in range(ROUNDS):
-        tried = [(float(turned.errors(other, beside, False).sum()), other) for other in neighbours_of(law)]
+        tried = [(turned.total_error(other, beside), other) for other in neighbours_of(law)]
         if not tried or min(tried, key=lambda each: each[0])[0] >= error * (1 - 1e-3):
             break
         error, law = min(tried, key=lambda each: each[0])
-    return error, law
+    return error, law.values
 
 
 def _judge_law(

@@ -11,7 +11,7 @@ from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motion_band_hz, motions_of
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.types import TimeBudget
+from analysis.diagnosis.types import Mapper, TimeBudget
 from equalizer.signals.recording import Recording
 
 NARROWER = 0.5
@@ -19,7 +19,7 @@ NARROWER = 0.5
 
 
 def find_balances(
-    recordings: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
+    recordings: Sequence[Recording], without: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> tuple[Balance, ...]:
     """One force balance per command; empty where no motion was measured, or too little of it. Where no law is named in
     the band that noise allows, the narrower band in which the device moves is tried: edges of the command above it
@@ -27,16 +27,20 @@ def find_balances(
     try:
         records = observed_parts(recordings, len(recordings[0].response.channels))
         motions = motions_of(records)
-        found = _balances_per_axis(motions, recordings, without, time_left)
+        found = _balances_per_axis(motions, recordings, without, time_left, map_)
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
     if any(balance.named or not balance.tested for balance in found) or not time_left():
         return found
-    return _balances_in_motion_band(records, motions, without, time_left) or found
+    return _balances_in_motion_band(records, motions, without, time_left, map_) or found
 
 
 def _balances_in_motion_band(
-    records: Sequence[Observed], motions: Sequence[Motion], without: frozenset[str], time_left: TimeBudget
+    records: Sequence[Observed],
+    motions: Sequence[Motion],
+    without: frozenset[str],
+    time_left: TimeBudget,
+    map_: Mapper,
 ) -> tuple[Balance, ...]:
     """The balances in the band in which the device moves; empty where it is hardly narrower, or no law is named."""
     narrow_hz = motion_band_hz(motions)
@@ -44,7 +48,7 @@ def _balances_in_motion_band(
         return ()
     try:
         found = _balances_per_axis(
-            motions_of(records, narrow_hz), [each.recording for each in records], without, time_left
+            motions_of(records, narrow_hz), [each.recording for each in records], without, time_left, map_
         )
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
@@ -52,11 +56,17 @@ def _balances_in_motion_band(
 
 
 def _balances_per_axis(
-    motions: Sequence[Motion], recordings: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
+    motions: Sequence[Motion],
+    recordings: Sequence[Recording],
+    without: frozenset[str],
+    time_left: TimeBudget,
+    map_: Mapper,
 ) -> tuple[Balance, ...]:
     turning = any(unit.startswith("rad") for unit in recordings[0].response.units)
     turning |= any(unit.startswith("N m") for unit in recordings[0].command.units)
     axes = range(len(recordings[0].command.channels))
     if any(recording.meta.get("imposed") for recording in recordings):
         return tuple(judge_laws(search_beside_linear(motions, axis, turning, without, time_left)) for axis in axes)
-    return tuple(doubt_laws_of_actuator(find_balance(motions, axis, turning, without, time_left)) for axis in axes)
+    return tuple(
+        doubt_laws_of_actuator(find_balance(motions, axis, turning, without, time_left, map_)) for axis in axes
+    )

@@ -12,7 +12,7 @@ from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.first_model.model_of_balance import FirstModel, plain_model
 from analysis.diagnosis.first_model.model_structures import StructureRefused, balance_recordings, fit_structure
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
-from analysis.diagnosis.types import Progress, TimeBudget
+from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
 from equalizer.identification.mechanical.open_tolerance import widen_tolerance
@@ -36,13 +36,17 @@ UNTIMED_SAID = (
 
 
 def first_model_of(
-    recordings: Sequence[Recording], without: Sequence[str], time_left: TimeBudget, on_progress: Progress
+    recordings: Sequence[Recording],
+    without: Sequence[str],
+    time_left: TimeBudget,
+    on_progress: Progress,
+    map_: Mapper = map,
 ) -> FirstModel:
     """From the force balance where that names laws along the motion of one body per command; else by a fit to spectra,
     which takes longer. recordings: in the form of `plain_form`. Raises NothingToDiagnose where they carry no model."""
     _require_no_weight(recordings)
     on_progress("weighing laws in the force balance", 0.0)
-    balances = find_balances(recordings, frozenset(without), time_left)
+    balances = find_balances(recordings, frozenset(without), time_left, map_)
     if any(time_unit(each) != "s" for each in recordings) and (still := _massless_model(recordings)) is not None:
         return FirstModel(still, (UNTIMED_SAID,), balances)
     model = plain_model(balances, recordings[0], "fitted to these recordings")

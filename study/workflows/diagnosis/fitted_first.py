@@ -11,6 +11,7 @@ from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModel
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error
+from study.workflows.forked_map import map_forked
 
 GIVE_ONE = "Give a model of the device alone with --model, or a recording that carries one."
 
@@ -22,7 +23,7 @@ def first_model_of(
     time_left, guard = bounds
 
     def weighed() -> FirstModel | None:
-        return fitted_first.first_model_of(found.recordings, without, time_left, on_progress)
+        return fitted_first.first_model_of(found.recordings, without, time_left, on_progress, map_forked)
 
     with _translate_refusals():
         first = guard.part(BALANCE, "the first model", weighed, None, (NothingToDiagnose,))
