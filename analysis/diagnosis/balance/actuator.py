@@ -34,8 +34,9 @@ from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.balance.structures import StructureSearch
-from analysis.diagnosis.types import Mapper, TimeBudget
+from analysis.diagnosis.balance.structures import SLIDING, StructureSearch
+from analysis.diagnosis.settings import STILL_SHARE
+from analysis.diagnosis.types import Mapper, Mask, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
@@ -48,6 +49,7 @@ TOLD = 0.3
 """Share of its own error by which a rival must leave more to be told from it."""
 ROUNDS = 8
 NEEDLESS = "a law of the command leaves as little without it"
+HOLDS_AT_REST = (*SLIDING, "presliding_hysteresis")
 NO_COLUMN = -1
 """Place in a regression of a law that changes the force itself."""
 
@@ -57,7 +59,10 @@ class _InverseBalance:
     """A balance solved for the acceleration along its axis."""
 
     search: StructureSearch
-    map_: Mapper = map
+    map_: Mapper
+    rubs: bool
+    """Whether a friction is among the laws of the motion: rest is no evidence then, for friction holds any force up to
+    its level there, and a dead band gives none."""
 
     def total_errors(self, laws: Sequence[CommandLaw], beside: Sequence[int]) -> list[float]:
         """Of each law: its cross-validated sum of squares."""
@@ -86,11 +91,22 @@ class _InverseBalance:
         regression = self.search.regression
         motions, own = regression.motions, regression.beside.own
         aims = [columns[:, own] for columns in regression.columns]
-        fit, test = ([motion.valid_samples(mask) for motion, mask in zip(motions, masks, strict=True)]
-                     for masks in ([m.fit for m in motions], [m.test for m in motions]))  # fmt: skip
+        fit, test = (
+            [motion.valid_samples(mask & moves) for motion, mask, moves in zip(motions, masks, moving, strict=True)]
+            for moving in [self._moving()]
+            for masks in ([m.fit for m in motions], [m.test for m in motions])
+        )
         mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
         units = column_scale(rows, fit), mean
         return blocks_of(rows, aims, fit, units), blocks_of(rows, aims, test, units)
+
+    def _moving(self) -> list[Mask]:
+        """(n,) per motion: samples that are evidence."""
+        regression = self.search.regression
+        speeds = [motion.velocity[:, regression.beside.own] for motion in regression.motions]
+        used = np.concatenate([speed[motion.fit] for speed, motion in zip(speeds, regression.motions, strict=True)])
+        least = STILL_SHARE * float(np.mean(used**2)) if self.rubs else -1.0
+        return [speed**2 > least for speed in speeds]
 
     def _rows(self, law: CommandLaw, laws: Sequence[int]) -> list[FloatArray]:
         regression, found = self.search.regression, []
@@ -163,7 +179,7 @@ def find_actuator(balance: Balance, without: frozenset[str], map_: Mapper = map)
     laws = [law for law in known if law.effect not in without]
     if not np.isfinite(regression.motions[0].band_hz) or not laws or not np.any(commands):
         return None
-    turned = _InverseBalance(search, map_)
+    turned = _InverseBalance(search, map_, any(each.law.effect in HOLDS_AT_REST for each in balance.laws))
     instead = _in_place_of_motion(turned, laws, tuple(each.place for each in balance.named))
     if instead is not None:
         return instead

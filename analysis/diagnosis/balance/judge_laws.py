@@ -85,7 +85,28 @@ def judge_laws(search: StructureSearch) -> Balance:
     if not blocks_to_judge(regression):
         alone = float(np.sqrt(search.linear.error / _signal_power(regression)))
         return Balance(search, search.linear, (), (), alone, alone, alone, search.complete, tested=False)
-    chosen = plainest_structure(search)
+    judged = _judge_structure(search, plainest_structure(search))
+    if judged.named or not _shares_family(regression, judged.chosen.laws):
+        return judged
+    # Two laws that act alike share what either could take alone, so that neither seems needed beside the other.
+    apart = tuple(each for each in search.ranked if not _shares_family(regression, each.laws))
+    best = min(apart, key=lambda each: each.error, default=search.linear)
+    single = _judge_structure(search, plainest_structure(replace(search, ranked=apart, best=best)))
+    return single if single.named else judged
+
+
+def _shares_family(regression: Regression, laws: Sequence[int]) -> bool:
+    """Whether two of these laws are of one family and along one channel."""
+    keys = [regression.laws[number].key for number in laws]
+    return any(
+        channel == other and effect in family_of(name) and (effect, channel) != (name, other)
+        for effect, channel in keys
+        for name, other in keys
+    )
+
+
+def _judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
+    regression = search.regression
     held = _held_out_errors(regression, chosen.laws)
     linear = _held_out_errors(regression, ())
     ceiling = _error_of_all_laws(regression, held)

@@ -59,6 +59,7 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
     ]
     if not named:
         return None
+    whole_context, context = context, context.fit_to_all()
     constant = constants_of(balances)
     given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), constant)
     before, retuned = context.with_test_score(context.candidate(given)), context.candidate(refine(context, given))
@@ -76,7 +77,7 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
             sealed = float(np.nanmax(after.score.test, initial=0.0))
             whole = repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
             judged = Judgement("explained" if whole else "partly_explained", True)
-            return SearchResult(context, explained, judged, errors=errors)
+            return SearchResult(whole_context, explained, judged, errors=errors)
         named = refit_laws(balances, [law for number, law in enumerate(named) if number != vague])
     return None
 

@@ -80,7 +80,7 @@ def list_fitting_measures(
     if time_unit(recordings[0]) != "s":
         yield FittingMeasure(model, chosen)
         return
-    if chosen.measure.name == "free simulation" and compared != "force":
+    if (chosen.measure.name == "free simulation" or chosen.measure.name.startswith("windows")) and compared != "force":
         yield FittingMeasure(model, chosen)
     if compared == "motion":
         return

@@ -43,6 +43,10 @@ class Observed:
             test[start:half] = False
         return replace(self, fit=fit, choose=choose, test=test)
 
+    def fit_to_all(self) -> "Observed":
+        """With the samples to choose by fitted to as well, for what was chosen by other means."""
+        return replace(self, fit=self.fit | self.choose, choose=self.fit | self.choose)
+
     def shorten(self) -> "Observed":
         """Cut after the last sample to fit or to choose by; the recording itself stays whole."""
         end = int(np.flatnonzero(self.fit | self.choose)[-1]) + 1 if (self.fit | self.choose).any() else len(self.fit)

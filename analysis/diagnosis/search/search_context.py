@@ -69,6 +69,14 @@ class SearchContext:
         whole = self.whole.with_records(tuple(record.unseal_half() for record in self.whole.records))
         return replace(self, measure=whole.shorten(), whole=whole)
 
+    def fit_to_all(self) -> "SearchContext":
+        """With the samples to choose by fitted to as well: what a force balance chose needs none."""
+        measure, whole = (
+            each.with_records(tuple(record.fit_to_all() for record in each.records))
+            for each in (self.measure, self.whole)
+        )
+        return replace(self, measure=measure, whole=whole)
+
     def candidate(self, fitted: Fitted) -> FittedCandidate:
         """The fit scored on the samples to fit and to choose by; its `test` is NaN."""
         return self._score(fitted, self.measure)

@@ -1,0 +1,51 @@
+"""Dry friction and a dead band of the actuator, told apart on trapezoidal moves with rests between them."""
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.balance.judge_laws import family_of
+from tests.analysis.diagnosis.balance.invented_axis import recording
+
+RATE_HZ, STEPS = 250.0, 20
+MASS_KG, DAMPING_N_S_PER_M, GAINS = 0.4, 0.3, (400.0, 25.0)
+LEVEL_N = 4.0
+
+
+def reference_m():
+    """(n,): three moves of 10 m, there and back and there, with rests."""
+    ramp, rest = np.linspace(0.0, 1.0, int(0.6 * RATE_HZ)), np.zeros(int(0.25 * RATE_HZ))
+    speed = np.concatenate([ramp, np.ones(int(1.9 * RATE_HZ)), ramp[::-1], rest])
+    whole = np.cumsum(np.concatenate([speed, -speed, speed])) / RATE_HZ
+    return 10.0 * whole / whole.max()
+
+
+def moved(friction_n, dead_band_n, seed):
+    """A motor under position control; noise of a tenth in what is recorded of its command."""
+    random, aims = np.random.default_rng(seed), reference_m()
+    position, command = np.empty(len(aims)), np.empty(len(aims))
+    q = v = 0.0
+    for k, (aim, noise) in enumerate(
+        zip(aims.tolist(), (1e-4 * random.standard_normal(len(aims))).tolist(), strict=True)
+    ):
+        position[k] = q + noise
+        command[k] = GAINS[0] * (aim - position[k]) - GAINS[1] * v
+        force = np.sign(command[k]) * max(abs(command[k]) - dead_band_n, 0.0)
+        for _ in range(STEPS):
+            free = v + (force - DAMPING_N_S_PER_M * v) / MASS_KG / (STEPS * RATE_HZ)
+            v = np.sign(free) * max(abs(free) - friction_n / MASS_KG / (STEPS * RATE_HZ), 0.0)
+            q += v / (STEPS * RATE_HZ)
+    command += 0.1 * command.std() * random.standard_normal(len(command))
+    return recording(command[:, None], position[:, None], RATE_HZ)
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
+def test_friction_that_holds_a_motor_between_its_moves_is_no_dead_band(balance_of, seed):
+    (balance,) = balance_of(moved(LEVEL_N, 0.0, seed))
+    (named,) = balance.named
+    assert named.law.effect in family_of("coulomb_friction")
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
+def test_a_dead_band_beside_which_the_motor_coasts_is_no_friction(balance_of, seed):
+    (balance,) = balance_of(moved(0.0, LEVEL_N, seed))
+    assert not [law for law in balance.named if law.law.effect != "force_deadband"]
