@@ -145,6 +145,12 @@ def fit(
     return best
 
 
+def expected_gain(gained: float, before: float) -> float:
+    """Share of the cost that the next fit may take, after `gained` by the last and `before` by the one before it: gains
+    shrink about geometrically."""
+    return gained * min(gained / before, 1.0) if before > 0 else gained
+
+
 def evaluate_fit(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis) -> Fitted:
     residuals = measure.residuals(tuning.tune(deviations), hypothesis.placed_effects())
     return Fitted(hypothesis, deviations, residuals, _cost(residuals_to_fit(measure, residuals), deviations))

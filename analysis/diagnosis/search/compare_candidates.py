@@ -5,7 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import similar_hypotheses
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, residuals_to_fit
+from analysis.diagnosis.errors.output_error import (
+    Fitted,
+    Sensitivity,
+    evaluate_fit,
+    expected_gain,
+    fit,
+    residuals_to_fit,
+)
 from analysis.diagnosis.search.search_context import FITTING, FittedCandidate, SearchContext, sensitivity_at
 from analysis.diagnosis.search.short_recordings import short_recordings_of
 from analysis.diagnosis.settings import (
@@ -173,10 +180,8 @@ def _refine_from(
     for _ in range(MOST_REFRESHED):
         better = fit(context.measure, context.tuning, best, there, SECOND_ROUNDS, context.map_)
         gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
-        # Gains shrink about geometrically, so that the next one can be predicted.
-        foreseen, before = gained * min(gained / before, 1.0) if before > 0 else gained, gained
-        best = better
-        settled = (foreseen if complete else gained) < _least_gain(best)
+        best, expected, before = better, expected_gain(gained, before), gained
+        settled = (expected if complete else gained) < _least_gain(best)
         if (complete and settled) or (context.candidate(best).score.worst_channel <= NO_SECOND_START and settled):
             break
         if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:

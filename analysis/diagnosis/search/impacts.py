@@ -15,7 +15,7 @@ from analysis.diagnosis.errors.excited_segments import select_excited_segments
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, hypothesis_of_claim
-from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
+from analysis.diagnosis.errors.output_error import evaluate_fit, expected_gain, gather_evidence
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.search.explain import Explanation, Statistic
@@ -98,10 +98,8 @@ def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
         view = replace(view, by_deviations=_by_deviations(view, best))
         better = fit_band_power(view, best, STEPS)
         gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
-        # Gains shrink about geometrically, so that the next one can be predicted.
-        foreseen, before = gained * min(gained / before, 1.0) if before > 0 else gained, gained
-        best = better
-        if foreseen <= GAINED:
+        best, expected, before = better, expected_gain(gained, before), gained
+        if expected <= GAINED:
             break
     return best
 

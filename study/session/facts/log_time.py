@@ -52,32 +52,23 @@ def elapsed_s(before: Moment, now: Moment) -> float:
     wall clock."""
     if before.monotonic_s is not None and now.monotonic_s is not None:
         return max(0.0, now.monotonic_s - before.monotonic_s)
-    return max(0.0, _wall_s(before, now))
+    return max(0.0, seconds_between(before.utc, now.utc))
 
 
 def clock_step(before: Moment, now: Moment, between_sittings: bool = False) -> ClockStep | None:
     """By how much the wall clock was set between two entries, or None; without monotonic times only a step back can
     be detected."""
-    wall_s = _wall_s(before, now)
+    wall_s = seconds_between(before.utc, now.utc)
     monotonic = before.monotonic_s is not None and now.monotonic_s is not None
     by_s = wall_s - elapsed_s(before, now) if monotonic else min(0.0, wall_s)
     return ClockStep(now.utc, by_s, between_sittings) if abs(by_s) >= STEP_S else None
 
 
-def minutes_between(first_utc: str, second_utc: str) -> float:
-    """Minutes by the wall clock: negative if it was set back. Both ISO 8601; 0 if the first is empty."""
+def seconds_between(first_utc: str, second_utc: str) -> float:
+    """By the wall clock: negative if it was set back. Both ISO 8601; 0 if the first is empty."""
     if not first_utc:
         return 0.0
-    return seconds_between(first_utc, second_utc) / 60.0
-
-
-def seconds_between(first_utc: str, second_utc: str) -> float:
-    """By the wall clock: negative if it was set back. Both ISO 8601."""
     return (datetime.fromisoformat(second_utc) - datetime.fromisoformat(first_utc)).total_seconds()
-
-
-def _wall_s(before: Moment, now: Moment) -> float:
-    return 60.0 * minutes_between(before.utc, now.utc)
 
 
 def _duration(seconds: float) -> str:

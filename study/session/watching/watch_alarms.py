@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from protocols.trial import Phase, Trial, TrialStatus
-from study.session.facts.log_time import Moment, elapsed_s, minutes_between
+from study.session.facts.log_time import Moment, elapsed_s, seconds_between
 from study.session.facts.void_reasons import computer_too_busy
 from study.session.watching.live import Live
 from study.session.watching.watch_view import ON, Alarm, Exposure, Standing
@@ -61,7 +61,7 @@ class Situation:
         return elapsed_s(begun, Moment(self.now_utc))
 
     def seconds_since(self, utc: str) -> float:
-        return 60.0 * minutes_between(utc, self.now_utc)
+        return seconds_between(utc, self.now_utc)
 
 
 def alarms_of(now: Situation, before: tuple[Alarm, ...]) -> tuple[Alarm, ...]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from protocols.trial import Phase
-from study.session.facts.log_time import Moment, minutes_between
+from study.session.facts.log_time import Moment, seconds_between
 from study.session.state.sitting_state import SittingState, dose_now, pass_time
 from study.session.state.vibration_dose import a8_mps2
 from study.session.views.archive_views import TURNED_AWAY
@@ -159,4 +159,4 @@ def _until_now(sitting: SittingState, live: Live | None, now_utc: str) -> Sittin
 
 def _seconds(since_utc: str, now_utc: str) -> float:
     """Seconds between two times, never negative: the clocks of two computers differ."""
-    return max(0.0, 60.0 * minutes_between(since_utc, now_utc))
+    return max(0.0, seconds_between(since_utc, now_utc))

@@ -6,7 +6,7 @@ from pathlib import Path
 from study.errors import StudyError
 from study.session.facts.events import SessionOpened, parse_event
 from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained
-from study.session.facts.log_time import minutes_between
+from study.session.facts.log_time import seconds_between
 from study.session.state.draw_check import LogContradiction
 from study.session.watching.live import Live
 from study.session.watching.requests import Request
@@ -131,9 +131,9 @@ class Follower:
     def _is_written(self, live: Live | None, now_utc: str) -> bool | None:
         if self._missing:
             return False
-        if live is not None and 60.0 * minutes_between(live.utc, now_utc) <= SILENT_AFTER_S:
+        if live is not None and seconds_between(live.utc, now_utc) <= SILENT_AFTER_S:
             self._writer = None
-        elif 60.0 * abs(minutes_between(self._probed_utc, now_utc)) >= PROBE_EVERY_S or not self._probed_utc:
+        elif abs(seconds_between(self._probed_utc, now_utc)) >= PROBE_EVERY_S or not self._probed_utc:
             self._probed_utc = now_utc
             self._writer = is_log_locked(self._folder.log)
         return self._writer
