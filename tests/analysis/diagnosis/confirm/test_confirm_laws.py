@@ -110,6 +110,7 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
     context = SimpleNamespace(
         measure=None, whole=None, tuning=SimpleNamespace(names=()), candidate=ends_at, with_test_score=lambda each: each
     )
+    context.fit_to_all = lambda: context
     found = by_balance.search_by_balance(context, (balance,), False)
     assert (found is not None) == is_named
 

@@ -1,5 +1,7 @@
 """Which samples count for what."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -127,3 +129,13 @@ def test_errors_are_counted_in_noise_and_in_a_share_of_the_signal():
     loud = np.full((100, 1), 10.0)
     assert error_units(loud, np.array([1.0])) == pytest.approx(np.hypot(1.0, 10 * MODEL_FLOOR))
     assert error_units(loud, np.array([0.0])) == pytest.approx(10 * MODEL_FLOOR)
+
+
+def test_what_was_chosen_by_other_means_is_fitted_to_all_but_the_held_out_samples():
+    observed = observe(replace(recording(np.zeros((1000, 2))), segments=(at(0, 600), at(600, 1000, "test"))), 2)
+    whole = observed.fit_to_all()
+    assert (whole.fit == (observed.fit | observed.choose)).all()
+    assert whole.fit[:600].all()
+    assert (whole.choose == whole.fit).all()
+    assert (whole.test == observed.test).all()
+    assert not (whole.fit & whole.test).any()
