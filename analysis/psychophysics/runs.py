@@ -6,11 +6,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from protocols.definition.staircase_rule import StaircaseRule
-from protocols.procedure.staircase import StaircaseState, begin, is_finished, level_n, step
+from protocols.procedure.staircase import StaircaseState, begin, is_finished, level_n, step, to_db
 from protocols.trial import AT_WILL, Phase, Trial, TrialStatus
 
 LEVEL_TOLERANCE = 1e-4
 """Relative: a thousandth of a dB. Covers rounding in a table, and is far below any step."""
+
+
+ROUNDING_DB = 1e-3
+"""Rounding in a table, as `LEVEL_TOLERANCE`."""
 
 
 class InconsistentTrialsError(ValueError):
@@ -38,8 +42,12 @@ class Run:
     """Presentations that the participant made void: asked for again, paused, left, answered too late or too early."""
 
 
-def recompute_runs(trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = Phase.TEST) -> tuple[Run, ...]:
-    """All runs of one phase, in the order in which they first occur.
+def recompute_runs(
+    trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = Phase.TEST, rove_db: float = 0.0
+) -> tuple[Run, ...]:
+    """rove_db: range from which the protocol draws levels around the staircase's.
+
+    All runs of one phase, in the order in which they first occur.
 
     Catch trials lie within test runs, with trial numbers of their own, and move nothing. Practice runs follow no
     staircase: a caller who asks for TRAINING leaves them out of `trials` (see `analysis.psychophysics.study_analysis`).
@@ -52,14 +60,14 @@ def recompute_runs(trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = 
     for trial in trials:
         if trial.phase in phases:
             grouped.setdefault((trial.subject, trial.session, trial.run), []).append(trial)
-    return tuple(_recompute(rows, rule) for rows in grouped.values())
+    return tuple(_recompute(rows, rule, rove_db) for rows in grouped.values())
 
 
-def _recompute(rows: list[Trial], rule: StaircaseRule) -> Run:
+def _recompute(rows: list[Trial], rule: StaircaseRule, rove_db: float) -> Run:
     first = rows[0]
     counted = tuple(sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial))
     _refuse_strange_rows(rows, counted)
-    state = _replay_answers(counted, rule)
+    state = _replay_answers(counted, rule, rove_db)
     steering = [trial for trial in rows if trial.phase is not Phase.CATCH]
     return Run(
         subject=first.subject,
@@ -75,7 +83,7 @@ def _recompute(rows: list[Trial], rule: StaircaseRule) -> Run:
     )
 
 
-def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule) -> StaircaseState:
+def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule, rove_db: float) -> StaircaseState:
     state = begin(rule)
     for trial in counted:
         if is_finished(rule, state):
@@ -88,6 +96,7 @@ def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule) -> Staircas
         if trial.phase is Phase.CATCH:
             _refuse_weak_catch_trial(trial, rule)
             continue
+        _refuse_level_beyond_roving(trial, rove_db)
         expected_n = level_n(rule, state)
         if not math.isclose(trial.staircase_n, expected_n, rel_tol=LEVEL_TOLERANCE):
             name = "level_n" if trial.nominal_n is None else "nominal_n"
@@ -97,6 +106,19 @@ def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule) -> Staircas
             )
         state = step(rule, state, trial.correct)
     return state
+
+
+def _refuse_level_beyond_roving(trial: Trial, rove_db: float) -> None:
+    """Half of the range lies on either side of the staircase's level."""
+    if trial.nominal_n is None:
+        return
+    off_db = abs(to_db(trial.level_n) - to_db(trial.nominal_n)) if trial.nominal_n > 0 else math.inf
+    if rove_db == 0 or off_db > rove_db / 2 + ROUNDING_DB:
+        allowed = f"roves by {rove_db / 2:g} dB to either side" if rove_db else "roves no levels"
+        raise InconsistentTrialsError(
+            f"{_trial_text(trial)}: level_n is {trial.level_n:.6g} N around a nominal_n of {trial.nominal_n:.6g} N, "
+            f"but the protocol {allowed}; the rows belong to another protocol or were changed"
+        )
 
 
 def _refuse_weak_catch_trial(trial: Trial, rule: StaircaseRule) -> None:

@@ -135,7 +135,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
     with `split_by_population` first), and InconsistentTrialsError when rows contradict the protocol's staircase.
     """
     population, rule = _single_population(trials), protocol.staircase
-    runs = recompute_runs(trials, rule)
+    runs = recompute_runs(trials, rule, rove_db=protocol.stimulus.rove_db)
     rows = tuple(threshold_of(run, rule) for run in runs)
     tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
     table = threshold_table(rows, protocol.stimulus.frequencies_hz)

@@ -70,13 +70,13 @@ class Threshold:
     """See `analysis.psychophysics.repeated_trials.is_often`."""
 
 
-def thresholds(trials: Iterable[Trial], rule: StaircaseRule) -> tuple[Threshold, ...]:
-    """The thresholds of all test runs, recomputed from the answers.
+def thresholds(trials: Iterable[Trial], rule: StaircaseRule, rove_db: float = 0.0) -> tuple[Threshold, ...]:
+    """The thresholds of all test runs, recomputed from the answers. rove_db: as for `recompute_runs`.
 
     Raises InconsistentTrialsError (a ValueError) naming subject, session, run and trial where the rows contradict
     the rule.
     """
-    return tuple(threshold_of(run, rule) for run in recompute_runs(trials, rule, Phase.TEST))
+    return tuple(threshold_of(run, rule) for run in recompute_runs(trials, rule, Phase.TEST, rove_db))
 
 
 def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:

@@ -86,23 +86,20 @@ def judge_laws(search: StructureSearch) -> Balance:
         alone = float(np.sqrt(search.linear.error / _signal_power(regression)))
         return Balance(search, search.linear, (), (), alone, alone, alone, search.complete, tested=False)
     judged = _judge_structure(search, plainest_structure(search))
-    if judged.named or not _shares_family(regression, judged.chosen.laws):
+    if judged.named or not _shares_friction(regression, judged.chosen.laws):
         return judged
-    # Two laws that act alike share what either could take alone, so that neither seems needed beside the other.
-    apart = tuple(each for each in search.ranked if not _shares_family(regression, each.laws))
+    # Two frictions share what either could take alone, so that neither seems needed beside the other.
+    apart = tuple(each for each in search.ranked if not _shares_friction(regression, each.laws))
     best = min(apart, key=lambda each: each.error, default=search.linear)
     single = _judge_structure(search, plainest_structure(replace(search, ranked=apart, best=best)))
     return single if single.named else judged
 
 
-def _shares_family(regression: Regression, laws: Sequence[int]) -> bool:
-    """Whether two of these laws are of one family and along one channel."""
+def _shares_friction(regression: Regression, laws: Sequence[int]) -> bool:
+    """Whether two frictions along one channel are among these laws."""
     keys = [regression.laws[number].key for number in laws]
-    return any(
-        channel == other and effect in family_of(name) and (effect, channel) != (name, other)
-        for effect, channel in keys
-        for name, other in keys
-    )
+    channels = [channel for effect, channel in set(keys) if effect in family_of("coulomb_friction")]
+    return len(channels) > len(set(channels))
 
 
 def _judge_structure(search: StructureSearch, chosen: Structure) -> Balance:

@@ -7,8 +7,9 @@ clearer, which is a term of its own.
 
     logit P(answer first) = person + side (a + b level + c residual) + g residual
 
-The level is in dB from the mean of the participant's levels; g is the cue, in logits per dB. Answers follow levels and
-levels earlier answers, but the residual of a trial depends on neither.
+Spectrum and coupling are asked beside the strength, its residual with the same two terms: where the level is roved,
+what is not in proportion to it follows it. The level is in dB from the mean of the participant's levels; g is the cue,
+in logits per dB. Answers follow levels and levels earlier answers, but the residual of a trial depends on neither.
 
 Source: the regression of answers on trial-by-trial stimuli, A. J. Ahumada, J. Lovell, J. Acoust. Soc. Am. 49 (1971),
 1751-1756.
@@ -58,10 +59,17 @@ class AnswersOnDelivery:
 
 
 def answers_on_delivery(trials: DeliveredTrials) -> tuple[AnswersOnDelivery, ...]:
-    return tuple(_regress(trials, cue, values_db) for cue, values_db in trials.values_db.items())
+    strength = trials.values_db.get(Cue.INTENSITY)
+    return tuple(
+        _regress(trials, cue, values_db, None if cue is Cue.INTENSITY else strength)
+        for cue, values_db in trials.values_db.items()
+    )
 
 
-def _regress(trials: DeliveredTrials, cue: Cue, values_db: FloatArray) -> AnswersOnDelivery:
+def _regress(
+    trials: DeliveredTrials, cue: Cue, values_db: FloatArray, strength_db: FloatArray | None
+) -> AnswersOnDelivery:
+    """strength_db: asked beside the cue; None = it is the cue, or was not measured."""
     residual, known = _residuals(trials, values_db)
     n = int(known.sum())
     if n == 0:
@@ -72,8 +80,9 @@ def _regress(trials: DeliveredTrials, cue: Cue, values_db: FloatArray) -> Answer
     if sd > FLATTEST_DB:
         level = trials.nominal_db[known] - _means(trials.nominal_db[known], person)
         people = (person[:, None] == np.unique(person)).astype(np.float64)
-        others = np.column_stack([np.ones(n), level, residual / sd])
-        design = np.column_stack([people, side[:, None] * others, residual / sd])
+        beside = _strength(trials, strength_db, known)
+        others = np.column_stack([np.ones(n), level, residual / sd, beside])
+        design = np.column_stack([people, side[:, None] * others, beside, residual / sd])
         slope, error = _logistic_slope(design, answered > 0)
     if slope is None or error is None:
         return AnswersOnDelivery(trials.frequency_hz, cue, n, sd, None, None, None, None)
@@ -82,6 +91,13 @@ def _regress(trials: DeliveredTrials, cue: Cue, values_db: FloatArray) -> Answer
         trials.frequency_hz, cue, n, sd, slope / sd, (slope - half) / sd, (slope + half) / sd,
         float(2.0 * norm.sf(abs(slope / error))),
     )  # fmt: skip
+
+
+def _strength(trials: DeliveredTrials, strength_db: FloatArray | None, known: NDArray[np.bool_]) -> FloatArray:
+    """(n, 1), standardised; (n, 0) where it was not measured or did not vary."""
+    residual = np.zeros(int(known.sum())) if strength_db is None else _residuals(trials, strength_db)[0][known]
+    sd = float(residual.std())
+    return residual[:, None] / sd if sd > FLATTEST_DB else np.zeros((len(residual), 0))
 
 
 def _residuals(trials: DeliveredTrials, values_db: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:

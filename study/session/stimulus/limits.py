@@ -37,10 +37,15 @@ def limits_of_study(protocol: StudyProtocol) -> Limits:
     """Limits with a slew rate just above the steepest stimulus: the highest frequency at the cap and roved to its
     highest, during its fade."""
     stimulus = protocol.stimulus
-    highest_n = min(protocol.staircase.cap_n * 10.0 ** (stimulus.rove_db / 40.0), protocol.safety.stimulus_cap_n)
     fastest_hz = max(protocol.all_frequencies_hz)
     fade_s = min(stimulus.fade_in_s, stimulus.fade_out_s)
-    return _limits(protocol.safety, _slew(fastest_hz, highest_n, fade_s))
+    return _limits(protocol.safety, _slew(fastest_hz, highest_level_n(protocol), fade_s))
+
+
+def highest_level_n(protocol: StudyProtocol) -> float:
+    """Highest level (N) of a trial: the staircase's cap, roved to its highest."""
+    roved = float(10.0 ** (protocol.stimulus.rove_db / 40.0))
+    return min(protocol.staircase.cap_n * roved, protocol.safety.stimulus_cap_n)
 
 
 def limits_of_recording(protocol: RecordingProtocol) -> Limits:

@@ -112,7 +112,7 @@ def _as_in(path: Path, rows: tuple[Row, ...], row_type: type[Row]) -> tuple[Row,
 
 def _compute_tables(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
     """Tables of thresholds of this session, by file name."""
-    tables = {THRESHOLDS_NAME: thresholds(state.trials, state.protocol.staircase)}
+    tables = {THRESHOLDS_NAME: thresholds(state.trials, state.protocol.staircase, state.protocol.stimulus.rove_db)}
     if detection := detection_thresholds(state.trials, state.protocol):
         tables[DETECTION_NAME] = detection
     return tables

@@ -16,7 +16,7 @@ from study.devices.device import DeviceInfo
 from study.errors import StudyError
 from study.session.facts.level_scale import EqualizedFacts, LevelScale
 from study.session.state.state import SessionState
-from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, limits_of_study
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, highest_level_n, limits_of_study
 from study.session.stimulus.stimulus import direction_vector, held_stimulus
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.provenance import sha256_of
@@ -125,12 +125,12 @@ def _hardest(
     protocol: StudyProtocol, equalizer: Equalizer, direction: int, frequency_hz: float, rate_hz: float
 ) -> float:
     """Peak force for 1 m/s^2 or, if the slew limit is reached first, the equivalent force."""
-    limits, cap_n = limits_of_study(protocol), protocol.staircase.cap_n
+    limits = limits_of_study(protocol)
     vector = direction_vector(protocol.directions, direction)
     stimulus = held_stimulus(protocol.stimulus, vector, frequency_hz, 1.0, equalizer, rate_hz)
     forces = stimulus.played_once_then_loop
     steps = np.diff(np.concatenate([np.zeros((1, 3)), forces, stimulus.loop.samples[:1]]), axis=0)
-    slewing_n = _largest(steps) * rate_hz / (limits.slew_n_per_s - SPRING_SLEW_N_PER_S) * cap_n
+    slewing_n = _largest(steps) * rate_hz / (limits.slew_n_per_s - SPRING_SLEW_N_PER_S) * highest_level_n(protocol)
     return max(_largest(forces), slewing_n)
 
 

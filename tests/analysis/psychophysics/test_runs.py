@@ -141,3 +141,14 @@ def test_a_run_that_got_no_further_than_a_catch_trial_is_an_empty_run(caught_row
 
 def test_catch_trials_belong_to_no_detection_run(caught_rows, rule):
     assert recompute_runs(caught_rows, rule, Phase.DETECTION) == ()
+
+
+@pytest.mark.parametrize("rove_db", [0.0, 6.0])
+@pytest.mark.parametrize("off_db", [0.0, 2.9, 3.1, 40.0])
+def test_a_level_that_roving_cannot_have_drawn_is_refused(rows, rule, rove_db, off_db):
+    drawn = [replace(row, nominal_n=row.level_n, level_n=row.level_n * 10 ** (off_db / 20)) for row in rows]
+    if rove_db and off_db <= rove_db / 2:
+        assert recompute_runs(drawn, rule, rove_db=rove_db)[0].complete
+    else:
+        with pytest.raises(InconsistentTrialsError, match="level_n is .* around a nominal_n of"):
+            recompute_runs(drawn, rule, rove_db=rove_db)

@@ -76,3 +76,29 @@ def test_who_is_always_right_shows_nothing(template):
     sure = [replace(trial, answer=trial.direction_shown, correct=True) for trial in trials]
     assert not slope_of(sure).tells
     assert slope_of(sure).p > 0.9
+
+
+def roved(template, seed, by_strength):
+    """Levels drawn from 6 dB; harmonics with a floor, which fall beside a stronger stimulus and tell nothing."""
+    random = np.random.default_rng(seed)
+    trials = []
+    for number in range(4 * TRIALS):
+        level_db, side, more_db = random.integers(-2, 3) - 6.0, random.choice([1.0, -1.0]), random.uniform(-3.0, 3.0)
+        played_n = 10 ** ((level_db + more_db) / 20)
+        first = random.random() < ndtr(more_db if by_strength else 1.6 * played_n * side)
+        shown, answer = (1 if side > 0 else 2), (1 if first else 2)
+        trials.append(
+            replace(
+                template, subject=f"s{number % 4}", trial=number, frequency_hz=25.0, level_n=played_n,
+                nominal_n=10 ** (level_db / 20), direction_shown=shown, answer=answer, correct=shown == answer,
+                delivered_mps2=4 * played_n * 10 ** (random.normal(0.0, 0.1) / 20), off_axis_mps2=None,
+                harmonics_mps2=0.3 * 10 ** (random.normal(0.0, 0.3) / 20),
+            )
+        )  # fmt: skip
+    return {found.cue: found.followed for found in cue_findings(trials)}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_strength_of_a_roved_study_does_not_accuse_the_spectrum_that_follows_it(template, seed):
+    assert roved(template, seed, by_strength=True) == {Cue.INTENSITY: True, Cue.SPECTRUM: False}
+    assert roved(template, seed, by_strength=False) == {Cue.INTENSITY: False, Cue.SPECTRUM: False}

@@ -1,6 +1,7 @@
 """A session whose stimuli go through a model: what a level means, what is logged, what is refused."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,12 +12,15 @@ from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, highest_level_n, limits_of_study
+from study.session.stimulus.stimulus import held_stimulus
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.trials_file import TRIALS_NAME, read_trials
 from study.store.sessions.trial_recordings import find_trial_recording, recording_name
 from study.workflows.results.analyze_data import analyze_data
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import write_tables
+from study.workflows.session import equalize_stimuli
 from study.workflows.session.conduct_session import conduct_new, conduct_resumed
 from study.workflows.session.equalize_stimuli import level_scales
 from study.workflows.session.open_session import SessionPlan
@@ -74,6 +78,32 @@ def test_a_level_is_the_highest_force_where_the_safety_cap_lies_above_that_of_th
     model = ModelEqualizer(rigid())
     levels, as_before = level_scales(lower, model, 1000.0), level_scales(plan.protocol, model, 1000.0)
     assert [s.n_per_mps2 for s in levels] == pytest.approx([s.n_per_mps2 for s in as_before])
+
+
+@pytest.mark.parametrize("rove_db", [0.0, 6.0])
+def test_a_steep_stimulus_roved_to_its_highest_keeps_the_slew_limit(small_text, tmp_path, monkeypatch, rove_db):
+    plan = planned(small_text, tmp_path)
+    protocol = replace(
+        plan.protocol,
+        stimulus=replace(plan.protocol.stimulus, rove_db=rove_db),
+        staircase=replace(plan.protocol.staircase, cap_n=2.1),
+        demo=replace(plan.protocol.demo, level_n=1.0),
+        practice=replace(plan.protocol.practice, level_n=1.0),
+    )
+    played = []
+
+    def jagged(*arguments):
+        """Every other sample halved: as high as before, and far steeper."""
+        stimulus = held_stimulus(*arguments)
+        forces = stimulus.played_once_then_loop.copy()
+        forces[1::2] /= 2
+        played.append(float(np.linalg.norm(np.diff(forces, axis=0), axis=1).max()) * 1000.0)
+        return SimpleNamespace(played_once_then_loop=forces, loop=stimulus.loop)
+
+    monkeypatch.setattr(equalize_stimuli, "held_stimulus", jagged)
+    (scale, *_) = level_scales(protocol, ModelEqualizer(rigid()), 1000.0)
+    steepest = max(played[:2]) * highest_level_n(protocol) / scale.n_per_mps2 + SPRING_SLEW_N_PER_S
+    assert steepest == pytest.approx(limits_of_study(protocol).slew_n_per_s)
 
 
 def test_what_is_within_reach_is_shown(conducted):
