@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -25,6 +26,9 @@ settings.load_profile("repeatable")
 # People read times by the clock of the machine: here it stands in one place, for programs that tests start as well.
 os.environ["TZ"] = "UTC"
 time.tzset()
+
+# A shell that runs the tests in the background has Ctrl-C ignored, and programs that tests start inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 FSYNC = os.fsync
 # For people a crashing effect is left out and the run goes on; a test must see it.
@@ -58,8 +62,11 @@ def summer_and_winter(monkeypatch) -> Iterator[None]:
 
 
 PAUSES = PauseMeter()
-IN_PROCESS = tuple(f"tests/study/devices/{room}/" for room in ("hung_driver", "drive", "safe", "governor"))
-"""Tests here run the haptic loop in the tests' own process, which must give it signs of life."""
+IN_PROCESS = tuple(
+    f"tests/study/devices/{room}/"
+    for room in ("hung_driver", "drive", "safe", "governor", "loop_process", "accelerometer")
+)
+"""Tests here run the haptic loop or a sensor's board in the tests' own process, or must give a loop signs of life."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

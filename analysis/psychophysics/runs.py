@@ -96,7 +96,6 @@ def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule, rove_db: fl
         if trial.phase is Phase.CATCH:
             _refuse_weak_catch_trial(trial, rule)
             continue
-        _refuse_level_beyond_roving(trial, rove_db)
         expected_n = level_n(rule, state)
         if not math.isclose(trial.staircase_n, expected_n, rel_tol=LEVEL_TOLERANCE):
             name = "level_n" if trial.nominal_n is None else "nominal_n"
@@ -104,6 +103,7 @@ def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule, rove_db: fl
                 f"{_trial_text(trial)}: {name} is {trial.staircase_n:.6g} N, but the answers before it lead to "
                 f"{expected_n:.6g} N under the protocol's staircase; the rows belong to another rule or were changed"
             )
+        _refuse_level_beyond_roving(trial, rove_db)
         state = step(rule, state, trial.correct)
     return state
 

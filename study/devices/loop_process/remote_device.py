@@ -69,8 +69,8 @@ class RemoteDevice:
         self._health = NEVER_HELD
         self._force_left = self._stopped = False
         """Said there at least once: the end of the process changes nothing about it."""
-        self._closed = self._ended = False
-        """Nothing is asked any more; nor does the process run."""
+        self._closing = self._closed = self._ended = False
+        """Asked to close; nothing is asked any more; nor does the process run."""
         self._losing = threading.Lock()
         self._lost = ""
         """How it was lost."""
@@ -167,6 +167,7 @@ class RemoteDevice:
     def close(self) -> None:
         if self._ended:
             return
+        self._closing = True
         try:
             if not (self._lost or self._closed):
                 with contextlib.suppress(DeviceError):
@@ -230,7 +231,7 @@ class RemoteDevice:
             raise self._absence()
 
     def _absence(self) -> DeviceError:
-        if self._closed:
+        if self._closing:
             return DeviceError("The device cannot do this now", "The device is closed.", "Open it again.")
         return DeviceError(
             "The device was lost",

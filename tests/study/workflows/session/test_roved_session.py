@@ -62,12 +62,12 @@ def test_what_was_drawn_is_what_the_device_played_and_both_levels_are_logged(rov
 
 def test_the_staircase_follows_the_answers_alone_and_is_checked_against_them(roved, tmp_path):
     state = roved.whole().state
-    trials, rule = state.trials, roved.protocol.staircase
-    (first, *_) = recompute_runs(trials, rule)
+    trials, rule, rove_db = state.trials, roved.protocol.staircase, roved.protocol.stimulus.rove_db
+    (first, *_) = recompute_runs(trials, rule, rove_db=rove_db)
     assert [t.nominal_n for t in first.answered][:3] == [rule.start_n] * 3
     wrong = replace(first.answered[4], nominal_n=1.234)
     with pytest.raises(InconsistentTrialsError, match=r"nominal_n is 1\.234 N"):
-        recompute_runs([wrong if t is first.answered[4] else t for t in trials], rule)
+        recompute_runs([wrong if t is first.answered[4] else t for t in trials], rule, rove_db=rove_db)
     answers = count_answers(trials, roved.protocol.stimulus.frequencies_hz)
     assert len(set(np.round(answers.level_db, 6))) > 0.9 * answers.trials
     analysis = analyse_study(trials, roved.protocol)
