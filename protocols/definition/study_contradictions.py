@@ -24,9 +24,9 @@ def _levels(protocol: StudyProtocol) -> list[Problem]:
     if protocol.safety.stimulus_cap_n < cap_n:
         wrong = f"is {protocol.safety.stimulus_cap_n} N, below staircase.cap_n: the highest levels could not be played"
         problems.append(Problem("safety.stimulus_cap_n", wrong, f"at least {cap_n} N, the staircase's cap"))
-    elif (highest_n := _roved_up_n(cap_n, protocol.stimulus.rove_db)) > protocol.safety.stimulus_cap_n + ROUNDING_N:
+    elif (highest_n := roved_up_n(cap_n, protocol.stimulus.rove_db)) > protocol.safety.stimulus_cap_n + ROUNDING_N:
         wrong = f"is {cap_n:g} N, and roving (stimulus.rove_db) adds up to {highest_n - cap_n:.3g} N to it"
-        room_n = _roved_up_n(protocol.safety.stimulus_cap_n, -protocol.stimulus.rove_db)
+        room_n = roved_up_n(protocol.safety.stimulus_cap_n, -protocol.stimulus.rove_db)
         allowed = f"at most {math.floor(1000 * room_n) / 1000:g} N, so that none is above safety.stimulus_cap_n"
         problems.append(Problem("staircase.cap_n", wrong, allowed))
     levels = {
@@ -43,10 +43,11 @@ def _levels(protocol: StudyProtocol) -> list[Problem]:
 
 def _highest_n(settings: DemoSettings | PracticeSettings) -> float:
     """Highest level of a roved stimulus (N): half of the range in dB lies above `level_n`."""
-    return _roved_up_n(settings.level_n, settings.rove_db)
+    return roved_up_n(settings.level_n, settings.rove_db)
 
 
-def _roved_up_n(level_n: float, rove_db: float) -> float:
+def roved_up_n(level_n: float, rove_db: float) -> float:
+    """The highest level (N) drawn from `rove_db` around a level; the lowest, where `rove_db` is negative."""
     return level_n * float(10.0 ** (rove_db / 40.0))
 
 

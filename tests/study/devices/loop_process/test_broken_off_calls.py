@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from dataclasses import replace
 
 import pytest
@@ -15,23 +14,7 @@ import pytest
 from study.devices.device import Fault, Played
 from study.devices.loop_process import line, remote_device, start
 from study.errors import DeviceError
-
-LATEST_S = 20.0
-"""For what takes a fraction of a second on a quiet computer."""
-
-
-def becomes(true) -> None:
-    until_s = time.monotonic() + LATEST_S
-    while not true():
-        assert time.monotonic() < until_s
-        time.sleep(0.005)
-
-
-def runs(pid: int) -> bool:
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(pid, 0)
-        return True
-    return False
+from tests.study.devices.loop_process.awaited import LATEST_S, becomes, runs
 
 
 def interrupt_soon() -> None:

@@ -17,11 +17,9 @@ from study.devices.clock import RealClock
 from study.devices.device import Fault
 from study.devices.opening import open_device
 from study.errors import DeviceError
+from tests.study.devices.loop_process.awaited import becomes, runs
 
 pytestmark = pytest.mark.real_time
-
-LATEST_S = 20.0
-"""For what takes a fraction of a second on a quiet computer."""
 
 PATIENT = {"stretch_in_use": 1000}
 """The device's own watchdog waits: what lets go is the program."""
@@ -72,20 +70,6 @@ class Holding:
         self.program.send_signal(signal.SIGCONT)
         said, errors = self.program.communicate(timeout=60)
         return said.decode() + errors.decode()
-
-
-def becomes(true) -> None:
-    until_s = time.monotonic() + LATEST_S
-    while not true():
-        assert time.monotonic() < until_s
-        time.sleep(0.005)
-
-
-def runs(pid: int) -> bool:
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(pid, 0)
-        return True
-    return False
 
 
 def set_switches(stub, switches: dict[str, float]) -> None:
