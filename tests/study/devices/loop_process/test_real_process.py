@@ -27,6 +27,8 @@ PATIENT = {"stretch_in_use": 1000}
 PROGRAM_CLOSED, WATCHDOG = 4, 3
 """Why the force is off, as the device says."""
 
+STARTS = 5
+
 PROGRAM = """
 import pickle, sys, time
 from study.devices.clock import RealClock
@@ -51,7 +53,6 @@ class Holding:
     """A program that holds or plays a force. Begins a process group of its own, as from a shell."""
 
     def __init__(self, rigs, stub, plays: bool = False) -> None:
-        self.stub = stub
         self.program = subprocess.Popen(
             [sys.executable, "-c", PROGRAM],
             stdin=subprocess.PIPE,
@@ -63,13 +64,41 @@ class Holding:
         self.program.stdin.write(pickle.dumps((rigs.SETTINGS, rigs.sine(2.0, 25), commands)))
         self.program.stdin.close()
         self.program.stdin = None
+
+    def holds(self, stub) -> bool:
+        """Waits for the force. False where the program ended before."""
         self.loop_pid = int(self.program.stdout.readline())
-        becomes(lambda: stub.get("last_write") > 0.5 and stub.get("force_on"))
+        becomes(lambda: self.program.poll() is not None or (stub.get("last_write") > 0.5 and stub.get("force_on")))
+        return self.program.poll() is None
 
     def end(self) -> str:
         self.program.send_signal(signal.SIGCONT)
         said, errors = self.program.communicate(timeout=60)
         return said.decode() + errors.decode()
+
+
+@pytest.fixture
+def holding(stub, rigs):
+    """Starts a program and waits for its force. Where a busy computer gave the program or its loop no processor, so
+    that the device let go before that could be seen, another is started."""
+    started: list[Holding] = []
+
+    def start(plays: bool = False) -> Holding:
+        set_switches(stub, PATIENT)
+        said = ""
+        for _ in range(STARTS):
+            begun = Holding(rigs, stub, plays)
+            started.append(begun)
+            if begun.holds(stub):
+                return begun
+            said = begun.end()
+            assert said == "STALLED\n"
+        pytest.fail(f"none of {STARTS} programs held a force: {said}")
+
+    yield start
+    for begun in started:
+        begun.program.kill()
+        begun.end()
 
 
 def set_switches(stub, switches: dict[str, float]) -> None:
@@ -86,30 +115,27 @@ def opened(stub, rigs):
 
 
 @pytest.mark.parametrize("plays", [pytest.param(False, marks=pytest.mark.slow), True])
-def test_when_its_program_is_killed_the_loop_fades_brakes_and_ends(stub, rigs, plays):
-    set_switches(stub, PATIENT)
-    holding = Holding(rigs, stub, plays)
-    holding.program.kill()
-    becomes(lambda: not runs(holding.loop_pid))
+def test_when_its_program_is_killed_the_loop_fades_brakes_and_ends(stub, rigs, holding, plays):
+    held = holding(plays)
+    held.program.kill()
+    becomes(lambda: not runs(held.loop_pid))
     assert stub.safe
     assert (stub.get("opened"), stub.get("cause")) == (0, PROGRAM_CLOSED)
     assert stub.get("peak_n") <= rigs.LIMITS.total_cap_n
-    holding.end()
 
 
 @pytest.mark.parametrize("plays", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_when_its_program_is_stopped_the_loop_fades_to_zero_and_lives(stub, rigs, plays):
-    set_switches(stub, PATIENT)
-    holding = Holding(rigs, stub, plays)
-    holding.program.send_signal(signal.SIGSTOP)
+def test_when_its_program_is_stopped_the_loop_fades_to_zero_and_lives(stub, rigs, holding, plays):
+    held = holding(plays)
+    held.program.send_signal(signal.SIGSTOP)
     time.sleep(rigs.LIMITS.watchdog_s + rigs.LIMITS.release_s)
     becomes(lambda: stays_zero(stub))
-    assert runs(holding.loop_pid) and stub.get("opened")
+    assert runs(held.loop_pid) and stub.get("opened")
     if plays:
-        holding.program.kill()
-    said = holding.end()
+        held.program.kill()
+    said = held.end()
     assert plays or said == "STALLED\n"
-    becomes(lambda: not runs(holding.loop_pid))
+    becomes(lambda: not runs(held.loop_pid))
     assert stub.safe and stub.get("cause") == PROGRAM_CLOSED
 
 
@@ -122,17 +148,16 @@ def stays_zero(stub) -> bool:
     return True
 
 
-def test_ctrl_c_in_the_terminal_reaches_the_program_alone_and_ends_with_a_fade(stub, rigs):
-    set_switches(stub, PATIENT)
-    holding = Holding(rigs, stub)
-    assert os.getsid(holding.loop_pid) != os.getsid(holding.program.pid)
-    os.kill(holding.loop_pid, signal.SIGINT)  # even so
-    os.kill(holding.loop_pid, signal.SIGHUP)
-    time.sleep(0.5)
-    assert runs(holding.loop_pid) and not stays_zero(stub)
-    os.killpg(holding.program.pid, signal.SIGINT)
-    assert "KeyboardInterrupt" in holding.end()
-    becomes(lambda: not runs(holding.loop_pid))
+def test_ctrl_c_in_the_terminal_reaches_the_program_alone_and_ends_with_a_fade(stub, holding):
+    held = holding()
+    assert os.getsid(held.loop_pid) != os.getsid(held.program.pid)
+    os.kill(held.loop_pid, signal.SIGINT)  # even so
+    os.kill(held.loop_pid, signal.SIGHUP)
+    time.sleep(0.2)
+    assert runs(held.loop_pid) and not stays_zero(stub)
+    os.killpg(held.program.pid, signal.SIGINT)
+    assert "KeyboardInterrupt" in held.end()
+    becomes(lambda: not runs(held.loop_pid))
     assert stub.safe and stub.get("cause") == PROGRAM_CLOSED
 
 
