@@ -51,6 +51,8 @@ class Stub:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.noise_mps2, self.random = 0.0, np.random.default_rng(0)
+        """Rms of white noise on each reading of the accelerometer, and what draws it."""
         self._library = ctypes.CDLL(str(path))
         self._library.stub_set.argtypes = [ctypes.c_char_p, ctypes.c_double]
         self._library.stub_get.argtypes, self._library.stub_get.restype = [ctypes.c_char_p], ctypes.c_double
@@ -98,10 +100,15 @@ class Stub:
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, TrueSensor(self) if sensed else None, rests)
 
 
-def accept(device: str, on: str = "", details: str = "serial 4242, firmware 2.41, SDK 3.17.5.0") -> None:
+def accept(
+    device: str,
+    on: str = "",
+    details: str = "serial 4242, firmware 2.41, SDK 3.17.5.0",
+    baseline: tuple[str, str] = ("", ""),
+) -> None:
     """As an operator would have, today or on that day."""
     today = datetime.now(UTC).date().isoformat()
-    write_acceptance(Acceptance(device, details, "the tests", on or today, 0.5, 0.03))
+    write_acceptance(Acceptance(device, details, "the tests", on or today, 0.5, 0.03, *baseline))
 
 
 class TrueSensor:
@@ -110,7 +117,8 @@ class TrueSensor:
         self.closed = False
 
     def latest(self) -> tuple[FloatArray, bool]:
-        return np.array([self._stub.get(f"a{axis}") for axis in "xyz"]), False
+        true_mps2 = np.array([self._stub.get(f"a{axis}") for axis in "xyz"])
+        return true_mps2 + self._stub.noise_mps2 * self._stub.random.standard_normal(3), False
 
     def close(self) -> None:
         self.closed = True

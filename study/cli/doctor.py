@@ -2,6 +2,8 @@
 
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,6 +15,7 @@ from study.cli.study import DataOption, DeviceOption
 
 if TYPE_CHECKING:
     from study.session.views.views import DeviceFinding
+    from study.workflows.checks.daily_check import Moving
     from study.workflows.checks.examine_setup import Examination
 
 NAME_WIDTH = 17
@@ -29,7 +32,14 @@ AcceptOption = Annotated[
     str | None,
     typer.Option(
         metavar="OPERATOR",
-        help="With no hand on the handle: prove with 0.5 N that the device lets go, and unlock it for hands.",
+        help="With no hand on the handle: record how it answers now, prove with 0.5 N that it lets go, and unlock it "
+        "for hands.",
+    ),
+]
+DailyOption = Annotated[
+    bool,
+    typer.Option(
+        "--daily", help="With no hand on the handle: does it answer as when it was accepted? It moves for 1.5 minutes."
     ),
 ]
 SensorOption = Annotated[
@@ -45,11 +55,13 @@ def doctor(
     data: DataOption = Path("data"),
     calibrate: CalibrateOption = False,
     accept: AcceptOption = None,
+    daily: DailyOption = False,
     calibrate_sensor: SensorOption = None,
     baud: BaudOption = 2_000_000,
     as_json: JsonOption = False,
 ) -> None:
-    """Check the installation, the device with its sensor, and the 1 kHz timing. Nothing moves."""
+    """Check the installation, the device with its sensor, and the 1 kHz timing. Nothing moves, unless --accept or
+    --daily asks for it: then it is said before, and confirmed."""
     from contextlib import nullcontext
 
     from study.cli.progress import bar
@@ -59,8 +71,7 @@ def doctor(
     if calibrate_sensor is not None:
         _calibrate_sensor(calibrate_sensor, baud)
         return
-    if calibrate:
-        _calibrate(device)
+    _prepare(device, calibrate, daily)
     with bar("Timing the loop (s)", total=timing) if timing else nullcontext(lambda done: None) as show:
         examination = examine_setup(device, data, timing, this_terminal(), on_progress=show)
     if as_json:
@@ -68,11 +79,54 @@ def doctor(
     else:
         _say(examination)
     if accept is not None:
-        from study.workflows.checks.examine_setup import accept as sign
-
-        typer.echo(sign(device, examination, accept), err=True)
+        _accept(device, examination, accept)
     if examination.exit_code:
         raise typer.Exit(examination.exit_code)
+    if daily:
+        _check_today(device, as_json)
+
+
+def _prepare(device: str, calibrate: bool, daily: bool) -> None:
+    if daily:
+        from study.workflows.checks.daily_check import require_real
+
+        require_real(device)
+    if calibrate:
+        _calibrate(device)
+
+
+def _accept(device: str, examination: "Examination", operator: str) -> None:
+    from study.workflows.checks.examine_setup import accept
+
+    with _moving() as moving:
+        said = accept(device, examination, operator, moving)
+    typer.echo(said, err=True)
+
+
+def _check_today(device: str, as_json: bool) -> None:
+    """What changed since the acceptance, after the rest was found fine. With --json, only the file, on stderr."""
+    from study.errors import ExitCode
+    from study.workflows.checks.daily_check import check_today
+
+    with _moving() as moving:
+        checked = check_today(device, moving)
+    if not as_json:
+        typer.echo("Daily check")
+        for finding in checked.findings:
+            _say_one(finding)
+    typer.echo(str(checked.file), err=as_json)
+    if any(finding.wrong for finding in checked.findings):
+        raise typer.Exit(ExitCode.DEVICE)
+
+
+@contextmanager
+def _moving() -> "Iterator[Moving]":
+    from study.cli.progress import late_bar
+    from study.cli.record import announce
+    from study.workflows.checks.daily_check import Moving, seconds_of_play
+
+    with late_bar("The device moves (s)", total=round(seconds_of_play())) as show:
+        yield Moving(announce, show)
 
 
 def _calibrate(device: str) -> None:

@@ -14,8 +14,8 @@ def record(
     protocol: Annotated[
         str,
         typer.Argument(
-            help="A shipped recording protocol (ellipsoid, sweep, sweep_band, sweep_study, sweep_hand, multisine), "
-            "or a file."
+            help="A shipped recording protocol (ellipsoid, sweep, sweep_band, sweep_study, sweep_hand, multisine, "
+            "daily_check), or a file."
         ),
     ],
     out: Annotated[Path, typer.Option(help="The recording to write, REC.h5.")],

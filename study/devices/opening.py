@@ -7,11 +7,13 @@ import contextlib
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from datetime import date
+from pathlib import Path
 from typing import Any
 
 from study.devices.admission import HAND_STIMULUS_CAP_N as HAND_STIMULUS_CAP_N
 from study.devices.clock import Clock
-from study.devices.device import Device, DeviceSettings
+from study.devices.device import Device, DeviceInfo, DeviceSettings
 from study.devices.force_dimension.models import MODELS
 from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
@@ -112,10 +114,30 @@ def calibrate_accelerometer(port: str, baud: int, before_each: Callable[[str], N
     return calibrate_on_table(port, baud, before_each)
 
 
-def accept_device(name: str, settings: DeviceSettings, clock: Clock, operator: str) -> str:
+def device_folder() -> Path:
+    """Where this computer keeps what it knows of its device: settings, acceptance, baseline and daily checks."""
+    from study.devices.force_dimension.lab import lab_file
+
+    return lab_file().parent
+
+
+def accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
+    """Name in `device_folder` and SHA-256 of the recording that was accepted; empty where none was made.
+
+    Raises `DeviceError` where this device was not accepted.
+    """
+    from study.devices.force_dimension.acceptance import check_accepted
+
+    return check_accepted(info, today)
+
+
+def accept_device(
+    name: str, settings: DeviceSettings, clock: Clock, operator: str, baseline: tuple[str, str] = ("", "")
+) -> str:
     """Hold a small force with no hand on the handle, stop the loop on purpose, and sign that the device let go.
 
     What was written, in a sentence. Raises `DeviceError`. What else is to be fine, the caller has found fine before.
+    baseline: name and SHA-256 of the recording that the daily check is to compare with.
     """
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
     from study.devices.force_dimension.force_proof import FORCE_N, prove_force_goes
@@ -130,5 +152,6 @@ def accept_device(name: str, settings: DeviceSettings, clock: Clock, operator: s
     finally:
         rig.close()
     today = clock.utc()[:10]
-    path = write_acceptance(Acceptance(device.info.name, device.info.details, operator, today, FORCE_N, gone_after_s))
-    return f"{device.info.name}: a force of {FORCE_N:g} N was gone {1000 * gone_after_s:.0f} ms after the loop; {path}"
+    info = device.info
+    path = write_acceptance(Acceptance(info.name, info.details, operator, today, FORCE_N, gone_after_s, *baseline))
+    return f"{info.name}: a force of {FORCE_N:g} N was gone {1000 * gone_after_s:.0f} ms after the loop; {path}"

@@ -30,6 +30,9 @@ class Acceptance:
     """That was held when the loop was stopped on purpose."""
     gone_after_s: float
     """Until the device said that it was off."""
+    baseline: str = ""
+    """Name of the recording beside this file with which the daily check compares; empty where none was made."""
+    baseline_sha256: str = ""
 
 
 def acceptance_file() -> Path:
@@ -45,13 +48,15 @@ def write_acceptance(acceptance: Acceptance) -> Path:
     return path
 
 
-def check_accepted(info: DeviceInfo, today: date) -> None:
-    """Raises `DeviceError` where this device, as it is now, was not accepted, or too long ago."""
+def check_accepted(info: DeviceInfo, today: date) -> tuple[str, str]:
+    """Name and SHA-256 of the accepted baseline, empty where none was made. Raises `DeviceError` where this device, as
+    it is now, was not accepted, or too long ago."""
     path = acceptance_file()
     try:
         document = json.loads(path.read_text("utf-8"))
         accepted_on = date.fromisoformat(document["accepted_on"])
         known = (document["format"], document["version"], document["device"], document["details"])
+        baseline = (str(document.get("baseline", "")), str(document.get("baseline_sha256", "")))
     except FileNotFoundError:
         raise _lock_error(info, f"There is no acceptance of it ({path})") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
@@ -60,6 +65,7 @@ def check_accepted(info: DeviceInfo, today: date) -> None:
         raise _lock_error(info, f"Another was accepted ({known[2]}, {known[3]}); this is {info.name}, {info.details}")
     if not accepted_on <= today <= accepted_on + VALID_FOR:
         raise _lock_error(info, f"It was accepted on {accepted_on}; that holds for {VALID_FOR.days} days")
+    return baseline
 
 
 def _lock_error(info: DeviceInfo, happened: str) -> DeviceError:

@@ -16,6 +16,7 @@ from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_installation import Terminal, check_installation
 from study.workflows.checks.check_timing import Timing, check_timing
 from study.workflows.checks.computer_load import load_per_processor
+from study.workflows.checks.daily_check import Moving, record_baseline
 from study.workflows.device_settings import device_settings
 
 PROTOCOL = "direction_threshold"
@@ -94,8 +95,9 @@ def _settings(name: str, timing_s: float) -> DeviceSettings:
     return replace(still, hand_on_handle=False) if needs_real_time(name) else still
 
 
-def accept(name: str, examination: Examination, operator: str) -> str:
-    """Sign that the device may be held, after an examination with timing. Raises DeviceError, WrongUseError."""
+def accept(name: str, examination: Examination, operator: str, moving: Moving) -> str:
+    """Record the baseline of the daily checks and sign that the device may be held, after an examination with timing.
+    Without an accelerometer there is no baseline. Raises DeviceError, WrongUseError."""
     if not needs_real_time(name):
         raise WrongUseError("There is nothing to accept", f"{name!r} moves no hand.", "Leave --accept out.")
     timing = examination.timing
@@ -103,4 +105,7 @@ def accept(name: str, examination: Examination, operator: str) -> str:
     if timing is None or hinders:
         found = ", ".join(finding.name for finding in hinders) or "the timing was not measured"
         raise DeviceError("The device was not accepted", f"Not fine: {found}.", "Mend that first, as said above.")
-    return accept_device(name, _settings(name, 0.0), RealClock(), operator)
+    sensed = all(finding.fine for finding in examination.findings if finding.name in NOT_NEEDED)
+    baseline = record_baseline(name, moving) if sensed else ("", "")
+    said = accept_device(name, _settings(name, 0.0), RealClock(), operator, baseline)
+    return said if sensed else f"{said}. Without an accelerometer no daily check will be possible."

@@ -64,7 +64,7 @@ def record_device(
     """
     check_free(plan.out)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
-    with contextlib.closing(open_device(plan.device, _settings(plan), clock, plan.seed)) as device:
+    with contextlib.closing(open_device(plan.device, recording_settings(plan), clock, plan.seed)) as device:
         return record_on(device, plan, on_progress, before_moving)
 
 
@@ -122,7 +122,7 @@ def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[Take]) -
         _write(plan, device, done, interrupted=True)
 
 
-def _settings(plan: RecordingPlan) -> DeviceSettings:
+def recording_settings(plan: RecordingPlan) -> DeviceSettings:
     return DeviceSettings(
         limits=limits_of_recording(plan.protocol),
         spring_frequency_hz=plan.protocol.spring.natural_frequency_hz,

@@ -14,6 +14,7 @@ from study.session.watching.requests import NoteAsked
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_timing import check_computer
 from study.workflows.checks.computer_load import load_per_processor
+from study.workflows.checks.daily_check import last_check
 from study.workflows.trial.sitting import Sitting, record, write_notes
 
 
@@ -82,7 +83,8 @@ def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     # In virtual time nothing waits for a processor.
     load = None if clock.virtual else load_per_processor()
     computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)
-    report = replace(report, findings=(*report.findings, *computer))
+    daily = () if device.info.simulated else (last_check(device.info),)
+    report = replace(report, findings=(*report.findings, *computer, *daily))
     go_on = sitting.display.device_checked(report)
     findings = tuple(f"{finding.name}: {finding.value}{_said(finding)}" for finding in report.findings)
     return record(state, DeviceChecked(utc=sitting.clock.utc(), passed=go_on, findings=findings), sitting)

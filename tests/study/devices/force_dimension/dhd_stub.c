@@ -30,6 +30,8 @@
   X(unplugged, 0) X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
   X(late_every, 0) X(late_s, 0) X(write_fails, 0) X(read_fails, 0) X(stop_fails, 0) X(buttons, 0)                      \
   X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
+  /* What wears: Coulomb friction in N, amplifiers, a mass that swings on the handle. */                               \
+  X(friction, 0) X(gain, 1) X(mode_hz, 0) X(mode_kg, 0.02)                                                             \
   /* What a test may ask for. */                                                                                       \
   X(force_on, 0) X(brake, 1) X(cause, 0) X(fx, 0) X(fy, 0) X(fz, 0) X(peak_n, 0) X(writes, 0) X(opened, 0)             \
   X(stops, 0) X(closes, 0) X(reads, 0) X(watchdog, 0) X(cap_n, -1) X(effector, 0) X(gravity, 1) X(guard, 1)            \
@@ -40,7 +42,7 @@
 #define AS_NAME(name, value) #name,
 enum { SWITCHES(AS_ENUM) COUNT };
 typedef struct {
-  double values[COUNT], position[3], velocity[3], commanded[3], told[3], started, integrated, commanded_at, reset_at;
+  double values[COUNT], position[3], velocity[3], commanded[3], told[3], swung[3], swinging[3], started, integrated, commanded_at, reset_at;
   double used; /* Since it was opened, a force was sent. */
 } Device;
 static Device own = {.values = {SWITCHES(AS_VALUE)}, .started = -1};
@@ -50,6 +52,8 @@ static Device *device = &own;
 #define v device->velocity
 #define command device->commanded
 #define shown device->told
+#define w device->swung
+#define u device->swinging
 #define started_s device->started
 #define integrated_s device->integrated
 #define last_command_s device->commanded_at
@@ -143,7 +147,10 @@ static void step(double dt) {
   for (int i = 0; i < 3; i++) {
     double applied = p[force_on] && !p[brake] ? command[i] : 0;
     double lift = p[gravity] && p[force_on] ? 9.81 * p[effector] : 0, down = i == 2 && p[weight] > 0 ? p[weight] - lift : 0;
-    double force = applied - (p[damping] + (p[brake] ? 20 : 0)) * v[i] - p[stiffness] * x[i] - down;
+    double rate = 2 * 3.14159265358979 * p[mode_hz], pull = p[mode_kg] * (rate * rate * (w[i] - x[i]) + 0.08 * rate * (u[i] - v[i]));
+    double force = p[gain] * applied - (p[damping] + (p[brake] ? 20 : 0)) * v[i] - p[stiffness] * x[i] - down;
+    force += pull - p[friction] * tanh(1000 * v[i]); /* creeps where it would stick, as before a real break-away */
+    u[i] -= dt * pull / p[mode_kg], w[i] += dt * u[i];
     p[fx + i] = applied, p[ax + i] = force / p[mass];
     v[i] += dt * p[ax + i], x[i] += dt * v[i];
     norm += applied * applied;

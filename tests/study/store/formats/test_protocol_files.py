@@ -45,7 +45,7 @@ def change(path: Path) -> None:
 
 def test_the_shipped_protocols_are_listed_and_each_can_be_read():
     studies, recordings = {"direction_threshold", "direction_training", "equalized_threshold"}, {"ellipsoid", "sweep"}
-    recordings |= {"sweep_band", "sweep_study", "sweep_hand", "multisine"}
+    recordings |= {"sweep_band", "sweep_study", "sweep_hand", "multisine", "daily_check"}
     assert studies | recordings <= set(list_shipped_protocols())
     for name in list_shipped_protocols():
         found = read_protocol(name)

@@ -1,0 +1,148 @@
+"""What changed between two measurements of a device, each number beside the accepted one and its limit."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.device_change.measure_device import (
+    DeviceMeasures,
+    NotMeasurableError,
+    measure_device,
+)
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.signals.recording import Recording
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeLimits:
+    step_db: float = 1.0
+    """Of gain and response: the finest step of the published staircases. A smaller change moves a threshold by less
+    than a step."""
+    friction_n: float = 0.12
+    """The same step at the 1 N with which those staircases begin."""
+    noise_factor: float = 2.0
+    """By hand: no threshold depends on the noise, a sensor that works loose or a broken shield has several times it."""
+    deviations: float = 3.0
+    """Standard errors beyond which a change is more than the scatter of the measurements."""
+    band_octaves: float = 1 / 3
+    """Width of the bands in which responses are compared: the usual third octaves."""
+
+    @property
+    def share(self) -> float:
+        """Of the accepted response."""
+        return float(10 ** (self.step_db / 20) - 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One number, then and now."""
+
+    kind: str
+    """friction, gain, response or noise"""
+    axis: str
+    """Channel of the command, or of the response for noise."""
+    accepted: float
+    today: float
+    error: float
+    """Standard error of the difference."""
+    limit: float
+    """Of the difference; for noise, of the ratio."""
+    unit: str
+    changed: bool
+    """Beyond the limit, and beyond the scatter of the measurements."""
+    band_hz: tuple[float, float] | None = None
+    """Of a response: where it changed most."""
+    peaks_hz: tuple[float, float] | None = None
+    """Of a changed response: where it is strongest about there, then and now."""
+
+
+def compare_devices(
+    baseline: Recording, recording: Recording, limits: ChangeLimits | None = None
+) -> tuple[Change, ...]:
+    """All changes, small ones too. baseline, recording: the same excitation, then and today.
+
+    Raises NotMeasurableError where one of them does not tell what is compared, or they do not belong together.
+    """
+    limits = limits or ChangeLimits()
+    accepted, today = measure_device(baseline), measure_device(recording)
+    return (
+        *_friction_changes(accepted, today, limits),
+        *_response_changes(accepted.response, today.response, limits),
+        *_noise_changes(accepted, today, limits),
+    )
+
+
+def _friction_changes(accepted: DeviceMeasures, today: DeviceMeasures, limits: ChangeLimits) -> Iterator[Change]:
+    for axis, channel in enumerate(accepted.response.input_channels):
+        then, now = float(accepted.friction_n[axis]), float(today.friction_n[axis])
+        error = float(np.hypot(accepted.friction_error_n[axis], today.friction_error_n[axis]))
+        # A handle that no longer moves has changed: its friction is unknown, and large.
+        stuck = np.isnan(now) or np.isnan(then)
+        changed = stuck or _is_beyond(now - then, error, limits.friction_n, limits)
+        yield Change("friction", channel, then, now, error, limits.friction_n, "N", changed)
+
+
+def _response_changes(then: FrequencyResponse, now: FrequencyResponse, limits: ChangeLimits) -> Iterator[Change]:
+    if then.input_channels != now.input_channels or then.output_channels != now.output_channels:
+        raise NotMeasurableError("the channels of the two recordings differ")
+    shared = np.intersect1d(then.frequency_hz[then.reliable], now.frequency_hz[now.reliable])
+    if not len(shared):
+        raise NotMeasurableError("no frequency is reliable in both recordings")
+    then, now = (each.of_lines(np.isin(each.frequency_hz, shared)) for each in (then, now))
+    for axis, channel in enumerate(then.input_channels):
+        # Column: the answer of all outputs to this force. A common factor is the gain; what is left, the response.
+        ratio = np.linalg.norm(now.response[:, :, axis], axis=1) / np.linalg.norm(then.response[:, :, axis], axis=1)
+        gain = float(np.median(ratio))
+        error = float(1.2533 * 1.4826 * np.median(np.abs(ratio - gain)) / np.sqrt(len(ratio)))
+        changed = _is_beyond(np.log(gain), error / gain, np.log1p(limits.share), limits)
+        yield Change("gain", channel, 1.0, gain, error, limits.share, "", changed)
+        yield _worst_band(then, now, axis, gain, limits)
+
+
+def _worst_band(
+    then: FrequencyResponse, now: FrequencyResponse, axis: int, gain: float, limits: ChangeLimits
+) -> Change:
+    """The third octave in which the response, less the common gain, differs most; noise is subtracted."""
+    band = np.floor(np.log2(then.frequency_hz / then.frequency_hz[0]) / limits.band_octaves)
+    found = []
+    for number in np.unique(band):
+        lines = band == number
+        size = float(np.sum(np.abs(then.response[lines][:, :, axis]) ** 2))
+        power = float(np.sum(np.abs(now.response[lines][:, :, axis] / gain - then.response[lines][:, :, axis]) ** 2))
+        noise = now.noise_variance[lines][:, :, axis] / gain**2 + then.noise_variance[lines][:, :, axis]
+        expected = float(np.sum(noise))
+        spread = float(np.sqrt(np.sum(noise**2)))
+        at_hz = then.frequency_hz[lines]
+        share = np.sqrt(max(power - expected, 0.0) / size)
+        found.append((share, expected, spread, power, size, (float(at_hz[0]), float(at_hz[-1]))))
+    share, expected, spread, power, size, band_hz = max(found)
+    changed = bool(share > limits.share and power > expected + limits.deviations * spread)
+    channel = then.input_channels[axis]
+    error = float(np.sqrt(spread / size))
+    peaks_hz = (_peak_hz(then, band_hz, axis), _peak_hz(now, band_hz, axis)) if changed else None
+    return Change("response", channel, 0.0, float(share), error, limits.share, "", changed, band_hz, peaks_hz)
+
+
+def _peak_hz(response: FrequencyResponse, band_hz: tuple[float, float], axis: int) -> float:
+    """Where the answer to the force along `axis` is strongest, within the band and half as much to either side."""
+    wider = (band_hz[1] / band_hz[0]) ** 0.5
+    lines = response.within(band_hz[0] / wider, band_hz[1] * wider)
+    strength = np.linalg.norm(lines.response[:, :, axis], axis=1)
+    return float(lines.frequency_hz[int(np.argmax(strength))])
+
+
+def _noise_changes(accepted: DeviceMeasures, today: DeviceMeasures, limits: ChangeLimits) -> Iterator[Change]:
+    # Relative standard error of an rms of independent samples.
+    relative = np.sqrt(0.5 / accepted.noise_samples + 0.5 / today.noise_samples)
+    for channel, then, now in zip(accepted.response.output_channels, accepted.noise, today.noise, strict=True):
+        high, low = max(float(then), float(now)), min(float(then), float(now))
+        changed = high > limits.noise_factor * low
+        unit = accepted.response.output_unit
+        yield Change(
+            "noise", channel, float(then), float(now), float(relative * now), limits.noise_factor, unit, changed
+        )
+
+
+def _is_beyond(difference: float, error: float, limit: float, limits: ChangeLimits) -> bool:
+    return bool(abs(difference) > limit and abs(difference) > limits.deviations * error)

@@ -1,0 +1,116 @@
+"""Numbers of one recording of a free device: friction of slow strokes, frequency response, noise at rest."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, estimate_transfer
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray
+
+STROKES_BELOW_HZ = 1.0
+"""Sinusoids slower than this are strokes: the shipped daily check has 0.5 Hz, the lowest stimulus of a study 5 Hz."""
+
+
+class NotMeasurableError(ValueError):
+    """The recording does not tell what is compared; the text says why."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DeviceMeasures:
+    friction_n: FloatArray
+    """(axes,): mean force that resisted the strokes along each axis; NaN where the handle did not move."""
+    friction_error_n: FloatArray
+    """(axes,): standard error of it, from stroke to stroke."""
+    response: FrequencyResponse
+    noise: FloatArray
+    """(outputs,): rms of the response at rest, in its unit, less a straight line."""
+    noise_samples: int
+
+
+def measure_device(recording: Recording) -> DeviceMeasures:
+    """recording: strokes and a broadband excitation along every axis, with rests. Raises NotMeasurableError."""
+    response = _response(recording)
+    friction = np.array([_friction_n(recording, axis) for axis in range(len(recording.command.channels))])
+    rests = _second_halves_of_rests(recording)
+    if not rests:
+        raise NotMeasurableError("the handle never rests in it")
+    noise, samples = _noise(recording, rests)
+    return DeviceMeasures(friction[:, 0], friction[:, 1], response, noise, samples)
+
+
+def _response(recording: Recording) -> FrequencyResponse:
+    try:
+        response = estimate_transfer([recording])
+    except TransferEstimateError as refusal:
+        raise NotMeasurableError(str(refusal)) from refusal
+    if not response.reliable.any():
+        raise NotMeasurableError("no line of its frequency response is reliable")
+    return response
+
+
+def _excited(recording: Recording) -> FloatArray:
+    return (recording.command if recording.excitation is None else recording.excitation).samples
+
+
+def _friction_n(recording: Recording, axis: int) -> tuple[float, float]:
+    """Mean and standard error over strokes of the work that a stroke loses, over the path of the handle.
+
+    What spring, weight and inertia take they give back within a stroke; so no model is needed.
+    """
+    found = [
+        _lost_per_path_n(recording, start, start + segment.period, axis)
+        for segment in recording.segments
+        if _is_stroke(recording, segment) and _driven_axis(recording, segment) == axis
+        for start in range(segment.start, segment.stop - segment.period + 1, segment.period)
+    ]
+    if len(found) < 2:
+        raise NotMeasurableError(f"it has {len(found)} slow strokes along {recording.command.channels[axis]}, not 2")
+    return float(np.mean(found)), float(np.std(found, ddof=1) / np.sqrt(len(found)))
+
+
+def _is_stroke(recording: Recording, segment: Segment) -> bool:
+    return segment.kind == "sine" and segment.period * STROKES_BELOW_HZ > recording.sample_rate_hz
+
+
+def _driven_axis(recording: Recording, segment: Segment) -> int:
+    return int(np.argmax(np.ptp(_excited(recording)[segment.start : segment.stop], axis=0)))
+
+
+def _lost_per_path_n(recording: Recording, start: int, stop: int, axis: int) -> float:
+    """NaN where the handle did not move further than it trembles across."""
+    if recording.position is None:
+        raise NotMeasurableError("it has no position")
+    position_m = recording.position.samples[start : stop + 1]
+    force_n = recording.command.samples[start : start + len(position_m) - 1]
+    path_m = 2 * float(np.ptp(position_m[:, axis]))
+    across_m = 2 * float(np.delete(np.ptp(position_m, axis=0), axis).max(initial=0.0))
+    if not path_m > across_m:
+        return np.nan
+    return float(np.sum(force_n * np.diff(position_m, axis=0)) / path_m)
+
+
+def _second_halves_of_rests(recording: Recording) -> list[FloatArray]:
+    """Stretches (k, outputs) at rest; in the first half of each rest what was excited dies away."""
+    still = np.concatenate([[False], ~_excited(recording).any(axis=1), [False]])
+    edges = np.flatnonzero(np.diff(still.astype(np.int8)))
+    longest = int((edges[1::2] - edges[::2]).max(initial=0))
+    return [
+        recording.response.samples[(start + stop) // 2 : stop]
+        for start, stop in zip(edges[::2], edges[1::2], strict=True)
+        if stop - start > longest / 2
+    ]
+
+
+def _noise(recording: Recording, rests: list[FloatArray]) -> tuple[FloatArray, int]:
+    squares, samples = np.zeros(len(recording.response.channels)), 0
+    for rest in rests:
+        at = np.arange(len(rest)) - (len(rest) - 1) / 2
+        bent = rest - rest.mean(axis=0)
+        bent = bent - np.outer(at, at @ bent / max(float(at @ at), 1.0))
+        squares += np.sum(bent**2, axis=0)
+        samples += len(rest)
+    if not np.isfinite(squares).all():
+        raise NotMeasurableError("samples are missing in its rests")
+    return np.sqrt(squares / max(samples, 1)), samples

@@ -1,0 +1,46 @@
+"""The file of a daily check, format `hapteq-daily-check`, version 1: what was compared, each number then and now."""
+
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.json_document import read_json, write_json
+from study.store.disk.provenance import gather_provenance
+
+FORMAT, VERSION = "hapteq-daily-check", 1
+
+
+@dataclass(frozen=True, slots=True)
+class DailyCheck:
+    device: str
+    details: str
+    """Serial number, firmware and SDK."""
+    utc: str
+    passed: bool
+    """Nothing changed beyond its limit."""
+    sentences: tuple[str, ...]
+    """One for each kind of change, as the screen shows them."""
+    changes: tuple[dict[str, Any], ...]
+    """Kind, axis, accepted and today's number, error, limit, unit, whether it changed, band."""
+    recording: str
+    """File beside this one."""
+    recording_sha256: str
+    baseline_sha256: str
+
+
+def write_daily_check(path: Path, check: DailyCheck) -> None:
+    """Raises AlreadyThereError, CannotWriteError."""
+    write_json(path, FORMAT, VERSION, asdict(check), gather_provenance())
+
+
+def read_daily_check(path: Path) -> DailyCheck:
+    """Raises CannotReadError, UnusableFileError."""
+    document = read_json(path, FORMAT, VERSION)
+    try:
+        found = {field.name: document[field.name] for field in fields(DailyCheck)}
+        if not isinstance(found["passed"], bool) or not all(isinstance(found[name], str) for name in ("device", "utc")):
+            raise TypeError("device and utc must be texts, passed true or false")
+        return DailyCheck(**{**found, "sentences": tuple(found["sentences"]), "changes": tuple(found["changes"])})
+    except (KeyError, TypeError) as error:
+        raise UnusableFileError(path, "daily check", (f"it has no proper {error}",)) from error

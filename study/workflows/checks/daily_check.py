@@ -1,0 +1,172 @@
+"""The daily check: the free device plays what it played when it was accepted, and both recordings are compared."""
+
+import contextlib
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from analysis.device_change.compare_devices import Change, compare_devices
+from analysis.device_change.measure_device import NotMeasurableError
+from equalizer.signals.recording import Recording
+from protocols.definition.recording_protocol import RecordingProtocol
+from study.devices.clock import RealClock
+from study.devices.device import Device, DeviceInfo
+from study.devices.opening import accepted_baseline, device_folder, needs_real_time, open_device
+from study.errors import DeviceError, StudyError, WrongUseError
+from study.local_clock import machine_zone
+from study.session.views.local_time import local_parts, local_time
+from study.session.views.views import DeviceFinding
+from study.store.disk.provenance import sha256_of
+from study.store.formats.daily_check_file import DailyCheck, read_daily_check, write_daily_check
+from study.store.formats.protocol_files import read_recording_protocol
+from study.store.formats.recording_file import read_recording
+from study.workflows.checks.device_changes import change_findings
+from study.workflows.recording.record_device import RecordingPlan, record_on, recording_settings
+
+PROTOCOL = "daily_check"
+BASELINES, CHECKS = "baselines", "daily_checks"
+"""Folders beside the acceptance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """What happens while the device moves by itself."""
+
+    announce: Callable[[str], None]
+    """Gets the notice before it moves; an exception from it keeps the device still."""
+    show: Callable[[float], None]
+    """Gets the seconds that were played."""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedToday:
+    findings: tuple[DeviceFinding, ...]
+    file: Path
+
+
+def seconds_of_play() -> float:
+    return RecordingPlan(_protocol(), "", (0.0, 0.0, 0.0), 1, Path()).total_s
+
+
+def record_baseline(name: str, moving: Moving) -> tuple[str, str]:
+    """Record what the daily checks compare with. Its name in `device_folder`, and its SHA-256. Raises StudyError."""
+    plan = _plan(name, BASELINES)
+    with contextlib.closing(_open(plan)) as device:
+        return _baseline_on(device, plan, moving)
+
+
+def _baseline_on(device: Device, plan: RecordingPlan, moving: Moving) -> tuple[str, str]:
+    record_on(device, plan, moving.show, moving.announce)
+    recorded = read_recording(plan.out)
+    compare_recordings(recorded, recorded)
+    return f"{BASELINES}/{plan.out.name}", sha256_of(plan.out)
+
+
+def require_real(name: str) -> None:
+    """Raises WrongUseError for a device that is never accepted."""
+    if not needs_real_time(name):
+        raise WrongUseError("There is nothing to compare with", f"{name!r} is never accepted.", "Leave --daily out.")
+
+
+def check_today(name: str, moving: Moving) -> CheckedToday:
+    """Play the excitation of the baseline and write what changed. Raises StudyError."""
+    plan = _plan(name, CHECKS)
+    with contextlib.closing(_open(plan)) as device:
+        return check_on(device, plan, moving)
+
+
+def check_on(device: Device, plan: RecordingPlan, moving: Moving) -> CheckedToday:
+    """As `check_today`, on an open device."""
+    baseline, digest = _accepted_recording(device.info)
+    record_on(device, plan, moving.show, moving.announce)
+    changes = compare_recordings(baseline, read_recording(plan.out))
+    findings = change_findings(changes)
+    check = DailyCheck(
+        device=device.info.name,
+        details=device.info.details,
+        utc=datetime.now(UTC).isoformat(timespec="seconds"),
+        passed=all(finding.fine for finding in findings),
+        sentences=tuple(f"{finding.name}: {finding.value}. {finding.advice}".strip() for finding in findings),
+        changes=tuple(_as_json(change) for change in changes),
+        recording=plan.out.name,
+        recording_sha256=sha256_of(plan.out),
+        baseline_sha256=digest,
+    )
+    file = plan.out.with_suffix(".json")
+    write_daily_check(file, check)
+    return CheckedToday(findings, file)
+
+
+def compare_recordings(baseline: Recording, today: Recording) -> tuple[Change, ...]:
+    """Raises DeviceError where one of them does not tell what is compared."""
+    try:
+        return compare_devices(baseline, today)
+    except NotMeasurableError as refusal:
+        raise _not_comparable_error(refusal) from refusal
+
+
+def last_check(info: DeviceInfo) -> DeviceFinding:
+    """Whether this device was checked today, as a line of the check before a sitting: a warning where it was not."""
+    day = local_parts(datetime.now(UTC).isoformat(), machine_zone)[0]
+    option = info.name.replace(".", "")
+    advice = f"With no hand on the handle: hapteq doctor --device {option} --daily."
+    for path in sorted((device_folder() / CHECKS).glob("*.json"), reverse=True):
+        try:
+            check = read_daily_check(path)
+        except StudyError:
+            continue
+        if (check.device, check.details) != (info.name, info.details):
+            continue
+        when = f"{local_time(check.utc, machine_zone)}, {path}"
+        if local_parts(check.utc, machine_zone)[0] != day:
+            return DeviceFinding("Daily check", f"none today; the last one was {when}", False, advice, warning=True)
+        if check.passed:
+            return DeviceFinding("Daily check", f"nothing changed since the acceptance ({when})", fine=True)
+        changed = ", ".join(dict.fromkeys(str(each["kind"]) for each in check.changes if each["changed"]))
+        return DeviceFinding("Daily check", f"{changed} changed since the acceptance ({when})", False, advice, True)
+    return DeviceFinding("Daily check", "none yet", False, advice, warning=True)
+
+
+def _accepted_recording(info: DeviceInfo) -> tuple[Recording, str]:
+    name, digest = accepted_baseline(info, datetime.now(UTC).date())
+    again = f"Accept it anew: hapteq doctor --device {info.name.replace('.', '')} --timing 60 --accept 'NAME'."
+    if not name:
+        raise DeviceError(
+            "There is nothing to compare with", "The device was accepted without a recording (no accelerometer).", again
+        )
+    path = device_folder() / name
+    if not path.is_file() or sha256_of(path) != digest:
+        raise DeviceError("There is nothing to compare with", f"{path} is gone, or is not what was accepted.", again)
+    return read_recording(path), digest
+
+
+def _not_comparable_error(refusal: NotMeasurableError) -> DeviceError:
+    happened = f"What was recorded does not tell how the device answers: {refusal}."
+    return DeviceError("The device was not compared", happened, "Check accelerometer and handle, and try again.")
+
+
+def _plan(name: str, folder: str) -> RecordingPlan:
+    place = device_folder() / folder
+    place.mkdir(parents=True, exist_ok=True)
+    return RecordingPlan(_protocol(), name, (0.0, 0.0, 0.0), 1, place / f"{name}_{_moment()}.h5")
+
+
+def _protocol() -> RecordingProtocol:
+    return read_recording_protocol(PROTOCOL).protocol
+
+
+def _moment() -> str:
+    """Names that are sorted as they came."""
+    return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+
+
+def _open(plan: RecordingPlan) -> Device:
+    return open_device(plan.device, recording_settings(plan), RealClock(), plan.seed)
+
+
+def _as_json(change: Change) -> dict[str, Any]:
+    numbers = {name: None for name in ("accepted", "today", "error") if math.isnan(getattr(change, name))}
+    return asdict(change) | numbers

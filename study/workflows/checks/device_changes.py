@@ -1,0 +1,65 @@
+"""What changed at a device since its acceptance, in findings with numbers and limits."""
+
+import math
+from collections.abc import Sequence
+
+from analysis.device_change.compare_devices import Change
+from analysis.wording import signed_number
+from study.session.views.views import DeviceFinding
+
+CAUSES = {
+    "friction": "Look for a cable that rubs and for dirt in the joints; let the device warm up.",
+    "gain": "Look at what was added to the handle, at the power supply, and at the sensor's mounting and calibration.",
+    "response": "Look for a loose screw at handle, sensor, base or table, and at the cable.",
+    "noise": "Look at the sensor's plug, cable and shield, and at what shakes the table.",
+}
+FRICTION_FIRST = "That may come from the friction: mend it first."
+IF_IT_STAYS = "If it stays, name the cause with `hapteq diagnose`, or accept the device anew."
+
+
+def change_findings(changes: Sequence[Change]) -> tuple[DeviceFinding, ...]:
+    """One for each kind, in the order in which they come."""
+    kinds = dict.fromkeys(change.kind for change in changes)
+    rubs = any(change.changed for change in changes if change.kind == "friction")
+    return tuple(_finding(kind, [change for change in changes if change.kind == kind], rubs) for kind in kinds)
+
+
+def _finding(kind: str, changes: Sequence[Change], rubs: bool) -> DeviceFinding:
+    """rubs: the friction changed, from which gain and response change too."""
+    value = f"{'; '.join(_words(change) for change in changes)} ({_limit_words(changes[0])})"
+    axes = ", ".join(change.axis for change in changes if change.changed)
+    causes = FRICTION_FIRST if rubs and kind in ("gain", "response") else f"{CAUSES[kind]} {IF_IT_STAYS}"
+    advice = f"It changed ({axes}). {causes}" if axes else ""
+    return DeviceFinding(kind.capitalize(), value, fine=not axes, advice=advice)
+
+
+def _words(change: Change) -> str:
+    match change.kind:
+        case "gain":
+            return f"{change.axis} {signed_number(100 * (change.today - 1), 1)} %"
+        case "response":
+            return f"{change.axis} {100 * change.today:.1f} %{_place_words(change)}"
+        case _:
+            then, now = _number(change.accepted), _number(change.today)
+            return f"{change.axis} {now} {change.unit}, accepted {then}"
+
+
+def _place_words(change: Change) -> str:
+    if change.band_hz is None:
+        return ""
+    moved = f", strongest at {change.peaks_hz[1]:g} Hz, accepted {change.peaks_hz[0]:g} Hz" if change.peaks_hz else ""
+    return f" at {change.band_hz[0]:g} to {change.band_hz[1]:g} Hz{moved}"
+
+
+def _limit_words(change: Change) -> str:
+    match change.kind:
+        case "friction":
+            return f"may change by {change.limit:g} {change.unit}"
+        case "noise":
+            return f"may change by a factor of {change.limit:g}"
+        case _:
+            return f"may change by {100 * change.limit:.0f} %"
+
+
+def _number(value: float) -> str:
+    return "the handle did not move" if math.isnan(value) else f"{value:.3g}"

@@ -1,0 +1,57 @@
+"""The comparison of two days on the simulated omega.3: its coupled axes, its modes, its accelerometer's noise."""
+
+import contextlib
+from dataclasses import replace
+
+import pytest
+
+from equalizer.signals.recording import Recording
+from study.devices.clock import VirtualClock
+from study.devices.safe import SafeDevice
+from study.devices.simulated.omega3 import build_omega3
+from study.devices.simulated.packing import pack_parameters
+from study.devices.simulated.parameters import Omega3Parameters
+from study.store.formats.protocol_files import read_recording_protocol
+from study.store.formats.recording_file import read_recording
+from study.workflows.checks.daily_check import compare_recordings
+from study.workflows.recording.record_device import RecordingPlan, record_on, recording_settings
+
+NEW = Omega3Parameters()
+CENTRE_M = (0.0, 0.0, 0.0)
+WORN = {
+    "friction": replace(NEW, drives=replace(NEW.drives, friction_n_m=2 * NEW.drives.friction_n_m)),
+    "response": replace(NEW, mount=replace(NEW.mount, frequencies_hz=(18.0, 26.6))),
+    "gain": replace(NEW, masses=replace(NEW.masses, handle_kg=NEW.masses.handle_kg + 0.06)),
+    "noise": replace(NEW, accelerometer=replace(NEW.accelerometer, noise_g_per_rthz=(450e-6, 450e-6, 900e-6))),
+}
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    def record(seed: int, parameters: Omega3Parameters = NEW) -> Recording:
+        rig = replace(build_omega3(seed, hand=False), parameters=pack_parameters(parameters, False, CENTRE_M))
+        plan = RecordingPlan(
+            read_recording_protocol("daily_check").protocol, "simulated", CENTRE_M, seed, tmp_path / f"{seed}.h5"
+        )
+        with contextlib.closing(SafeDevice(rig, recording_settings(plan), VirtualClock())) as device:
+            assert record_on(device, plan, lambda done: None).warnings == ()
+        return read_recording(plan.out)
+
+    return record
+
+
+def changed(baseline: Recording, today: Recording) -> set[str]:
+    return {change.kind for change in compare_recordings(baseline, today) if change.changed}
+
+
+@pytest.mark.parametrize("seeds", [range(2, 4), pytest.param(range(2, 32), marks=pytest.mark.slow)])
+def test_another_day_of_the_same_device_passes(recorded, seeds):
+    baseline = recorded(1)
+    assert [seed for seed in seeds if changed(baseline, recorded(seed))] == []
+
+
+@pytest.mark.parametrize("kind", sorted(WORN))
+def test_what_changed_at_the_device_is_named(recorded, kind):
+    found = changed(recorded(1), recorded(2, WORN[kind]))
+    assert kind in found
+    assert kind == "noise" or "noise" not in found
