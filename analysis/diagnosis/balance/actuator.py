@@ -144,7 +144,7 @@ def find_balance(
     """The balance of one axis: laws of the motion and, where one earns it, a law of the command, through which the
     commanded force is then passed before the laws of the motion are searched again."""
     balance = judge_laws(search_beside_linear(motions, axis, rotational, without, time_left))
-    actuator = find_actuator(balance, without, map_) if balance.tested else None
+    actuator = find_actuator(balance, rotational, without, map_) if balance.tested else None
     if actuator is None:
         return balance
     judged = actuator.judged
@@ -169,13 +169,13 @@ def _pass_through_law(motion: Motion, axis: int, own: int, law: CommandLaw) -> M
     return replace(motion, force=force)
 
 
-def find_actuator(balance: Balance, without: frozenset[str], map_: Mapper = map) -> Actuator | None:
+def find_actuator(balance: Balance, rotational: bool, without: frozenset[str], map_: Mapper = map) -> Actuator | None:
     """The law of the command that leaves the smallest error; None where the balance has no clock, no command varies,
     or no law of the command is allowed."""
     search = balance.search
     regression = search.regression
     commands = np.concatenate([motion.force[motion.fit, regression.axis] for motion in regression.motions])
-    known = [*command_laws(commands), *_laws_of_coils(regression)]
+    known = [*command_laws(commands), *(() if rotational else _laws_of_coils(regression))]
     laws = [law for law in known if law.effect not in without]
     if not np.isfinite(regression.motions[0].band_hz) or not laws or not np.any(commands):
         return None
@@ -190,6 +190,7 @@ def find_actuator(balance: Balance, without: frozenset[str], map_: Mapper = map)
     law = min(best, key=lambda each: each[0])[1]
     alone, held = (turned.total_error(law, each) for each in ((), beside))
     rivals = [other for _, other in best if other is not law]
+    law = _scaled_to_command(law, search.regression)
     judged = _judge_law(turned, law, rivals, (beside, beside))
     return Actuator(law, judged, bool(beside) and alone <= held / (1 - TOLD))
 
@@ -210,9 +211,16 @@ def _in_place_of_motion(turned: _InverseBalance, laws: Sequence[CommandLaw], nam
     best = _best_of_each(turned, laws, ())
     law = min(best, key=lambda each: each[0])[1]
     rivals = [other for _, other in best if other is not law]
+    law = _scaled_to_command(law, turned.search.regression)
     judged = _judge_law(turned, law, rivals, (named, ()))
     less = judged.gain >= MOST or len(named) > 1
     return Actuator(law, judged, True, True) if less and judged.gain_low > 0 else None
+
+
+def _scaled_to_command(law: CommandLaw, regression: Regression) -> CommandLaw:
+    motions, own = regression.motions, regression.beside.own
+    command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
+    return law.scaled_to(command, np.concatenate([motion.position[motion.fit, own] for motion in motions]))
 
 
 def _sums_to_try(search: StructureSearch) -> list[tuple[int, ...]]:
@@ -271,6 +279,7 @@ def _judge_law(
     return JudgedLaw(
         NO_COLUMN, known, dict(law.values), gain, low, float((without - held).sum()) / max(linear, 1e-300), alike,
         float(np.mean(np.all(first, axis=0))) if first else 1.0, _why_not(law, gain, low, alike),
+        formula=law.as_formula(),
     )  # fmt: skip
 
 
@@ -280,7 +289,8 @@ def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -
         return (
             f"in the command's place it takes {100 * max(gain, 0.0):.0f} % of what laws of the motion leave, not most"
         )
-    strange = [effect for effect in alike if effect not in EFFECTS_BY_NAME]
+    # A curve of the command and a pull that changes with the distance are different physics.
+    strange = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.pull is not None]
     if strange or len(alike) >= MOST_ALIKE:
         return f"these data cannot tell it from {', '.join(alike)}"
-    return "" if law.effect in EFFECTS_BY_NAME else "no simulation of ours plays it yet"
+    return "" if law.effect in EFFECTS_BY_NAME or law.formula else "no simulation of ours plays it yet"

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from equalizer.effects.force_nonlinearity import square_law_force
+from equalizer.laws.law import ActsOn
 from equalizer.signals.signal import FloatArray
 
 DEAD, FULL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
@@ -29,6 +30,16 @@ CLOSER = (0.95, 0.98, 1.02, 1.05)
 MOVED = ("width", "limit", "square", "gap", "power")
 
 
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A law in the language of `equalizer.laws`; x is the position and f the command of its own axis."""
+
+    text: str
+    """Its free numbers are p0, p1, …"""
+    numbers: tuple[float, ...]
+    acts_on: ActsOn
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CommandLaw:
     effect: str
@@ -41,11 +52,26 @@ class CommandLaw:
     """(n,): factor of the force at each position; None = it is the same everywhere."""
     rich: bool = False
     """It fits more than the plain laws do, and counts only where it leaves clearly less than these."""
+    scale: float = 1.0
+    """Of a single column: what makes it a force."""
+    formula: Callable[[dict[str, float], float], Formula] | None = None
+    """Of values and scale: what a simulation plays in the command's place, where no catalogue effect does."""
 
     def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
         """command, position: (n,) each."""
-        columns = self.columns(command, self.values)
+        columns = self.scale * self.columns(command, self.values)
         return columns if self.pull is None else columns * self.pull(position, self.values)[:, None]
+
+    def scaled_to(self, command: FloatArray, position: FloatArray) -> "CommandLaw":
+        """The law with its force as large as the command (least squares), where it has a formula: masses keep their
+        size then. command, position: (n,) each."""
+        if self.formula is None:
+            return self
+        given = self.of(command, position)[:, 0]
+        return replace(self, scale=self.scale * float(given @ command) / max(float(given @ given), 1e-300))
+
+    def as_formula(self) -> Formula | None:
+        return None if self.formula is None else self.formula(self.values, self.scale)
 
 
 AS_COMMANDED = CommandLaw("as_commanded", {}, lambda u, _: u[:, None])
@@ -66,7 +92,8 @@ def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
         yield CommandLaw("force_nonlinearity", {"square": square, "reference": unit}, _nonlinear_force)
     for width in (0.0, *_sizes(size, STARTS)):
         for power in POWERS:
-            yield CommandLaw("actuator_curve", {"width": width, "power": power}, _power_force, rich=True)
+            values = {"width": width, "power": power}
+            yield CommandLaw("actuator_curve", values, _power_force, rich=True, formula=_power_formula)
     yield CommandLaw("actuator_asymmetry", {}, lambda u, _: np.stack([u, np.abs(u)], axis=1))
 
 
@@ -76,14 +103,30 @@ def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:
     low, high = float(position.min()), float(position.max())
     for side, end in ((1.0, low), (-1.0, high)):
         for gap in GAPS:
-            for columns in (_force_of_square, AS_COMMANDED.columns):
-                pull = partial(_pull_at, side, end)
-                yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, pull, rich=True)
+            for columns, of_command in ((_force_of_square, "f**2"), (AS_COMMANDED.columns, "f")):
+                formula = partial(_pull_formula, (side, end), of_command)
+                yield CommandLaw(
+                    "electromagnet", {"gap": gap * (high - low)}, columns, partial(_pull_at, side, end), True,
+                    formula=formula,
+                )  # fmt: skip
 
 
 def _pull_at(side: float, end: float, position: FloatArray, of: dict[str, float]) -> FloatArray:
     """side: 1 where the position is a distance that grows, from `end` on; -1 where it falls."""
     return np.asarray((of["gap"] + np.maximum(side * (position - end), 0.0)) ** -2)
+
+
+def _pull_formula(at: tuple[float, float], of_command: str, of: dict[str, float], scale: float) -> Formula:
+    """Takes the force that the linear model makes of the command away. at: side and end of `_pull_at`."""
+    (side, end), gap = at, of["gap"]
+    # Its pole lies this far from where positions are counted, on the other side.
+    return Formula(f"{scale:.6g}*{of_command}/(p0 {'+' if side > 0 else '-'} x)**2 - f", (gap - side * end,), "force")
+
+
+def _power_formula(of: dict[str, float], scale: float) -> Formula:
+    if not of["width"]:
+        return Formula(f"{scale:.6g}*sign(f)*abs(f)**p0", (of["power"],), "command")
+    return Formula(f"{scale:.6g}*sign(f)*maximum(abs(f) - p0, 0)**p1", (of["width"], of["power"]), "command")
 
 
 def _force_of_square(command: FloatArray, of: dict[str, float]) -> FloatArray:

@@ -191,7 +191,7 @@ def _judge_law(
     if not why_not and law.effect in PLAYED_AS:
         alike = (law.effect, *(effect for effect in alike if effect != PLAYED_AS[law.effect]))
         chosen, law = law.effect, replace(law, effect=PLAYED_AS[law.effect])
-    return JudgedLaw(number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, possible)
+    return JudgedLaw(number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, possible=possible)
 
 
 def _special_cases(effect: str) -> tuple[str, ...]:

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from analysis.diagnosis.balance.command_laws import Formula
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.regression import Regression
+from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
 DRAWS, SEED, LEVEL = 2000, 1, 0.025
@@ -36,8 +38,15 @@ class JudgedLaw:
     stands_for: str = ""
     """The law that was chosen, where it has no simulation and this one is fitted in its place."""
 
+    formula: Formula | None = None
+    """Of a law of the command that no catalogue effect plays."""
     possible: bool = True
     """Its numbers have signs and sizes that such physics can have."""
+
+    @property
+    def played_as(self) -> str:
+        """The effect of the catalogue, or a law without a name, that simulations play."""
+        return self.law.effect if self.formula is None else DISCOVERED_LAW
 
     @property
     def named(self) -> bool:

@@ -152,8 +152,10 @@ def _steps(
     """The fits with the laws added one after the other beside the constants."""
     whole = retuned.fitted.hypothesis
     steps = [retuned for _ in whole.claims]
+    recording = context.measure.records[0].recording
     for axis, law in named:
-        start = evaluate_fit(context.measure, context.tuning, deviations, combine(whole, hypothesis_of_law(axis, law)))
+        claimed = combine(whole, hypothesis_of_law(axis, law, recording))
+        start = evaluate_fit(context.measure, context.tuning, deviations, claimed)
         found = refine(context, start)
         steps.append(context.candidate(found))
         whole, deviations = found.hypothesis, found.deviations
@@ -162,18 +164,18 @@ def _steps(
 
 def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) -> int | None:
     """Place of a named law that may be absent: the intervals of all parameters that mean so hold it, or any parameter's
-    is open where the law only refines another of its family; None = there is none."""
+    is open where the law only refines another of its family or has no name; None = there is none."""
     begin, hypothesis = 0, explained.steps[-1].fitted.hypothesis
     families = [family_of(claim.effect.name) for claim in hypothesis.claims]
     for place, claim in enumerate(hypothesis.claims):
         free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
-        refines = place > constants and families[place] in families[constants:place]
+        every = (place > constants and families[place] in families[constants:place]) or claim.effect.law is not None
         vague = []
         for number, parameter in enumerate(free, begin):
             size = {"log": 1.0, "signed": abs(float(hypothesis.point[number])), "linear": np.inf}[parameter.scale]
-            if refines or parameter.none is not None:
+            if every or parameter.none is not None:
                 vague.append(VAGUE * errors[number] >= size)
-        if place >= constants and (any(vague) if refines else bool(vague) and all(vague)):
+        if place >= constants and (any(vague) if every else bool(vague) and all(vague)):
             return place - constants
         begin += len(free)
     return None

@@ -1,5 +1,6 @@
 """Converts laws that a force balance named to hypotheses of a simulation, with starting numbers."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,15 +10,22 @@ from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.structures import values_of
+from analysis.diagnosis.discovery.law_of_sum import hypothesis_of
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.discovered_law import axis_names
+from equalizer.laws.law import Law
+from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 CONSTANT = "constant_force"
+_SIGNAL = re.compile(r"\b[xf]\b")
 
 
 def can_be_played(own: int, judged: JudgedLaw) -> bool:
+    if judged.formula is not None:
+        return True
     effect = EFFECTS.get(judged.law.effect)
     if effect is None or judged.law.channel != own:
         return False
@@ -56,7 +64,12 @@ def constants_of(balances: Sequence[Balance]) -> Hypothesis:
     return whole
 
 
-def hypothesis_of_law(axis: int, judged: JudgedLaw) -> Hypothesis:
+def hypothesis_of_law(axis: int, judged: JudgedLaw, recording: Recording) -> Hypothesis:
+    """recording: whose channels a formula's signals are."""
+    if judged.formula is not None:
+        name = axis_names(recording.command.channels)[axis]
+        text = _SIGNAL.sub(lambda found: name if found[0] == "x" else f"f{name}", judged.formula.text)
+        return hypothesis_of(Law(text, judged.formula.numbers, (), judged.formula.acts_on, name), axis, recording)
     effect = EFFECTS[judged.law.effect]
     return hypothesis_of_claim(
         Claim(effect, "one", (axis,)), [{p.name: judged.values[p.name] for p in effect.parameters}]

@@ -84,7 +84,7 @@ def with_balances(
     if not balances:
         return diagnosis
     weighed = {
-        (law.law.effect, axis_letter(channels[axis], channels)): (law, _explained_share(balance, law))
+        (law.played_as, axis_letter(channels[axis], channels)): (law, _explained_share(balance, law))
         for axis, balance in enumerate(balances)
         for law in balance.laws
     }
@@ -103,6 +103,7 @@ def with_balances(
         (_rank(law), _candidate(law, axis_letter(channels[axis], channels)))
         for axis, balance in enumerate(balances)
         for law in (*balance.laws, *balance.others)
+        if law.formula is None or (law.played_as, axis_letter(channels[axis], channels)) not in named
     ]
     found += [(0, each) for each in unconfirmed]
     left = [each for _, each in sorted(found, key=lambda ranked: ranked[0]) if (each.effect, each.axis) not in named]
@@ -157,7 +158,7 @@ def balance_errors(
     for axis, balance in enumerate(balances):
         letter = axis_letter(channels[axis], channels)
         names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
-        laws = [law.place for law in balance.laws if law.law.effect in names]
+        laws = [law.place for law in balance.laws if law.played_as in names]
         rms = balance.error_of(laws) if laws else balance.linear
         given = balance.search.regression.prior is not None
         found.append(BalanceErrors(letter, balance.linear, rms, balance.ceiling, bool(laws), balance.tested, given))

@@ -1,0 +1,57 @@
+"""Laws of a command that no effect of the catalogue plays: written as a formula, and confirmed by simulation."""
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.diagnose_values import diagnose_values
+from equalizer.laws.law import law_of
+from tests.analysis.diagnosis.balance.invented_axis import recording
+from tests.analysis.diagnosis.balance.test_actuator_laws import pulled
+
+RATE_HZ = 100.0
+
+
+def driven(given, seed, count=6000):
+    """Recording of a mass of 0.2 kg with a damping of 0.5 N s/m on a spring of 5 N/m, driven by given(command), in
+    random steps of the command."""
+    random = np.random.default_rng([seed, 7])
+    command = np.repeat(random.uniform(-1.0, 1.0, count // 40), 40)
+    position, x, v = np.empty(count), 0.0, 0.0
+    for k, push in enumerate(given(command).tolist()):
+        position[k] = x
+        for _ in range(10):
+            v += (push - 0.5 * v - 5.0 * x) / 0.2 / (10 * RATE_HZ)
+            x += v / (10 * RATE_HZ)
+    read = position + 1e-4 * random.standard_normal(count)
+    return recording(command[:, None], read[:, None], RATE_HZ)
+
+
+def valve(u):
+    return np.sign(u) * np.maximum(np.abs(u) - 0.1, 0.0) ** 0.4
+
+
+def laws_named(shot):
+    return {effect.effect: effect for effect in diagnose_values([shot]).diagnosis.effects}
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
+def test_the_curve_of_a_valve_is_named_with_its_formula(seed):
+    named = laws_named(driven(valve, seed))
+    assert set(named) == {"discovered_law"}
+    law = named["discovered_law"].law
+    assert (law.acts_on, law.variables) == ("command", ("fx",))
+    width, power = law_of(law.expression, "command", "x").numbers[1:]
+    assert width == pytest.approx(0.1, abs=0.03)
+    assert power == pytest.approx(0.4, abs=0.1)
+
+
+def test_a_drive_in_order_has_no_curve():
+    assert "discovered_law" not in laws_named(driven(lambda u: u, 1))
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_the_pull_of_a_coil_is_named_with_its_formula(seed):
+    named = laws_named(pulled(lambda i, x: 2.9e-6 * i**2 / (0.01 - x) ** 2, seed))
+    law = named["discovered_law"].law
+    assert (law.acts_on, law.variables) == ("force", ("fx", "x"))
+    assert law_of(law.expression, "force", "x").numbers[1] == pytest.approx(0.01, rel=0.1)
