@@ -10,12 +10,15 @@ from analysis.diagnosis.reference.learn_model_error import LearnedError, count_a
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.no_prediction import is_without_prediction
-from analysis.diagnosis.search.search import SearchResult, search_effects
+from analysis.diagnosis.search.search import SearchResult, Unconfirmed, search_effects
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.without_effect import without_effect
 from analysis.diagnosis.settings import EXPLAINED_ERROR, NOISE_ALONE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
+
+THERE_BEFORE = "the clean recordings are predicted better with it, too: it did not come since"
 
 
 def search_beside_reference(
@@ -31,15 +34,34 @@ def search_beside_reference(
     Where much more is left than on a device in order, its colour is of little use: then what is simply larger than that
     is looked for, too, and whichever leaves less stands.
     """
-    fine = _by_contrast(context, learned, catalogue, progress, time_left)
+    fine = _unname_what_was_there(_by_contrast(context, learned, catalogue, progress, time_left), learned)
     if context.certain or fine.found.after.score.worst_channel <= learned.floor.beyond or not time_left():
         return fine
-    coarse = _by_size(context, learned, catalogue, progress, time_left)
+    coarse = _unname_what_was_there(_by_size(context, learned, catalogue, progress, time_left), learned)
     return (
         coarse
         if coarse.judgement.named and _mean_log_error(fine.context, coarse) < _mean_log_error(fine.context, fine)
         else fine
     )
+
+
+def _unname_what_was_there(seen: SearchResult, learned: LearnedError) -> SearchResult:
+    """The result without effects that the recordings in order show as well, with the same numbers: the model lacks
+    these, but they are no fault."""
+    found, before = seen.found, []
+    for place in reversed(range(len(found.steps) if seen.judgement.named and not seen.context.certain else 0)):
+        whole = found.after.fitted.hypothesis
+        if not learned.references.hold(whole, place):
+            continue
+        before.append(Unconfirmed(whole, 0.0, THERE_BEFORE, place))
+        if len(found.steps) > 1:
+            found = without_effect(seen.context, found, place)
+        else:
+            found = replace(found, after=found.retuned, steps=())
+    if not before:
+        return seen
+    judged = _judge_with_floor(seen.context.whole, found, bool(found.steps), learned.floor.beyond)
+    return replace(seen, found=found, judgement=judged, unconfirmed=(*seen.unconfirmed, *before))
 
 
 def _mean_log_error(context: SearchContext, seen: SearchResult) -> float:
@@ -80,19 +102,27 @@ def _by_contrast(
     found = _refit_by(back, seen.found)
     if context.certain:
         return replace(
-            seen, context=back, found=found, judgement=_judge_with_floor(found, True, learned.floor.beyond), remarks=()
+            seen,
+            context=back,
+            found=found,
+            judgement=_judge_with_floor(plain, found, True, learned.floor.beyond),
+            remarks=(),
         )
     named = seen.judgement.named and not is_without_prediction(plain, found.after)
-    return replace(seen, context=back, found=found, judgement=_judge_with_floor(found, named, learned.floor.beyond))
+    return replace(
+        seen, context=back, found=found, judgement=_judge_with_floor(plain, found, named, learned.floor.beyond)
+    )
 
 
-def _judge_with_floor(found: Explanation, named: bool, beyond: float) -> Judgement:
-    """The verdict, with all thresholds raised by the factor `beyond`, for devices differ from day to day, too."""
+def _judge_with_floor(measure: ErrorMeasure, found: Explanation, named: bool, beyond: float) -> Judgement:
+    """The verdict, with all thresholds raised by the factor `beyond`, for devices differ from day to day, too. measure:
+    of the residuals of what was found; scores may be of a whitened one, which is blind to what changes slowly."""
     if named:
         return Judgement(
             "explained" if found.after.score.worst_channel <= beyond * EXPLAINED_ERROR else "partly_explained", True
         )
-    if found.before.score.worst_channel <= beyond * NOISE_ALONE:
+    plain = fit_score(measure, found.before.fitted.residuals).worst_channel
+    if max(plain, found.before.score.worst_channel) <= beyond * NOISE_ALONE:
         return Judgement("no_mismatch", False)
     return Judgement(
         "parameters" if found.retuned.score.worst_channel <= beyond * NOISE_ALONE else "unexplained", False

@@ -1,12 +1,12 @@
 """The gain of a hypothesis on clean recordings, where its effect is absent: a baseline for its gain elsewhere."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from analysis.diagnosis.errors.coloured_measure import ColouredMeasure
 from analysis.diagnosis.errors.fit_score import rms_over
-from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine, without_claim
+from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine, hypothesis_of_claim, without_claim
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, gather_evidence, sensitivity
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.starting_hypotheses import candidates
@@ -41,6 +41,11 @@ class ReferenceRecording:
         without, with_it = self._left(self.base), self._left(best)
         return np.asarray(np.log(without) - np.log(np.maximum(with_it, np.finfo(float).tiny)))
 
+    def gain_of(self, fixed: Hypothesis) -> float:
+        """Fall of the cost by a hypothesis whose numbers are fixed, the model re-tuned beside it."""
+        start = evaluate_fit(self.measure, self.tuning, self.base.deviations, fixed)
+        return self.base.cost - fit(self.measure, self.tuning, start, self.known, ROUNDS).cost
+
     def _starts(self, wanted: Hypothesis) -> list[Hypothesis]:
         """Starting points: the wanted hypothesis, and the last claim's starting values from this recording."""
         last = wanted.claims[-1]
@@ -68,6 +73,15 @@ class ReferenceRecordings:
             gains = np.max([each.gain_on_clean(hypothesis) for each in self.each], axis=0)
             self.seen[hypothesis.key] = self.beyond * np.maximum(gains, 0.0)
         return self.seen[hypothesis.key]
+
+    def hold(self, hypothesis: Hypothesis, claim: int) -> bool:
+        """Whether the recordings in order are predicted better with an effect as it was fitted elsewhere, all its
+        numbers included: then it did not come since. claim: which of the hypothesis's effects."""
+        effect = hypothesis.claims[claim].effect
+        numbers = tuple(replace(parameter, fixed=True) for parameter in effect.parameters)
+        held = replace(hypothesis.claims[claim], effect=replace(effect, parameters=numbers))
+        fixed = hypothesis_of_claim(held, [placed.values for placed in hypothesis.of_claim(claim)])
+        return sum(each.gain_of(fixed) for each in self.each) > 0
 
 
 def reference_recording(
