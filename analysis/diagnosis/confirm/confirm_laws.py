@@ -17,7 +17,7 @@ from analysis.diagnosis.confirm.laws_to_play import (
     CONSTANT,
     can_be_played,
     constants_of,
-    hypothesis_of_law,
+    hypothesis_of_judged,
     numbers_beside_laws,
     refit_laws,
 )
@@ -154,7 +154,7 @@ def _steps(
     steps = [retuned for _ in whole.claims]
     recording = context.measure.records[0].recording
     for axis, law in named:
-        claimed = combine(whole, hypothesis_of_law(axis, law, recording))
+        claimed = combine(whole, hypothesis_of_judged(axis, law, recording))
         start = evaluate_fit(context.measure, context.tuning, deviations, claimed)
         found = refine(context, start)
         steps.append(context.candidate(found))

@@ -10,12 +10,9 @@ from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.structures import values_of
-from analysis.diagnosis.discovery.law_of_sum import hypothesis_of
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.discovered_law import axis_names
-from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -64,12 +61,17 @@ def constants_of(balances: Sequence[Balance]) -> Hypothesis:
     return whole
 
 
-def hypothesis_of_law(axis: int, judged: JudgedLaw, recording: Recording) -> Hypothesis:
+def hypothesis_of_judged(axis: int, judged: JudgedLaw, recording: Recording) -> Hypothesis:
     """recording: whose channels a formula's signals are."""
     if judged.formula is not None:
+        # Imported here: few diagnoses have such a law.
+        from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
+        from equalizer.effects.discovered_law import axis_names
+        from equalizer.laws.law import Law
+
         name = axis_names(recording.command.channels)[axis]
         text = _SIGNAL.sub(lambda found: name if found[0] == "x" else f"f{name}", judged.formula.text)
-        return hypothesis_of(Law(text, judged.formula.numbers, (), judged.formula.acts_on, name), axis, recording)
+        return hypothesis_of_law(Law(text, judged.formula.numbers, (), judged.formula.acts_on, name), axis, recording)
     effect = EFFECTS[judged.law.effect]
     return hypothesis_of_claim(
         Claim(effect, "one", (axis,)), [{p.name: judged.values[p.name] for p in effect.parameters}]

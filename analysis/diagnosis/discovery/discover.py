@@ -8,11 +8,12 @@ import numpy as np
 from analysis.diagnosis.discovery.beam import RankedSums, best_sums
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import axes_of, periodic_terms, terms_of
-from analysis.diagnosis.discovery.law_of_sum import hypothesis_of, law_of_sum
+from analysis.diagnosis.discovery.law_of_sum import law_of_sum
 from analysis.diagnosis.discovery.matched_filter import View, views_of
 from analysis.diagnosis.discovery.screen_terms import cross_validate_terms, products_of
 from analysis.diagnosis.discovery.snap_exponents import snap_exponents
 from analysis.diagnosis.errors.hypothesis import combine
+from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, is_worthwhile
@@ -148,7 +149,7 @@ def _starting_fit(context: SearchContext, base: Fitted, each: Sum) -> Fitted | N
     """The sum added to the fit, with the model's own numbers as they were or shifted as the sum's fit has them,
     whichever costs less."""
     recording = context.measure.records[0].recording
-    law = hypothesis_of(law_of_sum(each, recording), each.axis, recording)
+    law = hypothesis_of_law(law_of_sum(each, recording), each.axis, recording)
     found: list[Fitted] = []
     for deviations in (base.deviations, np.clip(base.deviations + each.model_shift, -RETUNING_BOUND, RETUNING_BOUND)):
         try:

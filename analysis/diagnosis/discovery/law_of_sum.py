@@ -1,12 +1,12 @@
-"""Turns a sum of terms into a law that can be simulated, and a law into a hypothesis to fit by output error."""
+"""Turns a sum of terms into a law that can be simulated, and a hypothesis into its laws."""
 
 import re
 from collections.abc import Sequence
 
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import AXES
-from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, hypothesis_of_claim
-from equalizer.effects.discovered_law import Channels, axis_names, law_effect, law_values
+from analysis.diagnosis.errors.hypothesis import Hypothesis
+from equalizer.effects.discovered_law import axis_names
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
 
@@ -30,16 +30,6 @@ def law_of_sum(of: Sum, recording: Recording) -> Law:
 
 def _renumber(shape: str, first: int) -> str:
     return _NUMBER.sub(lambda found: f"p{int(found[1]) + first}", shape)
-
-
-def hypothesis_of(law: Law, axis: int, recording: Recording) -> Hypothesis:
-    effect = law_effect(law, channels_of(recording))
-    return hypothesis_of_claim(Claim(effect, "one", (axis,)), [law_values(law)])
-
-
-def channels_of(recording: Recording) -> Channels:
-    response = recording.response
-    return Channels(recording.command.channels, response.channels, response.quantities[0])
 
 
 def laws_of(hypothesis: Hypothesis) -> tuple[Law | None, ...]:

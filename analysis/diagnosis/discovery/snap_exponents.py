@@ -6,9 +6,10 @@ from functools import reduce
 
 import numpy as np
 
-from analysis.diagnosis.discovery.law_of_sum import channels_of, laws_of
+from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.intervals import standard_errors
+from analysis.diagnosis.errors.law_hypothesis import channels_of
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, SearchContext, sensitivity_at
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
