@@ -18,6 +18,8 @@ from study.importing.map_format.map_toml import is_map, parse_map
 from study.store.disk.csv_rows import header_problem
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats import identified_model_file, recording_layout
+from study.store.formats.daily_check_file import FORMAT as DAILY_CHECK_FORMAT
+from study.store.formats.daily_check_file import read_daily_check
 from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model
@@ -119,6 +121,13 @@ def recognise_diagnosis(content: FileContent) -> str | None:
     return f"diagnosis, {found.verdict}: {', '.join(effect.effect for effect in found.effects) or 'no effects'}"
 
 
+def recognise_daily_check(content: FileContent) -> str | None:
+    if content.json_format != DAILY_CHECK_FORMAT:
+        return None
+    found = read_daily_check(content.path)
+    return f"daily check of {found.device} at {found.utc}: {'passed' if found.passed else 'something changed'}"
+
+
 def recognise_repeats(content: FileContent) -> str | None:
     if content.json_format != REPEATS_FORMAT:
         return None
@@ -177,6 +186,7 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     recognise_real_answer,
     recognise_reproduction,
     recognise_repeats,
+    recognise_daily_check,
     recognise_trajectory,
     recognise_trials,
     recognise_thresholds,

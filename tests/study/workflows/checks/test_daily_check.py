@@ -142,7 +142,7 @@ def two_days(recorded, device_like, vendor):
     return baseline, again
 
 
-def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, tmp_path):
+def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, capsys):
     _, check = two_days
     assert last_check(INFO).value == "none yet" and last_check(INFO).warning
     (device_folder() / "daily_checks").mkdir()
@@ -154,6 +154,8 @@ def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, t
             seed == 2,
             "omega.3",
         )
+        assert main(["validate", str(checked.file), str(checked.file.with_suffix(".h5"))]) == 0
+        assert f"daily check of omega.3 at {document['utc']}" in capsys.readouterr().out
         checked.file.rename(device_folder() / "daily_checks" / checked.file.name)
         found = last_check(INFO)
         assert said in found.value and checked.file.name in found.value

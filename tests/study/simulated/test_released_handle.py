@@ -1,0 +1,67 @@
+"""What the response to a stimulus tells of the grip, on the simulated omega.3: why a release is no stop."""
+
+import contextlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from equalizer.signals.signal import FloatArray, Signal
+from protocols.definition.apparatus import TestDirections
+from study.devices.clock import VirtualClock
+from study.devices.safe import SafeDevice
+from study.devices.simulated.omega3 import build_omega3
+from study.devices.simulated.packing import pack_parameters
+from study.devices.simulated.parameters import Hand, Omega3Parameters
+from study.session.stimulus.delivered import measure_delivered
+from study.session.stimulus.held_stimulus import HeldStimulus
+from study.session.stimulus.stimulus import direction_vector
+from study.store.formats.protocol_files import read_study_protocol
+from study.workflows.device_settings import device_settings
+
+PROTOCOL = read_study_protocol("direction_threshold").protocol
+VECTOR = direction_vector(TestDirections(), 1)
+LEVEL_N = 1.0
+
+
+def gripped(share: float) -> FloatArray:
+    """Parameters with so much of the simulated hand; 0: let go."""
+    hand = Hand(*(tuple(share * part for part in parts) for parts in vars_of(Hand())))
+    return pack_parameters(Omega3Parameters(hand=hand), share > 0, (0.0, 0.0, 0.0))
+
+
+def vars_of(hand: Hand) -> tuple[tuple[float, ...], ...]:
+    return hand.mass_kg, hand.damping_n_s_per_m, hand.stiffness_n_per_m
+
+
+def rise_db(frequency_hz: float, before: float, after: float, seed: int) -> float:
+    """Of the acceleration in the last second of a held stimulus, when the grip changes in the middle of it."""
+    found = []
+    for grip in (before, after):
+        rig = replace(build_omega3(seed, hand=True), parameters=gripped(before))
+        wave = LEVEL_N * np.sin(2 * np.pi * frequency_hz * np.arange(200) / 1000)[:, None] * VECTOR
+        loop = Signal(wave, 1000.0, "force", "N", ("fx", "fy", "fz"))
+        clock = VirtualClock()
+        with contextlib.closing(SafeDevice(rig, device_settings(PROTOCOL), clock)) as device:
+            device.hold(HeldStimulus(loop, 0.5, 0.05, "raised_cosine"))
+            for tenth in range(30):
+                if tenth == 15:
+                    rig.parameters[:] = gripped(grip)
+                clock.sleep(0.1)
+                device.keep_alive()
+            recording = device.release().recording
+        assert recording is not None
+        delivered = measure_delivered(recording, VECTOR, frequency_hz)
+        assert delivered is not None
+        found.append(delivered.along_mps2)
+    return float(20 * np.log10(found[1] / found[0]))
+
+
+@pytest.mark.parametrize("seed", [1])
+def test_a_released_grip_is_seen_in_the_response_and_so_is_one_that_only_became_lighter(seed):
+    released = {frequency: rise_db(frequency, 1.0, 0.0, seed) for frequency in (5.0, 25.0, 45.0)}
+    assert all(rise > 1.5 for rise in released.values())
+    lighter = {frequency: rise_db(frequency, 1.0, 0.25, seed) for frequency in released}
+    light_released = {frequency: rise_db(frequency, 0.25, 0.0, seed) for frequency in released}
+    # No threshold on the change names the release alone.
+    assert all(lighter[frequency] > light_released[frequency] > 0.3 for frequency in released)
