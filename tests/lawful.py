@@ -11,7 +11,7 @@ from analysis.diagnosis.search.search_context import SearchContext
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import simulate_mechanism
-from equalizer.laws.law import Law
+from equalizer.laws.law import ActsOn, Law
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
@@ -21,8 +21,8 @@ PLAN = (("multisine", 0.7, "fit"), ("multisine", 1.5, "fit"), ("multisine", 3.0,
 LOOKS = 2
 
 
-def law(expression: str, *numbers: float) -> Law:
-    return Law(expression, numbers, (), "force", "x")
+def law(expression: str, *numbers: float, acts_on: ActsOn = "force") -> Law:
+    return Law(expression, numbers, (), acts_on, "x")
 
 
 def recorded(laws: tuple[Law, ...], seed: int, noise: float = 1.0, plan=PLAN) -> Recording:

@@ -31,5 +31,8 @@ def found_law(law: Law) -> FoundLaw:
 
 
 def law_text(law: FoundLaw) -> str:
-    """ "F = -4.1*abs(vy)**1.5*sign(vy) N": what a law adds, or what it puts in the place of its command or response."""
-    return f"F = {law.expression} N" if law.acts_on == "force" else f"{law.axis} becomes {law.expression}"
+    """ "F = -4.1*abs(vy)**1.5*sign(vy) N": what a law adds, or what it puts in the place of its command or reading."""
+    if law.acts_on == "force":
+        return f"F = {law.expression} N"
+    replaced = "command" if law.acts_on == "command" else "reading"
+    return f"in place of the {replaced} of {law.axis}: {law.expression}"

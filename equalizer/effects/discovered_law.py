@@ -12,7 +12,7 @@ from equalizer.laws.law import Law
 from equalizer.laws.parse import MEMORY
 from equalizer.laws.program import DEEPEST, program_of
 from equalizer.laws.roles import Role, roles
-from equalizer.laws.tree import Apply, nodes
+from equalizer.laws.tree import Apply, Node, Variable, nodes
 from equalizer.laws.units import FORCE, SECOND, motion_dimension, units_of
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
@@ -79,8 +79,15 @@ def law_with_values(law: Law, values: Values) -> Law:
 
 def law_parameters(law: Law) -> tuple[Parameter, ...]:
     found = roles(law.tree)
-    none = 0.0 if law.acts_on == "force" else None
+    none = 0.0 if law.acts_on == "force" or _adds_to_signal(law.tree) else None
     return tuple(_parameter(f"p{place}", number, found[place], none) for place, number in enumerate(law.numbers))
+
+
+def _adds_to_signal(tree: Node) -> bool:
+    """Whether it is a signal plus terms: without these it changes nothing."""
+    while isinstance(tree, Apply) and tree.name in ("+", "-"):
+        tree = tree.parts[0]
+    return isinstance(tree, Variable)
 
 
 def _parameter(name: str, number: float, role: Role, none: float | None) -> Parameter:
@@ -114,6 +121,14 @@ def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
     if len(set(ends)) == len(ends) and set(ends) <= set(LETTERS):
         return ends
     return tuple(LETTERS[: len(channels)])
+
+
+def reading_names(channels: Channels) -> tuple[str, ...]:
+    """Names of the response's channels in a formula: ax, ay, az of accelerations, or as the recording calls them."""
+    found: dict[int, str] = {}
+    for name, number in _response_signals(channels).items():
+        found.setdefault(number, name)
+    return tuple(found[number] for number in sorted(found))
 
 
 def force_signals(channels: Channels) -> dict[str, int]:

@@ -32,7 +32,6 @@ CATALOGUES = {
 
 LONG_FILES: set[str] = set()
 SMALL_BESIDE_THEIR_IMPORTER = {
-    "analysis/diagnosis/discovery/evaluate_shape.py",
     "study/devices/rigs_by_name.py",
     "study/tui/app/everywhere.py",
     "study/tui/app/load_screens.py",

@@ -122,10 +122,12 @@ def _fit_best_shapes(
 ) -> tuple[Sum, ...]:
     """The best-ranked shapes, each fitted together with the terms in `held`, sorted by held-out error."""
     shapes: dict[str, Term] = {}
+    families: set[str] = set()
     for number in order:
-        if terms[number].shape not in {term.shape for term in held}:
-            shapes.setdefault(terms[number].shape, terms[number])
-        if len(shapes) == LAW_REFINED:
-            break
+        term = terms[number]
+        family = term.family or term.shape
+        if term.shape not in {each.shape for each in held} and (len(families) < LAW_REFINED or family in families):
+            shapes.setdefault(term.shape, term)
+            families.add(family)
     found = [fit_sum(base, (*held, term)) for term in shapes.values() if time_left()]
     return tuple(sorted((each for each in found if each is not None), key=lambda each: each.cross_validated))

@@ -1,19 +1,26 @@
-"""Forward selection of discovered laws: at the axis where most force is missing, the best sum of terms is fitted."""
+"""Forward selection of discovered laws: where most is missing, on an axis or a reading, the best sum of terms is
+fitted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
-from analysis.diagnosis.discovery.beam import RankedSums, best_sums
+from analysis.diagnosis.discovery.antisymmetric_pairs import (
+    antisymmetric_pairs,
+    coupling_taken,
+    pair_starts,
+    with_equal_halves,
+)
+from analysis.diagnosis.discovery.beam import best_sums
 from analysis.diagnosis.discovery.fit_sum import Sum
-from analysis.diagnosis.discovery.grammar import axes_of, periodic_terms, terms_of
-from analysis.diagnosis.discovery.law_of_sum import law_of_sum
+from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum
 from analysis.diagnosis.discovery.matched_filter import View, views_of
 from analysis.diagnosis.discovery.screen_terms import cross_validate_terms, products_of
 from analysis.diagnosis.discovery.snap_exponents import snap_exponents
-from analysis.diagnosis.errors.hypothesis import combine
-from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
+from analysis.diagnosis.discovery.view_terms import view_terms
+from analysis.diagnosis.errors.hypothesis import combine, without_claim
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, is_worthwhile
@@ -66,28 +73,37 @@ def discover(context: SearchContext, known: Explanation, progress: Progress, tim
         found = _find_next_law(context, base.fitted, time_left)
         if found is None or not is_worthwhile(base, found.fitted_candidates[0]):
             break
+        if found.sums[0].partner is not None:
+            steps.append(_first_half(context, found.fitted_candidates[0]))
         base = found.fitted_candidates[0]
         rounds.append(found)
         steps.append(base)
     if not rounds:
         return None
-    last = context.candidate(snap_exponents(context, base.fitted))
+    snapped = snap_exponents(context, base.fitted)
+    last = context.candidate(with_equal_halves(context.measure, context.tuning, snapped))
     steps[-1] = last
     whole = Explanation(
         known.before,
         known.retuned,
         context.with_test_score(last),
-        tuple(each.fitted_candidates for each in rounds),
+        tuple(each.fitted_candidates for each in rounds for _ in range(1 if each.sums[0].partner is None else 2)),
         tuple(steps),
     )
     return Discovery(whole, tuple(rounds))
 
 
+def _first_half(context: SearchContext, pair: FittedCandidate) -> FittedCandidate:
+    """The candidate without the second law of its pair: each named law has a step of its own."""
+    hypothesis = without_claim(pair.fitted.hypothesis, len(pair.fitted.hypothesis.claims) - 1)
+    return context.candidate(evaluate_fit(context.measure, context.tuning, pair.fitted.deviations, hypothesis))
+
+
 def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) -> Round | None:
     views = views_of(context.measure, context.tuning, base)
-    ranked_sums = [_search_axis(view, time_left) for view in _axes_to_search(views)]
+    searched = [(view, best_sums(products_of(view), view_terms(view), time_left)) for view in _views_to_search(views)]
     every = sorted(
-        (item for found in ranked_sums for item in found.sums),
+        (*(item for _, found in searched for item in found.sums), *antisymmetric_pairs(views)),
         key=lambda item: _explained_squares(views, item),
         reverse=True,
     )
@@ -111,10 +127,11 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) 
         if _count_numbers(pair[1]) < _count_numbers(fits[0][1]) and inseparable(refined[0][0], pair[0])
     ]
     refined += [(context.candidate(refine(context, candidate.fitted)), item) for candidate, item in close]
-    ranked = _put_plainest_first([*refined, *(pair for pair in rest if pair not in close)])
+    ranked = _put_plainest_first(context, [*refined, *(pair for pair in rest if pair not in close)])
     first = ranked[0][1]
-    # Of the axis that it acts along.
-    placebo = max(found.placebo for found in ranked_sums if any(item.axis == first.axis for item in found.sums))
+    # Of the axes that it acts along.
+    own = [(each.acts_on, each.axis) for each in (first, first.partner) if each is not None]
+    placebo = max((found.placebo for view, found in searched if (view.acts_on, view.axis) in own), default=0.0)
     taken = 1 - first.cross_validated / max(first.without, 1e-300)
     return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo, taken)
 
@@ -128,11 +145,14 @@ def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
     return first if other is None else [*first, other]
 
 
-def _put_plainest_first(pairs: Sequence[tuple[FittedCandidate, Sum]]) -> list[tuple[FittedCandidate, Sum]]:
-    """By error; but first comes, of those that these data cannot tell from the best, the one with fewest numbers."""
+def _put_plainest_first(
+    context: SearchContext, pairs: Sequence[tuple[FittedCandidate, Sum]]
+) -> list[tuple[FittedCandidate, Sum]]:
+    """By error; but first comes, of those that these data cannot tell from the best, the one with fewest numbers, and
+    of these the one that asks least of the model's own coupled numbers."""
     ranked = sorted(pairs, key=lambda pair: pair[0].score.mean_log_error)
     alike = [pair for pair in ranked if inseparable(ranked[0][0], pair[0])]
-    first = min(alike, key=lambda pair: _count_numbers(pair[1]))
+    first = min(alike, key=lambda pair: (_count_numbers(pair[1]), coupling_taken(context.tuning, pair[0].fitted)))
     return [first, *(pair for pair in ranked if pair is not first)]
 
 
@@ -149,22 +169,29 @@ def _starting_fit(context: SearchContext, base: Fitted, each: Sum) -> Fitted | N
     """The sum added to the fit, with the model's own numbers as they were or shifted as the sum's fit has them,
     whichever costs less."""
     recording = context.measure.records[0].recording
-    law = hypothesis_of_law(law_of_sum(each, recording), each.axis, recording)
+    shifted = np.clip(base.deviations + each.model_shift, -RETUNING_BOUND, RETUNING_BOUND)
+    starts = (each,) if each.partner is None else pair_starts(each)
     found: list[Fitted] = []
-    for deviations in (base.deviations, np.clip(base.deviations + each.model_shift, -RETUNING_BOUND, RETUNING_BOUND)):
+    for start, deviations in product(starts, (base.deviations, shifted)):
+        whole = combine(base.hypothesis, hypothesis_of_sum(start, recording))
         try:
-            found.append(evaluate_fit(context.measure, context.tuning, deviations, combine(base.hypothesis, law)))
+            found.append(evaluate_fit(context.measure, context.tuning, deviations, whole))
         except (MechanicalModelError, np.linalg.LinAlgError):
             continue
     return min(found, key=lambda start: start.cost, default=None)
 
 
-def _axes_to_search(views: Sequence[View]) -> list[View]:
-    """The two axes with the largest excess error at most, the largest first."""
-    missing = [(_excess(view), view.axis) for view in views]
-    most = max(excess for excess, _ in missing)
-    worth = [(excess, axis) for excess, axis in missing if excess > LAW_ALMOST_NOISE]
-    return [views[axis] for excess, axis in sorted(worth, reverse=True)[:2] if excess >= LAW_AXES_SHARE * most]
+def _views_to_search(views: Sequence[View]) -> list[View]:
+    """Of axes and of readings, the two with the largest excess error each at most, the largest first."""
+    found: list[View] = []
+    for acts_on in ("force", "response"):
+        missing = [(_excess(view), view.output) for view in views if view.acts_on == acts_on]
+        most = max((excess for excess, _ in missing), default=0.0)
+        worth = [(excess, output) for excess, output in missing if excess > LAW_ALMOST_NOISE]
+        found += [
+            views[output] for excess, output in sorted(worth, reverse=True)[:2] if excess >= LAW_AXES_SHARE * most
+        ]
+    return found
 
 
 def _excess(view: View) -> float:
@@ -174,17 +201,11 @@ def _excess(view: View) -> float:
     return float(without.sum()) / (view.noise * len(view.residual))
 
 
-def _search_axis(view: View, time_left: TimeBudget) -> RankedSums:
-    seen = view.records[0]
-    axes = axes_of(seen.columns, seen.missing_force.shape[1])
-    terms = terms_of(axes, view.axis, len(seen.missing_force) / seen.rate_hz, seen.rate_hz)
-    lines = periodic_terms(seen.columns, axes[view.axis], seen.missing_force[:, view.axis], seen.rate_hz)
-    return best_sums(products_of(view), (*terms, *lines), time_left)
-
-
 def _explained_squares(views: Sequence[View], each: Sum) -> float:
-    view = views[each.axis]
-    return (each.without - each.cross_validated) * view.noise * len(view.residual)
+    view = next(view for view in views if (view.acts_on, view.axis) == (each.acts_on, each.axis))
+    own = (each.without - each.cross_validated) * view.noise * len(view.residual)
+    # A pair's errors are the mean of both halves'.
+    return own if each.partner is None else 2 * own
 
 
 def _keep_close_to_best(sums: Sequence[Sum]) -> list[Sum]:
@@ -198,7 +219,8 @@ def _keep_close_to_best(sums: Sequence[Sum]) -> list[Sum]:
 
 def _best_of_each_structure(sums: Sequence[Sum]) -> list[Sum]:
     """The best of each structure."""
-    found: dict[tuple[int, frozenset[str]], Sum] = {}
+    found: dict[object, Sum] = {}
     for each in sums:
-        found.setdefault((each.axis, frozenset(term.shape for term in each.terms)), each)
+        shapes = frozenset(term.shape for term in each.terms)
+        found.setdefault((each.acts_on, each.axis, each.partner is None, shapes), each)
     return list(found.values())

@@ -1,10 +1,12 @@
-"""Evaluates a term's formula along the samples of a recording, vectorised where it has no memory."""
+"""Evaluates a term's formula along the samples of a recording, vectorised where it has no memory; gathers the signals
+that it may hold."""
 
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.discovery.grammar import Columns
+from analysis.diagnosis.discovery.grammar import AXES, Columns
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
 from equalizer.laws.parse import MEMORY, parse_formula
@@ -16,6 +18,19 @@ _WHOLE: Mapping[str, Callable[..., FloatArray]] = {
     "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "sqrt": np.sqrt, "abs": np.abs,
     "sign": np.sign, "tanh": np.tanh, "atan": np.arctan, "minimum": np.minimum, "maximum": np.maximum,
 }  # fmt: skip
+
+
+def columns_of(evidence: Evidence) -> Columns:
+    """Signals by their names in the grammar: x, vx and fx of the first axis, ax of the first channel of the response as
+    the model foresees it (free of noise), and so on; t."""
+    n, m = evidence.command.shape
+    found = {"t": np.arange(n) / evidence.sample_rate_hz}
+    for axis, name in zip(range(m), AXES, strict=False):
+        found[name] = evidence.axis_position[:, axis]
+        found[f"v{name}"] = evidence.axis_velocity[:, axis]
+        found[f"f{name}"] = evidence.command[:, axis]
+    found |= {f"a{name}": channel for name, channel in zip(AXES, evidence.predicted.T, strict=False)}
+    return {name: np.ascontiguousarray(column) for name, column in found.items()}
 
 
 def evaluate_shape(shape: str, numbers: Sequence[float], columns: Columns, rate_hz: float) -> FloatArray:

@@ -13,6 +13,7 @@ from analysis.diagnosis.discovery.evaluate_shape import evaluate_shape
 from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.matched_filter import View
 from analysis.diagnosis.discovery.screen_terms import Products, Solution, add_columns, cross_validate_terms, solve
+from equalizer.laws.law import ActsOn
 from equalizer.signals.signal import FloatArray
 
 _MOVE = 1e-3
@@ -24,6 +25,7 @@ _CONVERGED = 1e-3
 @dataclass(frozen=True, slots=True, eq=False)
 class Sum:
     axis: int
+    """Driven axis, or channel of the response."""
     terms: tuple[Term, ...]
     factors: tuple[float, ...]
     """SI"""
@@ -35,20 +37,24 @@ class Sum:
     """Jackknife error of the first factor over the blocks, as a share of it."""
     model_shift: tuple[float, ...]
     """(t,): change of the model's own numbers that is fitted with it, in standard deviations."""
+    acts_on: ActsOn = "force"
+    partner: "Sum | None" = None
+    """The same on another axis, as a part of the same law."""
 
     @property
     def variables(self) -> tuple[str, ...]:
-        return tuple(sorted(frozenset[str]().union(*(term.variables for term in self.terms))))
+        own = frozenset[str]().union(*(term.variables for term in self.terms))
+        return tuple(sorted(own.union(() if self.partner is None else self.partner.variables)))
 
 
 def column_of(view: View, term: Term) -> FloatArray | None:
-    """(s,): the term's force through the matched filter; None where it is not finite."""
+    """(s,): the term through the view's filter; None where it is not finite."""
     parts = []
     for seen in view.records:
         force = evaluate_shape(term.shape, term.numbers, seen.columns, seen.rate_hz)
         if not np.isfinite(force).all():
             return None
-        parts.append(seen.column(force, view.axis))
+        parts.append(seen.column(force, view.output))
     return np.concatenate(parts)
 
 
@@ -88,6 +94,7 @@ def _score_sum(base: Products, terms: tuple[Term, ...], columns: Sequence[FloatA
         float(alone.without.sum()) / size,
         spread,
         tuple(best.weights[: len(view.parameter_columns) - 1].tolist()),
+        view.acts_on,
     )
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 Columns = Mapping[str, FloatArray]
-"""Along a recording, (n,) each, SI: x, y, z and vx, … the axes' motion, fx, … the commands, t."""
+"""Along a recording, (n,) each, SI: x, y, z and vx, … the axes' motion, fx, … the commands, ax, … the readings, t."""
 AXES = "xyz"
-_SIGNAL = re.compile(rf"\b(?:[vf]?[{AXES}]|t)\b")
+_SIGNAL = re.compile(rf"\b(?:[vfa]?[{AXES}]|t)\b")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +31,8 @@ class Term:
     """Which of them are exponents."""
     turns: tuple[int, ...] = ()
     """Which of them are angles: all others are positive."""
+    family: str = ""
+    """Shapes of one family differ by a whole exponent: one of them ranked high, all are fitted. Empty: the shape."""
 
     @property
     def variables(self) -> frozenset[str]:
@@ -115,19 +117,29 @@ def _saturations(of: Axis) -> Iterator[Term]:
     for (name, size), share in product(((of.v, of.speed), (of.x, of.travel)), (0.03, 0.1, 0.3, 1.0)):
         width = (share * size,), ((1e-3 * size, 10 * size),)
         yield Term(f"tanh({name}/p0)", *width)
+        yield Term(f"atan({name}/p0)", *width)
         yield Term(f"{name}/(1 + abs({name})/p0)", *width)
         yield Term(f"{name}/(1 + ({name}/p0)**2)", *width)
         yield Term(f"{name}*exp(-({name}/p0)**2)", *width)
-    for share in (0.1, 0.3, 1.0):
-        yield Term(f"tanh({of.f}/p0)", (share * of.force,), ((1e-3 * of.force, 10 * of.force),))
+    yield from bent_terms(of.f, of.force)
+
+
+def bent_terms(name: str, size: float) -> Iterator[Term]:
+    """Soft limits of a command or a reading, less itself, so that small signals pass unchanged: the model's numbers
+    hold no gain that could make up for it. size: its largest value."""
+    for curve, share in product(("tanh({0}/p0)*p0", "atan({0}/p0)*p0", "{0}/(1 + abs({0})/p0)"), (0.2, 0.5, 1.0, 2.0)):
+        yield Term(f"({curve.format(name)} - {name})", (share * size,), ((1e-2 * size, 20 * size),))
 
 
 def _poles(of: Axis) -> Iterator[Term]:
-    """Inverse powers of the distance to a position that the axis never reached, with or without their value at zero."""
-    for share, power, side in product((1.15, 1.5, 2.5), (1.0, 2.0, 3.0), (of.x, f"(-{of.x})")):
-        beyond = (1.02 * of.travel, 20 * of.travel)
+    """Inverse powers of the distance to a position that the axis never reached, with or without their value at zero. A
+    free exponent trades against the position in a narrow valley, so that whole ones are fitted for themselves."""
+    beyond = (1.02 * of.travel, 20 * of.travel)
+    for share, power, side in product((1.15, 1.5, 2.5), (1, 2, 3), (of.x, f"(-{of.x})")):
+        whole = f"(1/abs(p0 - {side})**{power} - 1/p0**{power})"
+        yield Term(whole, (share * of.travel,), (beyond,), family=f"pole of {side}")
         for shape in (f"(1/abs(p0 - {side})**p1 - 1/p0**p1)", f"1/abs(p0 - {side})**p1"):
-            yield Term(shape, (share * of.travel, power), (beyond, POWER), (1,))
+            yield Term(shape, (share * of.travel, float(power)), (beyond, POWER), (1,))
 
 
 def _memory(of: Axis, others: Sequence[Axis], seconds: float, rate_hz: float) -> Iterator[Term]:

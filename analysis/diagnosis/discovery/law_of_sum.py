@@ -2,34 +2,54 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import AXES
-from analysis.diagnosis.errors.hypothesis import Hypothesis
-from equalizer.effects.discovered_law import axis_names
+from analysis.diagnosis.errors.hypothesis import Hypothesis, combine
+from analysis.diagnosis.errors.law_hypothesis import channels_of, hypothesis_of_law
+from equalizer.effects.discovered_law import axis_names, has_memory, reading_names
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
 
 _NUMBER = re.compile(r"\bp(\d+)\b")
-_SIGNAL = re.compile(rf"\b([vf]?)([{AXES}])\b")
+_SIGNAL = re.compile(rf"\b([vfa]?)([{AXES}])\b")
 
 
 def law_of_sum(of: Sum, recording: Recording) -> Law:
     """The sum as a law: p0 is the first term's factor, then its numbers, then the next term's. The grammar calls the
-    driven axes x, y, z in their order; the law calls them as the recording does."""
-    names = axis_names(recording.command.channels)
+    driven axes and the channels of the response x, y, z in their order; the law calls them as the recording does. What
+    hangs on commands alone and remembers nothing is a law of the command: then it can be undone."""
+    channels = channels_of(recording)
+    names, readings = axis_names(channels.inputs), reading_names(channels)
     parts: list[str] = []
     numbers: list[float] = []
     for term, factor in zip(of.terms, of.factors, strict=True):
         first = len(numbers)
         numbers += [factor, *term.numbers]
         parts.append(f"p{first}*{_renumber(term.shape, first + 1)}")
-    text = _SIGNAL.sub(lambda found: found[1] + names[AXES.index(found[2])], " + ".join(parts))
-    return Law(text, tuple(numbers), (), "force", names[of.axis])
+
+    def rename(found: re.Match[str]) -> str:
+        place = AXES.index(found[2])
+        return readings[place] if found[1] == "a" else found[1] + names[place]
+
+    text = _SIGNAL.sub(rename, " + ".join(parts))
+    if of.acts_on == "response":
+        letter = axis_names(channels.outputs)[of.axis]
+        return Law(f"{readings[of.axis]} + {text}", tuple(numbers), (), "response", letter)
+    law = Law(text, tuple(numbers), (), "force", names[of.axis])
+    if all(name.startswith("f") for name in of.variables) and not has_memory(law):
+        return replace(law, expression=f"f{names[of.axis]} + {text}", acts_on="command")
+    return law
 
 
 def _renumber(shape: str, first: int) -> str:
     return _NUMBER.sub(lambda found: f"p{int(found[1]) + first}", shape)
+
+
+def hypothesis_of_sum(of: Sum, recording: Recording) -> Hypothesis:
+    own = hypothesis_of_law(law_of_sum(of, recording), of.axis, recording)
+    return own if of.partner is None else combine(own, hypothesis_of_sum(of.partner, recording))
 
 
 def laws_of(hypothesis: Hypothesis) -> tuple[Law | None, ...]:

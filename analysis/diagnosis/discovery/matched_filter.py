@@ -2,7 +2,7 @@
 
 Of all channels only what such a force could have caused is kept, scaled so that noise stays white and inner products of
 columns are those of the simulated responses. A column of force costs two Fourier transforms instead of a simulation.
-Where forces are compared, the filter is the band alone.
+Where forces are compared, and for what is added to a reading, the filter is the band alone.
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.discovery.evaluate_shape import columns_of
 from analysis.diagnosis.discovery.grammar import AXES, Columns
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import MOVED, Fitted
@@ -21,6 +22,7 @@ from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.forces.transfer import axis_transfer
 from analysis.diagnosis.settings import LAW_BLOCKS, LAW_POWER_KEPT, SETTLED_CONSTANTS
 from equalizer.effects.starts.evidence import Evidence
+from equalizer.laws.law import ActsOn
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.band_limited import low_pass_gain
@@ -32,7 +34,8 @@ _SETTLING_S = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilteredRecord:
-    """One record's matched filters for forces along the driven axes."""
+    """One record's filters: matched ones for forces along the m driven axes, then the band alone for p readings. An
+    output is one of these m + p."""
 
     columns: Columns
     missing_force: FloatArray
@@ -44,30 +47,38 @@ class FilteredRecord:
     """(lines, c, m): frequency response from a force to the residuals, up to the last line with command power."""
     strength: FloatArray
     """(lines, m)"""
+    reading_units: FloatArray
+    """(p,): units of the residuals of the response channels; none where forces are compared."""
     block_slices: tuple[slice, ...]
     """Blocks, in decimated samples."""
 
     def filter_residuals(self, residuals: FloatArray) -> FloatArray:
-        """(kept samples, m): residuals (n, c) through the matched filter of each axis."""
-        spectrum = rfft(residuals, self.length, axis=0)[: len(self.force_response)]
-        found = np.einsum("lcm,lc->lm", np.conj(self.force_response), spectrum) / self.strength
-        return self._select_blocks(found)
+        """(kept samples, m + p): residuals (n, c) through the filter of each output."""
+        return self._filter_spectrum(rfft(residuals, self.length, axis=0)[: len(self.force_response)])
+
+    def _filter_spectrum(self, spectrum: ComplexArray) -> FloatArray:
+        """spectrum: (lines, c) of residuals."""
+        along = np.einsum("lcm,lc->lm", np.conj(self.force_response), spectrum) / self.strength
+        return self._select_blocks(np.hstack([along, spectrum[:, : len(self.reading_units)]]))
 
     def filter_forces(self, forces: FloatArray) -> FloatArray:
-        """(kept samples, m): the residuals that forces (n, m), N, cause, through the same filter. Each force acts as in
-        `column`."""
+        """(kept samples, m + p): the residuals that forces (n, m), N, cause, through the same filters. Each force acts
+        as in `column`."""
         mean = forces.copy()
         mean[:-1] = 0.5 * (forces[1:] + forces[:-1])
         spectrum = rfft(mean, self.length, axis=0)[: len(self.force_response)]
-        seen = np.einsum("lcm,lm->lc", self.force_response, spectrum)
-        return self._select_blocks(np.einsum("lcm,lc->lm", np.conj(self.force_response), seen) / self.strength)
+        return self._filter_spectrum(np.einsum("lcm,lm->lc", self.force_response, spectrum))
 
-    def column(self, force: FloatArray, axis: int) -> FloatArray:
-        """(kept samples,): the filter's output for a force (n,), N, along one axis. Sampled at each sample, it acts as
-        the mean over the step that begins there."""
-        mean = force.copy()
-        mean[:-1] = 0.5 * (force[1:] + force[:-1])
-        spectrum = rfft(mean, self.length)[: len(self.force_response)] * self.strength[:, axis]
+    def column(self, added: FloatArray, output: int) -> FloatArray:
+        """(kept samples,): one filter's output for a force (n,), N, along its axis, or for what is added to its
+        reading. Sampled at each sample, a force acts as the mean over the step that begins there."""
+        lines, axes = self.strength.shape
+        if output >= axes:
+            spectrum = rfft(added, self.length)[:lines] / self.reading_units[output - axes]
+        else:
+            mean = added.copy()
+            mean[:-1] = 0.5 * (added[1:] + added[:-1])
+            spectrum = rfft(mean, self.length)[:lines] * self.strength[:, output]
         return self._select_blocks(spectrum[:, None])[:, 0]
 
     def _select_blocks(self, spectrum: ComplexArray) -> FloatArray:
@@ -78,15 +89,19 @@ class FilteredRecord:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The filtered residual along one axis, with what the model's own numbers would explain of it."""
+    """The filtered residual of one output, with what the model's own numbers would explain of it."""
 
+    output: int
+    acts_on: ActsOn
+    """What a term of it is: a force, or what is added to a response."""
     axis: int
+    """The driven axis, or the channel of the response."""
     records: tuple[FilteredRecord, ...]
     residual: FloatArray
     """(s,), over all records and blocks."""
     parameter_columns: FloatArray
     """(t + 1, s): what one standard deviation of each of the model's own numbers would explain of it, and a constant
-    force."""
+    force or reading."""
     pull: FloatArray
     """(t + 1,): the calibration's values of these numbers less the present ones, in standard deviations."""
     edges: tuple[int, ...]
@@ -96,7 +111,7 @@ class View:
 
 
 def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
-    """One view per driven axis."""
+    """One view per driven axis, then one per channel of the response."""
     model, placed = tuning.tune(fitted.deviations), fitted.hypothesis.placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
     seen = tuple(_filter_record(measure, record, own) for record, own in zip(measure.records, evidence, strict=True))
@@ -109,11 +124,13 @@ def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Vie
     edges = _edges(seen)
     pull = np.append(-fitted.deviations, 0.0)
     views = []
-    for axis in range(model.inputs):
-        constant = np.concatenate([each.column(np.ones(len(each.missing_force)), axis) for each in seen])
-        tuned = np.vstack([columns[:, :, axis].reshape(-1, len(residual)), constant])
-        noise = _noise(measure, seen, axis)
-        views.append(View(axis, seen, residual[:, axis], tuned, pull, edges, noise))
+    for output in range(residual.shape[1]):
+        acts_on: ActsOn = "force" if output < model.inputs else "response"
+        axis = output if output < model.inputs else output - model.inputs
+        constant = np.concatenate([each.column(np.ones(len(each.missing_force)), output) for each in seen])
+        tuned = np.vstack([columns[:, :, output].reshape(-1, len(residual)), constant])
+        noise = _noise(measure, seen, axis) if acts_on == "force" else float((measure.noise / measure.unit)[axis] ** 2)
+        views.append(View(output, acts_on, axis, seen, residual[:, output], tuned, pull, edges, noise))
     return tuple(views)
 
 
@@ -124,7 +141,7 @@ def _zero_missing(left: FloatArray) -> FloatArray:
 def _parameter_columns(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, seen: Sequence[FilteredRecord], number: int
 ) -> FloatArray:
-    """(s, m): effect of one standard deviation of one of the model's numbers. That of mass, damping and stiffness
+    """(s, m + p): effect of one standard deviation of one of the model's numbers. That of mass, damping and stiffness
     follows from the force along the measured motion, exact however wrong the model is; that of modes from the model
     without the hypothesis."""
     m = tuning.model.inputs
@@ -144,7 +161,8 @@ def _parameter_columns(
             for each, before, after in zip(seen, base, moved, strict=True)
         ]
         return np.concatenate(change)
-    return np.zeros((sum(part.stop - part.start for each in seen for part in each.block_slices), m))
+    kept = sum(part.stop - part.start for each in seen for part in each.block_slices)
+    return np.zeros((kept, m + len(seen[0].reading_units)))
 
 
 def _parameter_force(
@@ -178,7 +196,9 @@ def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) 
     # What a force does near the end is cut off there.
     end = n - min(_settling_samples(measure, evidence), n // 4)
     kept = tuple(slice(int(a * share), int(min(b, end) * share)) for a, b in _blocks(record) if a < end)
-    return FilteredRecord(columns_of(evidence), evidence.axis_force, rate_hz, length, through, strength, kept)
+    forces = isinstance(measure, PredictedForce)
+    units = measure.unit[: 0 if forces else evidence.response.shape[1]]
+    return FilteredRecord(columns_of(evidence), evidence.axis_force, rate_hz, length, through, strength, units, kept)
 
 
 def _force_response(measure: ErrorMeasure, evidence: Evidence, lines: FloatArray) -> ComplexArray:
@@ -197,16 +217,6 @@ def _settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
         return 0
     slowest = float(np.abs(np.linalg.eigvals(linear_steps(evidence.model, 1 / evidence.sample_rate_hz).advance)).max())
     return int(SETTLED_CONSTANTS / -np.log(slowest)) if slowest < 1 else len(evidence.command)
-
-
-def columns_of(evidence: Evidence) -> Columns:
-    m = evidence.command.shape[1]
-    found = {"t": np.arange(len(evidence.command)) / evidence.sample_rate_hz}
-    for axis, name in zip(range(m), AXES, strict=False):
-        found[name] = evidence.axis_position[:, axis]
-        found[f"v{name}"] = evidence.axis_velocity[:, axis]
-        found[f"f{name}"] = evidence.command[:, axis]
-    return {name: np.ascontiguousarray(column) for name, column in found.items()}
 
 
 def _blocks(record: Observed) -> list[tuple[int, int]]:

@@ -5,13 +5,13 @@ found in confirm it (extrapolation), where its numbers are the same in every str
 in a shuffled force finds nothing (negative control), and where no law of other variables fits as well.
 """
 
-import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.discovery.antisymmetric_pairs import is_taken_by_coupling
 from analysis.diagnosis.discovery.discover import Discovery
 from analysis.diagnosis.discovery.law_of_sum import law_of_sum, laws_of
 from analysis.diagnosis.effect_words import noun_of
@@ -29,11 +29,9 @@ SAME_KIND = (
 )
 
 HALF_TAKEN = (
-    "the model's own coupled damping or stiffness, which acts on both axes alike, takes half of any such force: a "
-    "gyroscopic pair of half its size does as well"
+    "the model's own coupled damping or stiffness, which acts on both axes alike, can take half of such a force: a "
+    "force on one axis and an antisymmetric pair of half its size do as well"
 )
-_COUPLED = re.compile(r"p0\*v?[a-z]")
-"""Linear in the motion of another axis; in its own the model is."""
 
 
 def reasons_against(context: SearchContext, of: Discovery, rivals: Sequence[FittedCandidate]) -> tuple[str, ...]:
@@ -55,7 +53,8 @@ def _reasons_against(context: SearchContext, of: Discovery, rivals: Sequence[Fit
                 f"{100 * found.placebo:.0f} % of one that is shuffled in time"
             )
         yield from _equally_good_laws(context, of, number)
-    if any(law is not None and _COUPLED.fullmatch(law.expression) for law in laws_of(of.found.after.fitted.hypothesis)):
+    inputs = context.whole.records[0].recording.command.channels
+    if is_taken_by_coupling(context.tuning, of.found.after.fitted, inputs):
         yield HALF_TAKEN
     yield from _insignificant_gain(context, of.found.after, (of.found.retuned, "the re-tuned model"))
     for rival in rivals:

@@ -166,10 +166,11 @@ def balance_errors(
 
 
 def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Each effect at its best place."""
-    first: dict[str, Candidate] = {}
+    """Each effect at its best place. Laws without a name differ by their formulas: those of one answer all stay."""
+    first: dict[object, Candidate] = {}
     for candidate in candidates:
-        first.setdefault(candidate.effect, candidate)
+        law = candidate.law
+        first.setdefault(candidate.effect if law is None else (law.axis, law.expression), candidate)
     return tuple(first.values())
 
 

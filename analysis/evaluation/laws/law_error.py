@@ -35,7 +35,7 @@ def _axis_error(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
         if law.axis[-1] != axis or (law.acts_on == "response") != fresh.response:
             continue
         replaced = {"force": None, "command": f"f{axis}", "response": f"a{axis}"}[law.acts_on]
-        said = evaluate(law, fresh.columns, fresh.rate_hz)
+        said = evaluate(law, _begin_at_rest(fresh), fresh.rate_hz)[1:]
         found = found + said - (0.0 if replaced is None else fresh.columns[replaced])
     if not np.isfinite(found).all():
         return float("inf")
@@ -46,6 +46,12 @@ def _axis_error(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
         return float(np.linalg.norm(force - base @ (base.T @ force)))
 
     return beside(true - found) / max(beside(true), 1e-300)
+
+
+def _begin_at_rest(fresh: FreshMotion) -> Mapping[str, FloatArray]:
+    """The signals with a sample of rest before them: what a law remembers began there, as the device did."""
+    columns = {name: np.concatenate([[0.0], column]) for name, column in fresh.columns.items()}
+    return columns | {"t": np.concatenate([[fresh.columns["t"][0] - 1 / fresh.rate_hz], fresh.columns["t"]])}
 
 
 def _normalise(column: FloatArray) -> FloatArray:

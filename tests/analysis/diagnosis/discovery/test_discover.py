@@ -11,12 +11,13 @@ from analysis.diagnosis.discovery.add_laws import add_laws
 from analysis.diagnosis.discovery.beam import best_sums
 from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.fit_sum import Sum
-from analysis.diagnosis.discovery.grammar import Term, axes_of, periodic_terms, terms_of
+from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.law_of_sum import law_of_sum, laws_of
 from analysis.diagnosis.discovery.matched_filter import views_of
 from analysis.diagnosis.discovery.proof import SAME_KIND
 from analysis.diagnosis.discovery.screen_terms import products_of
 from analysis.diagnosis.discovery.snap_exponents import simplify_powers
+from analysis.diagnosis.discovery.view_terms import view_terms
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.result.wording import summary_lines
@@ -120,14 +121,7 @@ def test_a_shuffled_force_holds_no_law(seed=9):
     view = views_of(
         context.measure, context.tuning, evaluate_fit(context.measure, context.tuning, fitted.deviations, NOTHING)
     )[0]
-    seen = view.records[0]
-    axis = axes_of(seen.columns, 1)
-    terms = terms_of(axis, 0, len(seen.missing_force) / seen.rate_hz, seen.rate_hz)
-    found = best_sums(
-        products_of(view),
-        (*terms, *periodic_terms(seen.columns, axis[0], seen.missing_force[:, 0], seen.rate_hz)),
-        always,
-    )
+    found = best_sums(products_of(view), view_terms(view), always)
     best = found.sums[0]
     assert best.cross_validated / best.without < LAW_PLACEBO * (1 - found.placebo)
     assert any("vx" not in each.variables for each in found.sums)  # the grammar without it was asked

@@ -53,6 +53,14 @@ def test_what_the_model_fits_itself_counts_for_nothing():
     assert law_error((both,), DRAG) < 1e-6
 
 
+def test_what_a_law_remembers_began_at_rest():
+    lag = np.zeros(len(T))
+    for k in range(1, len(T)):  # exact for a held signal
+        lag[k] = lag[k - 1] + (1 - np.exp(-1 / (RATE_HZ * 0.5))) * (COLUMNS["fy"][k - 1] - lag[k - 1])
+    remembers = FreshMotion(COLUMNS, {"y": -2.0 * lag}, False, RATE_HZ)
+    assert law_error((law_of("-2.0*lag(fy, 0.5)", "force", "y"),), remembers) < 5e-3
+
+
 def test_another_axis_or_place_is_all_off():
     for law in (law_of("-3.0*abs(vy)**1.5*sign(vy)", "force", "x"), law_of("0.9*ay", "response", "y")):
         assert law_error((law,), DRAG) == pytest.approx(1.0)

@@ -1,0 +1,121 @@
+"""Antisymmetric pairs: a force on one axis by the motion of another, and the opposite on that axis by the first one's.
+
+Of such a pair each half alone looks as if it were half a coupled damping or stiffness, which acts on both axes alike
+and which the model has as a number of its own: only both together are fitted. With velocities it is a gyroscopic or
+Lorentz force, with positions a circulatory one (Merkin, Introduction to the Theory of Stability, 1997).
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import reduce
+from itertools import combinations, product
+
+import numpy as np
+
+from analysis.diagnosis.discovery.fit_sum import Sum, fit_sum
+from analysis.diagnosis.discovery.grammar import AXES, Term
+from analysis.diagnosis.discovery.law_of_sum import laws_of
+from analysis.diagnosis.discovery.matched_filter import View
+from analysis.diagnosis.discovery.screen_terms import products_of
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.hypothesis import combine, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.settings import RETUNING_BOUND
+from equalizer.effects.discovered_law import axis_names
+
+_COUPLED = re.compile(r"p0\*(v?)([a-z])")
+"""Linear in the motion of another axis; in its own the model is."""
+
+
+def antisymmetric_pairs(views: Sequence[View]) -> Iterator[Sum]:
+    """The pairs of axes whose two halves were fitted with opposite signs."""
+    forces = [view for view in views if view.acts_on == "force"][: len(AXES)]
+    for (first, other), prefix in product(combinations(forces, 2), ("v", "")):
+        halves = [
+            fit_sum(products_of(view), (Term(prefix + AXES[across.axis]),))
+            for view, across in ((first, other), (other, first))
+        ]
+        own, partner = halves
+        if own is None or partner is None or own.factors[0] * partner.factors[0] >= 0:
+            continue
+        factor = (own.factors[0] - partner.factors[0]) / 2
+        yield _pair(own, partner, factor)
+
+
+def _pair(own: Sum, partner: Sum, factor: float) -> Sum:
+    return replace(
+        own, factors=(factor,), cross_validated=(own.cross_validated + partner.cross_validated) / 2,
+        without=(own.without + partner.without) / 2, spread=max(own.spread, partner.spread),
+        partner=replace(partner, factors=(-factor,)),
+    )  # fmt: skip
+
+
+def pair_starts(pair: Sum) -> tuple[Sum, ...]:
+    """Where its fit may start: where the axes are coupled, either half alone was fitted as the whole pair, beside a
+    coupled number of the model, and so is twice as large."""
+    assert pair.partner is not None
+    half, opposite = pair.factors[0] / 2, replace(pair.partner, factors=(pair.partner.factors[0] / 2,))
+    return pair, replace(pair, factors=(half,), partner=opposite)
+
+
+def coupling_taken(tuning: Tuning, fitted: Fitted) -> float:
+    """Sum of squares of the deviations of the model's coupled damping and stiffness from their calibration."""
+    m = tuning.model.inputs
+    places = [_coupled_number(tuning, prefix, i, j) for prefix in ("v", "") for i, j in combinations(range(m), 2)]
+    return float(np.sum(fitted.deviations[places] ** 2))
+
+
+def with_equal_halves(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> Fitted:
+    """The fit with the two factors of each pair made opposite and equal, and what they had in common given to the
+    model's coupled number, which does the same. Unchanged where there is no pair, or the number would leave its
+    bounds."""
+    found = _coupled_laws(fitted, measure.records[0].recording.command.channels)
+    values, deviations = (
+        [dict(placed.values) for placed in fitted.hypothesis.placed_effects()],
+        fitted.deviations.copy(),
+    )
+    for (prefix, axis, other), (claim, factor) in found.items():
+        partner, opposite = found.get((prefix, other, axis), (claim, 0.0))
+        if axis < other and factor * opposite < 0:
+            shared, number = (factor + opposite) / 2, _coupled_number(tuning, prefix, axis, other)
+            deviations[number] -= shared / tuning.deviation[number]
+            values[claim]["p0"], values[partner]["p0"] = factor - shared, opposite - shared
+    if (deviations == fitted.deviations).all() or np.abs(deviations).max() > RETUNING_BOUND:
+        return fitted
+    parts = zip(fitted.hypothesis.claims, values, strict=True)
+    hypothesis = reduce(combine, [hypothesis_of_claim(claim, [own]) for claim, own in parts])
+    return evaluate_fit(measure, tuning, deviations, hypothesis)
+
+
+def is_taken_by_coupling(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]) -> bool:
+    """Whether a law is linear in another axis's motion alone, and the model's own coupled damping or stiffness could
+    have made half of it: always where it acts on one axis; of an antisymmetric pair, where that number would stay
+    within the bound of re-tuning. inputs: command channels."""
+    found = _coupled_laws(fitted, inputs)
+    for (prefix, axis, other), (_, factor) in found.items():
+        opposite = found.get((prefix, other, axis), (0, 0.0))[1]
+        half = abs(factor - opposite) / 2 if factor * opposite < 0 else 0.0
+        number = _coupled_number(tuning, prefix, axis, other)
+        if half / tuning.deviation[number] - abs(fitted.deviations[number]) <= RETUNING_BOUND:
+            return True
+    return False
+
+
+def _coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, int, int], tuple[int, float]]:
+    """Claim and factor of each force that is linear in another axis's motion, by prefix of the motion, its own axis and
+    the other one."""
+    names, found = axis_names(inputs), {}
+    for number, (claim, law) in enumerate(zip(fitted.hypothesis.claims, laws_of(fitted.hypothesis), strict=True)):
+        linear = None if law is None or law.acts_on != "force" else _COUPLED.fullmatch(law.expression)
+        if law is not None and linear is not None:
+            found[linear[1], claim.sites[0], names.index(linear[2])] = (number, law.numbers[0])
+    return found
+
+
+def _coupled_number(tuning: Tuning, prefix: str, axis: int, other: int) -> int:
+    """Which of the model's numbers is the coupled damping (prefix v) or stiffness of two axes."""
+    m = tuning.model.inputs
+    pairs = [(i, j) for i in range(m) for j in range(i, m)]
+    return (1 if prefix else 2) * len(pairs) + pairs.index((min(axis, other), max(axis, other)))
