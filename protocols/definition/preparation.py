@@ -58,7 +58,8 @@ class ConsentSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class SetupSettings:
-    """How a participant sits at the device. Asked for and logged at the start of every sitting."""
+    """How a participant sits at the device, asked for and logged at the start of every sitting, and in which state that
+    must be."""
 
     ask: Annotated[bool, Field(description="Whether the set-up is gone through. Default: no.")] = False
     hearing_masked: Annotated[
@@ -74,6 +75,13 @@ class SetupSettings:
     grip: Annotated[
         str, Field(max_length=80, description="The grip that is asked for. Default: as published, constant.")
     ] = "constant and comfortable"
+    daily_check_needed: Annotated[
+        bool,
+        Field(
+            description="Whether a real device must have passed `hapteq doctor --daily` on that day, or nothing "
+            "begins. Default: no, a warning says where it has not."
+        ),
+    ] = False
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -35,8 +35,17 @@ ROVE_SINCE: dict[str, Untouched] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0
 
 TIMING_SINCE: dict[str, Untouched] = {"measurement.late_ticks_limit": 1.0, "measurement.longest_late_ms": 1000.0}
 
+SETUP_SINCE: dict[str, Untouched] = {"setup.daily_check_needed": False}
+
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
-    "study": {"trial.device_buttons": [], "trial.repeats_per_run": 3, **ROVE_SINCE, **SAFETY_SINCE, **TIMING_SINCE},
+    "study": {
+        "trial.device_buttons": [],
+        "trial.repeats_per_run": 3,
+        **ROVE_SINCE,
+        **SAFETY_SINCE,
+        **TIMING_SINCE,
+        **SETUP_SINCE,
+    },
     "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
 }
 """The same for single fields, for each kind of protocol; `segments.role` is that of every segment."""

@@ -108,8 +108,19 @@ def compare_recordings(baseline: Recording, today: Recording) -> tuple[Change, .
         raise _not_comparable_error(refusal) from refusal
 
 
-def last_check(info: DeviceInfo) -> DeviceFinding:
-    """Whether this device was checked today, as a line of the check before a sitting: a warning where it was not."""
+def last_check(info: DeviceInfo, needed: bool = False) -> DeviceFinding:
+    """Whether this device passed today, as a line of the check before a sitting: a warning where it did not.
+
+    needed: as the protocol asks; then it is a DeviceError.
+    """
+    found = _found_check(info)
+    if needed and not found.fine:
+        title = "The sitting did not begin: its protocol asks for a daily check that was passed"
+        raise DeviceError(title, f"Daily check: {found.value}.", found.advice)
+    return found
+
+
+def _found_check(info: DeviceInfo) -> DeviceFinding:
     day = local_parts(datetime.now(UTC).isoformat(), machine_zone)[0]
     option = info.name.replace(".", "")
     advice = f"With no hand on the handle: hapteq doctor --device {option} --daily."

@@ -83,7 +83,7 @@ def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     # In virtual time nothing waits for a processor.
     load = None if clock.virtual else load_per_processor()
     computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)
-    daily = () if device.info.simulated else (last_check(device.info),)
+    daily = () if device.info.simulated else (last_check(device.info, state.protocol.setup.daily_check_needed),)
     report = replace(report, findings=(*report.findings, *computer, *daily))
     go_on = sitting.display.device_checked(report)
     findings = tuple(f"{finding.name}: {finding.value}{_said(finding)}" for finding in report.findings)
