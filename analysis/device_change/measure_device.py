@@ -1,16 +1,21 @@
 """Numbers of one recording of a free device: friction of slow strokes, frequency response, noise at rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.data.measured_motion import fill_gaps
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, estimate_transfer
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import FloatArray, Signal
 
 STROKES_BELOW_HZ = 1.0
 """Sinusoids slower than this are strokes: the shipped daily check has 0.5 Hz, the lowest stimulus of a study 5 Hz."""
+
+
+MISSED_LIMIT = 0.02
+"""Share of missed ticks at most: that of a trial in the shipped protocols."""
 
 
 class NotMeasurableError(ValueError):
@@ -31,6 +36,7 @@ class DeviceMeasures:
 
 def measure_device(recording: Recording) -> DeviceMeasures:
     """recording: strokes and a broadband excitation along every axis, with rests. Raises NotMeasurableError."""
+    recording = _without_gaps(recording)
     response = _response(recording)
     friction = np.array([_friction_n(recording, axis) for axis in range(len(recording.command.channels))])
     rests = _second_halves_of_rests(recording)
@@ -38,6 +44,23 @@ def measure_device(recording: Recording) -> DeviceMeasures:
         raise NotMeasurableError("the handle never rests in it")
     noise, samples = _noise(recording, rests)
     return DeviceMeasures(friction[:, 0], friction[:, 1], response, noise, samples)
+
+
+def _without_gaps(recording: Recording) -> Recording:
+    """Interpolated across missed ticks: a single one would cost a whole period."""
+    if recording.position is None:
+        raise NotMeasurableError("it has no position")
+    command, response = _filled(recording.command, "command"), _filled(recording.response, "response")
+    position = _filled(recording.position, "position")
+    excitation = None if recording.excitation is None else _filled(recording.excitation, "excitation")
+    return replace(recording, command=command, response=response, position=position, excitation=excitation)
+
+
+def _filled(signal: Signal, name: str) -> Signal:
+    missing = 1 - float(np.isfinite(signal.samples).all(axis=1).mean())
+    if missing > MISSED_LIMIT:
+        raise NotMeasurableError(f"{100 * missing:.1f} % of its {name} is missing, more than {100 * MISSED_LIMIT:g} %")
+    return replace(signal, samples=fill_gaps(signal.samples))
 
 
 def _response(recording: Recording) -> FrequencyResponse:
@@ -80,8 +103,7 @@ def _driven_axis(recording: Recording, segment: Segment) -> int:
 
 def _lost_per_path_n(recording: Recording, start: int, stop: int, axis: int) -> float:
     """NaN where the handle did not move further than it trembles across."""
-    if recording.position is None:
-        raise NotMeasurableError("it has no position")
+    assert recording.position is not None
     position_m = recording.position.samples[start : stop + 1]
     force_n = recording.command.samples[start : start + len(position_m) - 1]
     path_m = 2 * float(np.ptp(position_m[:, axis]))
@@ -111,6 +133,4 @@ def _noise(recording: Recording, rests: list[FloatArray]) -> tuple[FloatArray, i
         bent = bent - np.outer(at, at @ bent / max(float(at @ at), 1.0))
         squares += np.sum(bent**2, axis=0)
         samples += len(rest)
-    if not np.isfinite(squares).all():
-        raise NotMeasurableError("samples are missing in its rests")
     return np.sqrt(squares / max(samples, 1)), samples

@@ -3,14 +3,17 @@
 import contextlib
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
 from study.devices.clock import VirtualClock
 from study.devices.safe import SafeDevice
 from study.devices.simulated.omega3 import build_omega3
 from study.devices.simulated.packing import pack_parameters
 from study.devices.simulated.parameters import Omega3Parameters
+from study.errors import DeviceError
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.daily_check import compare_recordings
@@ -55,3 +58,32 @@ def test_what_changed_at_the_device_is_named(recorded, kind):
     found = changed(recorded(1), recorded(2, WORN[kind]))
     assert kind in found
     assert kind == "noise" or "noise" not in found
+
+
+def missed(recording: Recording, share: float, seed: int) -> Recording:
+    """With so many of its ticks missed, one at a time."""
+    gone = np.random.default_rng(seed).random(len(recording)) < share
+
+    def holed(signal: Signal) -> Signal:
+        return replace(signal, samples=np.where(gone[:, None], np.nan, signal.samples))
+
+    assert recording.position is not None and recording.excitation is not None
+    return replace(
+        recording,
+        command=holed(recording.command),
+        response=holed(recording.response),
+        position=holed(recording.position),
+        excitation=holed(recording.excitation),
+    )
+
+
+@pytest.mark.parametrize("seed", [5])
+def test_a_few_missed_ticks_change_nothing_and_many_are_refused(recorded, seed):
+    baseline, today = recorded(1), recorded(2)
+    assert changed(baseline, missed(today, 0.01, seed)) == set()
+    assert "friction" in changed(baseline, missed(recorded(3, WORN["friction"]), 0.01, seed))
+    with pytest.raises(DeviceError, match="% of its command is missing"):
+        compare_recordings(baseline, missed(today, 0.05, seed))
+    no_sensor = replace(today.response, samples=np.full_like(today.response.samples, np.nan))
+    with pytest.raises(DeviceError, match="100.0 % of its response is missing"):
+        compare_recordings(baseline, replace(today, response=no_sensor))
