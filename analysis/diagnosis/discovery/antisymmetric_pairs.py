@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.diagnosis.discovery.fit_sum import Sum, fit_sum
 from analysis.diagnosis.discovery.grammar import AXES, Term
-from analysis.diagnosis.discovery.law_of_sum import laws_of
+from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, laws_of
 from analysis.diagnosis.discovery.matched_filter import View
 from analysis.diagnosis.discovery.screen_terms import products_of
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
@@ -27,6 +27,8 @@ from equalizer.effects.discovered_law import axis_names
 
 _COUPLED = re.compile(r"p0\*(v?)([a-z])")
 """Linear in the motion of another axis; in its own the model is."""
+_BEGINS = 1e-9
+"""Share of a force that its opposite begins with."""
 
 
 def antisymmetric_pairs(views: Sequence[View]) -> Iterator[Sum]:
@@ -60,11 +62,32 @@ def pair_starts(pair: Sum) -> tuple[Sum, ...]:
     return pair, replace(pair, factors=(half,), partner=opposite)
 
 
+def is_coupling(of: Sum) -> bool:
+    """Whether it is linear in another axis's motion, and no more."""
+    return of.acts_on == "force" and len(of.terms) == 1 and bool(_COUPLED.fullmatch(f"p0*{of.terms[0].shape}"))
+
+
 def coupling_taken(tuning: Tuning, fitted: Fitted) -> float:
     """Sum of squares of the deviations of the model's coupled damping and stiffness from their calibration."""
     m = tuning.model.inputs
     places = [_coupled_number(tuning, prefix, i, j) for prefix in ("v", "") for i, j in combinations(range(m), 2)]
     return float(np.sum(fitted.deviations[places] ** 2))
+
+
+def as_pair(measure: ErrorMeasure, tuning: Tuning, single: tuple[Fitted, Sum], pair: Sum) -> Fitted | None:
+    """The fit of one force alone as a pair of half its size: the model's coupled number takes the rest, so that both
+    foretell the same. None where they are of different motions, or that number would leave its bounds."""
+    fitted, of = single
+    assert pair.partner is not None
+    halves = {(half.axis, half.terms[0].shape): half for half in (replace(pair, partner=None), pair.partner)}
+    if halves.pop((of.axis, of.terms[0].shape), None) is None:
+        return None
+    (other,) = halves.values()
+    size = laws_of(fitted.hypothesis)[-1].numbers[0]  # type: ignore[union-attr]
+    law = hypothesis_of_sum(replace(other, factors=(-_BEGINS * size,)), measure.records[0].recording)
+    begun = replace(fitted, hypothesis=combine(fitted.hypothesis, law))
+    found = with_equal_halves(measure, tuning, begun)
+    return None if found is begun else found
 
 
 def with_equal_halves(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> Fitted:

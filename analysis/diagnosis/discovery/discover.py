@@ -9,16 +9,18 @@ import numpy as np
 
 from analysis.diagnosis.discovery.antisymmetric_pairs import (
     antisymmetric_pairs,
+    as_pair,
     coupling_taken,
+    is_coupling,
     pair_starts,
     with_equal_halves,
 )
 from analysis.diagnosis.discovery.beam import best_sums
 from analysis.diagnosis.discovery.fit_sum import Sum
-from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum
+from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, laws_of
 from analysis.diagnosis.discovery.matched_filter import View, views_of
 from analysis.diagnosis.discovery.screen_terms import cross_validate_terms, products_of
-from analysis.diagnosis.discovery.snap_exponents import snap_exponents
+from analysis.diagnosis.discovery.snap_exponents import is_whole_limit, snap_exponents
 from analysis.diagnosis.discovery.view_terms import view_terms
 from analysis.diagnosis.errors.hypothesis import combine, without_claim
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
@@ -120,11 +122,11 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) 
     if not fits or not np.isfinite(fits[0][0].cost):
         return None
     refined = [(context.candidate(refine(context, fits[0][0])), fits[0][1])]
-    rest = [(context.candidate(fitted), item) for fitted, item in fits[1:]]
+    rest = [(context.candidate(_like_best(context, fits[0], refined[0][0], each)), each[1]) for each in fits[1:]]
     close = [
         pair
         for pair in rest
-        if _count_numbers(pair[1]) < _count_numbers(fits[0][1]) and inseparable(refined[0][0], pair[0])
+        if _count_numbers(pair) < _count_numbers(refined[0]) and inseparable(refined[0][0], pair[0])
     ]
     refined += [(context.candidate(refine(context, candidate.fitted)), item) for candidate, item in close]
     ranked = _put_plainest_first(context, [*refined, *(pair for pair in rest if pair not in close)])
@@ -134,6 +136,16 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) 
     placebo = max((found.placebo for view, found in searched if (view.acts_on, view.axis) in own), default=0.0)
     taken = 1 - first.cross_validated / max(first.without, 1e-300)
     return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo, taken)
+
+
+def _like_best(
+    context: SearchContext, best: tuple[Fitted, Sum], refined: FittedCandidate, other: tuple[Fitted, Sum]
+) -> Fitted:
+    """The other fit; of a pair of which the best is one half, the refined best as that pair."""
+    single, pair = best[1], other[1]
+    if single.partner is not None or pair.partner is None or not is_coupling(single):
+        return other[0]
+    return as_pair(context.measure, context.tuning, (refined.fitted, single), pair) or other[0]
 
 
 def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
@@ -148,17 +160,22 @@ def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
 def _put_plainest_first(
     context: SearchContext, pairs: Sequence[tuple[FittedCandidate, Sum]]
 ) -> list[tuple[FittedCandidate, Sum]]:
-    """By error; but first comes, of those that these data cannot tell from the best, the one with fewest numbers, and
-    of these the one that asks least of the model's own coupled numbers."""
+    """By error; but first comes, of those that these data cannot tell from the best, the one with fewest numbers; of
+    forces that are linear in another axis's motion, the one that asks least of the model's own coupled numbers."""
     ranked = sorted(pairs, key=lambda pair: pair[0].score.mean_log_error)
     alike = [pair for pair in ranked if inseparable(ranked[0][0], pair[0])]
-    first = min(alike, key=lambda pair: (_count_numbers(pair[1]), coupling_taken(context.tuning, pair[0].fitted)))
+    first = min(alike, key=_count_numbers)
+    if is_coupling(first[1]):
+        same = [pair for pair in alike if is_coupling(pair[1]) and _count_numbers(pair) == _count_numbers(first)]
+        first = min(same, key=lambda pair: coupling_taken(context.tuning, pair[0].fitted))
     return [first, *(pair for pair in ranked if pair is not first)]
 
 
-def _count_numbers(of: Sum) -> int:
-    """Free numbers of a sum, without exponents that are whole or half numbers."""
-    count = 0
+def _count_numbers(pair: tuple[FittedCandidate, Sum]) -> int:
+    """Free numbers of a sum, without exponents that are whole or half numbers, and a soft limit's factor of 1."""
+    candidate, of = pair
+    law = laws_of(candidate.fitted.hypothesis)[-1]
+    count = 0 if law is None else -int(is_whole_limit(law, LAW_NEAR))
     for term in of.terms:
         plain = [k for k in term.exponents if abs(2 * term.numbers[k] - round(2 * term.numbers[k])) < 2 * LAW_NEAR]
         count += 1 + len(term.numbers) - len(plain)

@@ -17,6 +17,9 @@ from equalizer.effects.discovered_law import law_effect, law_values
 from equalizer.laws.law import Law
 from equalizer.laws.roles import roles
 
+_LIMIT = re.compile(r"(\w+) \+ p0\*\((.+) - \1\)")
+"""A signal plus a share of a soft limit of it less itself (`grammar.bent_terms`)."""
+
 
 def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
     """The fit repeated with exponents held at whole or half numbers; unchanged where none is near one, or where that
@@ -67,7 +70,23 @@ def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:
         reach = 1.96 * INTERVAL_FACTOR * float(errors[place]) * value
         if abs(value - near) <= max(reach, LAW_SNAP * value):
             found = substitute_number(found, place, near)
-    return replace(found, expression=simplify_powers(found.expression))
+    if found.numbers == law.numbers:
+        found = _simplify_limit(law, float(errors[0]) * abs(law.numbers[0]))
+    return replace(found, expression=simplify_powers(found.expression.removeprefix("1*")))
+
+
+def is_whole_limit(law: Law, within: float) -> bool:
+    """Whether it is a signal plus p0 times a soft limit less the signal, with p0 near 1: the limit itself."""
+    return bool(_LIMIT.fullmatch(law.expression)) and abs(law.numbers[0] - 1) <= within
+
+
+def _simplify_limit(law: Law, error: float) -> Law:
+    """A soft limit alone where its factor's interval holds 1 and does not reach zero. error: of the factor."""
+    reach = 1.96 * INTERVAL_FACTOR * error
+    limit = _LIMIT.fullmatch(law.expression)
+    if limit is None or not reach < 1 or not is_whole_limit(law, max(reach, LAW_SNAP)):
+        return law
+    return substitute_number(replace(law, expression=f"p0*{limit[2]}"), 0, 1.0)
 
 
 def substitute_number(law: Law, place: int, value: float) -> Law:

@@ -7,6 +7,7 @@ import pytest
 
 from analysis.diagnosis.discovery.antisymmetric_pairs import (
     antisymmetric_pairs,
+    as_pair,
     is_taken_by_coupling,
     with_equal_halves,
 )
@@ -48,9 +49,9 @@ def found_in(recording, model=None):
     ("true", "shape"),
     [
         (law("fx + p0*fx**2", 0.05, acts_on="command"), "fx + p0*fx**2"),
-        (law("p0*tanh(fx/p0)", 2.0, acts_on="command"), "fx + p0*(tanh(fx/p1)*p1 - fx)"),
+        (law("p0*tanh(fx/p0)", 2.0, acts_on="command"), "tanh(fx/p0)*p0"),
         (law("ax + p0*ax**2", 0.01, acts_on="response"), "ax + p0*ax**2"),
-        (law("p0*atan(ax/p0)", 10.0, acts_on="response"), "ax + p0*(atan(ax/p1)*p1 - ax)"),
+        (law("p0*atan(ax/p0)", 10.0, acts_on="response"), "atan(ax/p0)*p0"),
     ],
 )
 def test_laws_of_commands_and_readings_are_found_where_they_act(true, shape, seed):
@@ -95,10 +96,29 @@ def test_a_pair_has_equal_halves_and_is_told_from_one_force_only_by_the_calibrat
     assert [each.numbers[0] for each in laws_of(even.hypothesis) if each is not None] == pytest.approx([0.6, -0.6])
     apart = even.residuals[0] - begun.residuals[0]
     assert np.sqrt(np.mean(apart**2)) < 1e-3 * np.sqrt(np.mean((fitted.residuals[0] - begun.residuals[0]) ** 2))
+    single = replace(pair, factors=(1.2,), partner=None)
+    one = evaluate_fit(measure, tuning, fitted.deviations, hypothesis_of_sum(single, recording))
+    assert as_pair(measure, tuning, (one, single), pair) is None  # the coupled number cannot take 0.6 N s/m
     inputs = recording.command.channels
     assert not is_taken_by_coupling(tuning, even, inputs)
     loose = replace(tuning, deviation=100 * tuning.deviation)
     assert is_taken_by_coupling(loose, even, inputs)
+
+
+def test_one_force_is_a_pair_of_half_its_size_beside_the_models_coupling(seed=4):
+    recording = recorded_on_axes(2, whirl(0.6), seed)
+    context, known = arena_of(recording, replace(device(2), tolerance=Tolerance(0.0003, 0.3, 0.8, 0.01)))
+    measure, tuning = context.measure, context.tuning
+    pair = Sum(0, (Term("vy"),), (0.6,), 1.0, 9.0, 0.0, (), partner=Sum(1, (Term("vx"),), (-0.6,), 1.0, 9.0, 0.0, ()))
+    single = replace(pair, factors=(1.2,), partner=None)
+    deviations = np.zeros(len(tuning.names))
+    one = evaluate_fit(measure, tuning, deviations, hypothesis_of_sum(single, recording))
+    found = as_pair(measure, tuning, (one, single), pair)
+    assert found is not None
+    assert [each.numbers[0] for each in laws_of(found.hypothesis) if each is not None] == pytest.approx([0.6, -0.6])
+    assert found.deviations[tuning.names.index("damping fx fy")] == pytest.approx(-0.6 / 0.3)
+    spread = np.std(one.residuals[0] - known.retuned.fitted.residuals[0][: len(one.residuals[0])])
+    assert np.std(found.residuals[0] - one.residuals[0]) < 1e-3 * spread
 
 
 def test_one_force_alone_may_always_be_half_the_models_own(seed=4):
