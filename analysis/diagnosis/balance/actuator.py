@@ -16,18 +16,18 @@ from typing import cast
 
 import numpy as np
 
-from analysis.diagnosis.balance.blocks import (
-    RIDGE,
-    Block,
-    block_products,
-    blocks_of,
-    column_scale,
-    solve_normal_equations,
-    squared_error,
-    summed_products,
+from analysis.diagnosis.balance.command_laws import (
+    AS_COMMANDED,
+    AnyCommandLaw,
+    CommandLaw,
+    any_curve,
+    any_pull,
+    coil_laws,
+    command_laws,
+    neighbours_of,
 )
-from analysis.diagnosis.balance.command_laws import AS_COMMANDED, CommandLaw, coil_laws, command_laws, neighbours_of
-from analysis.diagnosis.balance.judge_laws import MOST_ALIKE, Balance, blocks_to_judge, judge_laws
+from analysis.diagnosis.balance.inverse_balance import InverseBalance
+from analysis.diagnosis.balance.judge_laws import MOST_ALIKE, Balance, judge_laws
 from analysis.diagnosis.balance.judged_law import JudgedLaw, bootstrap_draws, gain_with_bound
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.linear_part import search_beside_linear
@@ -35,10 +35,8 @@ from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, StructureSearch
-from analysis.diagnosis.settings import STILL_SHARE
-from analysis.diagnosis.types import Mapper, Mask, TimeBudget
+from analysis.diagnosis.types import Mapper, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
-from equalizer.signals.signal import FloatArray
 
 SUMS = 4
 """Best sums of laws of the motion that are tried beside a law of the command."""
@@ -52,73 +50,6 @@ NEEDLESS = "a law of the command leaves as little without it"
 HOLDS_AT_REST = (*SLIDING, "presliding_hysteresis")
 NO_COLUMN = -1
 """Place in a regression of a law that changes the force itself."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _InverseBalance:
-    """A balance solved for the acceleration along its axis."""
-
-    search: StructureSearch
-    map_: Mapper
-    rubs: bool
-    """Whether a friction is among the laws of the motion: rest is no evidence then, for friction holds any force up to
-    its level there, and a dead band gives none."""
-
-    def total_errors(self, laws: Sequence[CommandLaw], beside: Sequence[int]) -> list[float]:
-        """Of each law: its cross-validated sum of squares."""
-        return cast(list[float], list(self.map_(partial(self.total_error, beside=beside), laws)))
-
-    def total_error(self, law: CommandLaw, beside: Sequence[int]) -> float:
-        return float(self.errors(law, beside, False).sum())
-
-    def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
-        """(blocks,): sums of squares. judged: on what nothing was fitted to; else each fold's."""
-        fit, test = self._blocks(self._rows(law, laws))
-        columns = list(range(len(fit[0].pull)))
-        whole = summed_products(fit, columns)
-        if judged and blocks_to_judge(self.search.regression) is self.search.regression.test:
-            weights = solve_normal_equations(whole, RIDGE)
-            return np.array([squared_error(block_products(block, columns), weights, block.power) for block in test])
-        found = []
-        for block in fit:
-            own = block_products(block, columns)
-            found.append(
-                squared_error(own, solve_normal_equations((whole[0] - own[0], whole[1] - own[1]), RIDGE), block.power)
-            )
-        return np.array(found)
-
-    def _blocks(self, rows: Sequence[FloatArray]) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
-        regression = self.search.regression
-        motions, own = regression.motions, regression.beside.own
-        aims = [columns[:, own] for columns in regression.columns]
-        fit, test = (
-            [motion.valid_samples(mask & moves) for motion, mask, moves in zip(motions, masks, moving, strict=True)]
-            for moving in [self._moving()]
-            for masks in ([m.fit for m in motions], [m.test for m in motions])
-        )
-        mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
-        units = column_scale(rows, fit), mean
-        return blocks_of(rows, aims, fit, units), blocks_of(rows, aims, test, units)
-
-    def _moving(self) -> list[Mask]:
-        """(n,) per motion: samples that are evidence."""
-        regression = self.search.regression
-        speeds = [motion.velocity[:, regression.beside.own] for motion in regression.motions]
-        used = np.concatenate([speed[motion.fit] for speed, motion in zip(speeds, regression.motions, strict=True)])
-        least = STILL_SHARE * float(np.mean(used**2)) if self.rubs else -1.0
-        return [speed**2 > least for speed in speeds]
-
-    def _rows(self, law: CommandLaw, laws: Sequence[int]) -> list[FloatArray]:
-        regression, found = self.search.regression, []
-        # Filters of the acceleration would give it back.
-        filters = {regression.beside.own, *range(regression.matrices, regression.base - 1)}
-        beside = [column for column in regression.columns_of(laws) if column not in filters]
-        for motion, columns in zip(regression.motions, regression.columns, strict=True):
-            force = law.of(motion.force[:, regression.axis], motion.position[:, regression.beside.own])
-            others = np.delete(motion.force, regression.axis, axis=1)
-            entered = np.hstack([force, np.gradient(force[:, :1], 1 / motion.rate_hz, axis=0), others])
-            found.append(np.hstack([motion.decimate(entered), columns[:, beside]]))
-        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,21 +102,21 @@ def _pass_through_law(motion: Motion, axis: int, own: int, law: CommandLaw) -> M
 
 def find_actuator(balance: Balance, rotational: bool, without: frozenset[str], map_: Mapper = map) -> Actuator | None:
     """The law of the command that leaves the smallest error; None where the balance has no clock, no command varies,
-    or no law of the command is allowed."""
+    no law of the command is allowed, or none can take enough."""
     search = balance.search
-    regression = search.regression
-    commands = np.concatenate([motion.force[motion.fit, regression.axis] for motion in regression.motions])
-    known = [*command_laws(commands), *(() if rotational else _laws_of_coils(regression))]
-    laws = [law for law in known if law.effect not in without]
-    if not np.isfinite(regression.motions[0].band_hz) or not laws or not np.any(commands):
+    kinds = _kinds_of_laws(search.regression, rotational, without)
+    if not np.isfinite(search.regression.motions[0].band_hz) or not kinds:
         return None
-    turned = _InverseBalance(
+    turned = InverseBalance(
         search, map_, any(each.law.effect in HOLDS_AT_REST and each.gain_low > 0 for each in balance.laws)
     )
-    instead = _in_place_of_motion(turned, laws, tuple(each.place for each in balance.named))
+    instead = _in_place_of_motion(turned, kinds, tuple(each.place for each in balance.named))
     if instead is not None:
         return instead
-    beside = min(_sums_to_try(search), key=lambda each: turned.total_error(AS_COMMANDED, each))
+    plain, beside = min((turned.total_error(AS_COMMANDED, each), each) for each in _sums_to_try(search))
+    laws = _worth_trying(turned, kinds, (1 - NOTABLE / 2) * plain, beside)
+    if not laws:
+        return None
     best = _best_of_each(turned, laws, beside)
     law = min(best, key=lambda each: each[0])[1]
     alone, held = (turned.total_error(law, each) for each in ((), beside))
@@ -195,18 +126,39 @@ def find_actuator(balance: Balance, rotational: bool, without: frozenset[str], m
     return Actuator(law, judged, bool(beside) and alone <= held / (1 - TOLD))
 
 
-def _laws_of_coils(regression: Regression) -> tuple[CommandLaw, ...]:
-    """Empty where no position was measured."""
-    if regression.motions[0].order > 0:
+Kinds = Sequence[tuple[AnyCommandLaw, Sequence[CommandLaw]]]
+"""Laws of the command of one kind, and a sum that comes near to each of them."""
+
+
+def _kinds_of_laws(regression: Regression, rotational: bool, without: frozenset[str]) -> Kinds:
+    """Pulls of coils only where the position of a translation was measured; empty where no command varies."""
+    motions, own = regression.motions, regression.beside.own
+    command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
+    if not np.any(command):
         return ()
-    own = regression.beside.own
-    return tuple(coil_laws(np.concatenate([motion.position[motion.fit, own] for motion in regression.motions])))
+    kinds = [(any_curve(command), list(command_laws(command)))]
+    if motions[0].order == 0 and not rotational:
+        position = np.concatenate([motion.position[motion.fit, own] for motion in motions])
+        kinds.append((any_pull(position), list(coil_laws(position))))
+    allowed = [(near, [law for law in laws if law.effect not in without]) for near, laws in kinds]
+    return [kind for kind in allowed if kind[1]]
 
 
-def _in_place_of_motion(turned: _InverseBalance, laws: Sequence[CommandLaw], named: tuple[int, ...]) -> Actuator | None:
+def _worth_trying(turned: InverseBalance, kinds: Kinds, most: float, beside: tuple[int, ...]) -> list[CommandLaw]:
+    """Laws of those kinds of which a sum that comes near to any leaves no more than `most`, on the samples that it is
+    fitted to: others need not be tried one by one."""
+    return [law for near, laws in kinds if turned.least_error(near, beside) <= most for law in laws]
+
+
+def _in_place_of_motion(turned: InverseBalance, kinds: Kinds, named: tuple[int, ...]) -> Actuator | None:
     """A law of the command that by itself takes most of what the named laws of the motion leave, or leaves less than
     several of them: they took its part, as a drag does that of an actuator whose gain falls."""
     if not named:
+        return None
+    # Half of what is asked for below, for the sums are not those laws themselves.
+    most = (1 - MOST / 2 if len(named) == 1 else 1 / (1 - TOLD)) * turned.total_error(AS_COMMANDED, named)
+    laws = _worth_trying(turned, kinds, most, ())
+    if not laws:
         return None
     best = _best_of_each(turned, laws, ())
     law = min(best, key=lambda each: each[0])[1]
@@ -231,7 +183,7 @@ def _sums_to_try(search: StructureSearch) -> list[tuple[int, ...]]:
 
 
 def _best_of_each(
-    turned: _InverseBalance, laws: Sequence[CommandLaw], beside: tuple[int, ...]
+    turned: InverseBalance, laws: Sequence[CommandLaw], beside: tuple[int, ...]
 ) -> list[tuple[float, CommandLaw]]:
     best: dict[str, tuple[float, CommandLaw]] = {}
     for law, error in zip(laws, turned.total_errors(laws, beside), strict=True):
@@ -248,7 +200,7 @@ def _best_of_each(
 
 
 def _refined_values(
-    turned: _InverseBalance, beside: tuple[int, ...], found: tuple[float, CommandLaw]
+    turned: InverseBalance, beside: tuple[int, ...], found: tuple[float, CommandLaw]
 ) -> tuple[float, dict[str, float]]:
     """Error and numbers of a law after moving each number for as long as that helps."""
     error, law = found
@@ -261,7 +213,7 @@ def _refined_values(
 
 
 def _judge_law(
-    turned: _InverseBalance,
+    turned: InverseBalance,
     law: CommandLaw,
     rivals: Sequence[CommandLaw],
     sums: tuple[tuple[int, ...], tuple[int, ...]],

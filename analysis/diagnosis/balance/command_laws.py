@@ -29,6 +29,10 @@ CLOSER = (0.95, 0.98, 1.02, 1.05)
 """Factors by which a number is moved, as long as that helps."""
 MOVED = ("width", "limit", "square", "gap", "power")
 
+BENDS = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
+"""Shares of the samples below a place where a piecewise linear function bends; of the command's size, a curve jumps
+there, too."""
+
 
 @dataclass(frozen=True, slots=True)
 class Formula:
@@ -56,6 +60,10 @@ class CommandLaw:
     """Of a single column: what makes it a force."""
     formula: Callable[[dict[str, float], float], Formula] | None = None
     """Of values and scale: what a simulation plays in the command's place, where no catalogue effect does."""
+
+    @property
+    def sloped(self) -> int:
+        return 1
 
     def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
         """command, position: (n,) each."""
@@ -160,3 +168,42 @@ def _deadband_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
     width = of["width"]
     beyond = command - np.clip(command, -width, width)
     return np.asarray(beyond + of["jump"] * width * np.sign(beyond))[:, None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AnyCommandLaw:
+    """A sum of simple functions that comes near to any law of a kind: where it does no better than the command itself,
+    none of them need be tried."""
+
+    columns: Callable[[FloatArray, FloatArray], FloatArray]
+    """(n, k) of command and position (n,) each; the command itself first."""
+    sloped: int
+    """See `inverse_balance.ForceOfCommand`."""
+
+    def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
+        return self.columns(command, position)
+
+
+def any_curve(command: FloatArray) -> AnyCommandLaw:
+    """A piecewise linear function of the command with jumps, each side by itself. command: (n,), which it spans."""
+    bends = np.unique(np.quantile(np.abs(command), BENDS))
+
+    def columns(u: FloatArray, position: FloatArray) -> FloatArray:
+        sides = (np.maximum(u, 0.0), np.maximum(-u, 0.0))
+        beyond = [np.maximum(side - bend, 0.0) for side in sides for bend in bends]
+        jumps = [np.where(side > bend, 1.0, 0.0) for side in sides for bend in bends]
+        return np.stack([u, sides[0], *beyond, *jumps], axis=1)
+
+    return AnyCommandLaw(columns, 2 + 2 * len(bends))
+
+
+def any_pull(position: FloatArray) -> AnyCommandLaw:
+    """The command, and its square, each with a gain that is piecewise linear in the position. position: (n,), which it
+    spans."""
+    bends = np.unique(np.quantile(position, BENDS))
+
+    def columns(u: FloatArray, x: FloatArray) -> FloatArray:
+        gains = [np.ones_like(x), x - bends[0], *(np.maximum(x - bend, 0.0) for bend in bends)]
+        return np.stack([force * gain for force in (u, u**2) for gain in gains], axis=1)
+
+    return AnyCommandLaw(columns, 4 + 2 * len(bends))

@@ -1,0 +1,112 @@
+"""The force balance solved for the acceleration: how well a law of the command does in the command's place."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol, cast
+
+import numpy as np
+
+from analysis.diagnosis.balance.blocks import (
+    RIDGE,
+    Block,
+    block_products,
+    blocks_of,
+    column_scale,
+    solve_normal_equations,
+    squared_error,
+    summed_products,
+)
+from analysis.diagnosis.balance.command_laws import CommandLaw
+from analysis.diagnosis.balance.judge_laws import blocks_to_judge
+from analysis.diagnosis.balance.structures import StructureSearch
+from analysis.diagnosis.settings import STILL_SHARE
+from analysis.diagnosis.types import Mapper, Mask
+from equalizer.signals.signal import FloatArray
+
+
+class ForceOfCommand(Protocol):
+    """One law of the command, or a sum of functions that comes near to any."""
+
+    @property
+    def sloped(self) -> int:
+        """How many of its first columns have their rate of change beside them, for a short lag."""
+
+    def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
+        """(n, weights), of command and position (n,) each: the force is their weighted sum."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InverseBalance:
+    """A balance solved for the acceleration along its axis."""
+
+    search: StructureSearch
+    map_: Mapper
+    rubs: bool
+    """Whether a friction is among the laws of the motion: rest is no evidence then, for friction holds any force up to
+    its level there, and a dead band gives none."""
+
+    def total_errors(self, laws: Sequence[CommandLaw], beside: Sequence[int]) -> list[float]:
+        """Of each law: its cross-validated sum of squares."""
+        return cast(list[float], list(self.map_(partial(self.total_error, beside=beside), laws)))
+
+    def total_error(self, law: CommandLaw, beside: Sequence[int]) -> float:
+        return float(self.errors(law, beside, False).sum())
+
+    def least_error(self, law: ForceOfCommand, beside: Sequence[int]) -> float:
+        """Sum of squares on the samples that were fitted to: a lower bound for each law that this one comes near to."""
+        fit, _ = self._blocks(self._rows(law, beside), False)
+        products = [block_products(block, range(len(fit[0].pull))) for block in fit]
+        weights = solve_normal_equations(summed_products(fit, range(len(fit[0].pull))), RIDGE)
+        return sum(squared_error(own, weights, block.power) for own, block in zip(products, fit, strict=True))
+
+    def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
+        """(blocks,): sums of squares. judged: on what nothing was fitted to; else each fold's."""
+        tested = judged and blocks_to_judge(self.search.regression) is self.search.regression.test
+        fit, test = self._blocks(self._rows(law, laws), tested)
+        columns = list(range(len(fit[0].pull)))
+        whole = summed_products(fit, columns)
+        if tested:
+            weights = solve_normal_equations(whole, RIDGE)
+            return np.array([squared_error(block_products(block, columns), weights, block.power) for block in test])
+        found = []
+        for block in fit:
+            own = block_products(block, columns)
+            found.append(
+                squared_error(own, solve_normal_equations((whole[0] - own[0], whole[1] - own[1]), RIDGE), block.power)
+            )
+        return np.array(found)
+
+    def _blocks(self, rows: Sequence[FloatArray], tested: bool) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
+        """To fit to, and, where they are asked for, to test by."""
+        regression = self.search.regression
+        motions, own = regression.motions, regression.beside.own
+        aims = [columns[:, own] for columns in regression.columns]
+        fit, test = (
+            [motion.valid_samples(mask & moves) for motion, mask, moves in zip(motions, masks, moving, strict=True)]
+            for moving in [self._moving()]
+            for masks in ([m.fit for m in motions], [m.test for m in motions])
+        )
+        mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
+        units = column_scale(rows, fit), mean
+        return blocks_of(rows, aims, fit, units), blocks_of(rows, aims, test, units) if tested else ()
+
+    def _moving(self) -> list[Mask]:
+        """(n,) per motion: samples that are evidence."""
+        regression = self.search.regression
+        speeds = [motion.velocity[:, regression.beside.own] for motion in regression.motions]
+        used = np.concatenate([speed[motion.fit] for speed, motion in zip(speeds, regression.motions, strict=True)])
+        least = STILL_SHARE * float(np.mean(used**2)) if self.rubs else -1.0
+        return [speed**2 > least for speed in speeds]
+
+    def _rows(self, law: ForceOfCommand, laws: Sequence[int]) -> list[FloatArray]:
+        regression, found = self.search.regression, []
+        # Filters of the acceleration would give it back.
+        filters = {regression.beside.own, *range(regression.matrices, regression.base - 1)}
+        beside = [column for column in regression.columns_of(laws) if column not in filters]
+        for motion, columns in zip(regression.motions, regression.columns, strict=True):
+            force = law.of(motion.force[:, regression.axis], motion.position[:, regression.beside.own])
+            others = np.delete(motion.force, regression.axis, axis=1)
+            entered = np.hstack([force, np.gradient(force[:, : law.sloped], 1 / motion.rate_hz, axis=0), others])
+            found.append(np.hstack([motion.decimate(entered), columns[:, beside]]))
+        return found
