@@ -7,7 +7,7 @@ from equalizer.signals.signal import FloatArray
 CLOSE = 0.02
 """Shares of a step by which values may miss the lattice; single precision leaves less."""
 NEARLY_ALL = 0.999
-LEAST_VALUES, MOST_VALUES = 4, 0.2
+LEAST_VALUES, MOST_VALUES = 3, 0.2
 """Different values that make a lattice, at least; and at most, as a share of the samples."""
 PEAK = 12.0
 """Times its surroundings that the histogram's spectrum must rise for a staircase."""

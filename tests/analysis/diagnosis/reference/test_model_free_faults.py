@@ -40,6 +40,14 @@ def test_another_recording_of_the_same_device_shows_nothing(step):
     assert seen(recording(2, step), recording(1, step)) == []
 
 
+def test_steps_of_half_the_range_are_seen():
+    new = spoiled(recording(2), lambda y: np.ptp(y) / 2 * np.round(y / (np.ptp(y) / 2)))
+    assert len(np.unique(new.response.samples)) == 3
+    ((name, _, values),) = seen(new, recording(1))
+    assert name == "quantization"
+    assert values["step"] == pytest.approx(np.ptp(new.response.samples) / 2)
+
+
 @pytest.mark.parametrize("channels", [1, 3])
 def test_wider_steps_are_seen_with_their_size(channels):
     new = spoiled(recording(2, channels=channels), lambda y: 0.07 * np.round(y / 0.07))
