@@ -60,8 +60,19 @@ def diagnose(
             if found is not None and not (look.narrow and leaves_open(found)):
                 return _assemble(recordings, settings, look, SearchOutcome(found, CleanFloor()), balances)
     progress("measuring the noise", 0.3 if balances else 0.0)
-    if settings.clean and (beside := _compare_with_clean(recordings, model, settings, map_, progress)) is not None:
-        return beside
+    if settings.clean:
+        return _diagnose_beside_clean(recordings, model, settings, map_, progress)
+    return _diagnose_by_model(recordings, model, settings, map_, progress, balances)
+
+
+def _diagnose_by_model(
+    recordings: Sequence[Recording],
+    model: MechanicalModel,
+    settings: DiagnosisSettings,
+    map_: Mapper,
+    progress: Progress,
+    balances: tuple[Balance, ...] = (),
+) -> Findings:
     look = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     seen = search_by_simulation(recordings, look, settings, map_, progress, balances)
     if not settings.fitted and not settings.clean:
@@ -71,14 +82,14 @@ def diagnose(
     return _assemble(recordings, settings, look, seen, balances)
 
 
-def _compare_with_clean(
+def _diagnose_beside_clean(
     recordings: Sequence[Recording],
     model: MechanicalModel,
     settings: DiagnosisSettings,
     map_: Mapper,
     progress: Progress,
-) -> Findings | None:
-    """Findings by comparison with the clean recordings, or by search where no fault explains the difference. None where
+) -> Findings:
+    """Findings by comparison with the clean recordings, or by search where no fault explains the difference, or where
     the given model predicts the clean ones well enough to be used itself, or repeats show that noise is small."""
     # Imported here, as below: only some diagnoses have clean recordings.
     from analysis.diagnosis.contrast.decide import BEYOND
@@ -87,11 +98,15 @@ def _compare_with_clean(
     from analysis.diagnosis.result.contrast_findings import add_contrast
 
     look = FittingMeasure(model, measure_of(recordings, model))
-    if not settings.fitted and (noise_is_from_repeats(look.chosen) or predicts_clean(model, settings.clean)):
-        return None
     progress("comparing with the clean recordings", 0.1)
     contrast = contrast_of(recordings, settings.clean, frozenset(settings.without), settings.time_left)
-    if not settings.fitted and contrast.left_open:
+    if not settings.fitted and (noise_is_from_repeats(look.chosen) or predicts_clean(model, settings.clean)):
+        found_by_model = _diagnose_by_model(recordings, model, settings, map_, progress)
+        said = found_by_model.diagnosis
+        names = frozenset(name for effect in said.effects for name in (effect.effect, *effect.class_))
+        if not contrast.contradicts(names, said.verdict == "explained"):
+            return found_by_model
+    elif not settings.fitted and contrast.left_open:
         unweighed = _search_beside_clean(recordings, model, settings, contrast.tested_effects, map_, progress)
         if unweighed is not None:
             return unweighed

@@ -47,6 +47,29 @@ class Contrast:
         return self.comparison.differ
 
     @property
+    def named_effects(self) -> frozenset[str]:
+        """The effect that is named, and those that cannot be told from it."""
+        if self.shown is not None:
+            return frozenset(claim.effect.name for claim in self.shown.claims)
+        if self.line is not None:
+            return frozenset({self.line.effect})
+        if self.decision is None or self.decision.named is None:
+            return frozenset()
+        return frozenset({self.decision.named.fault.effect, *self.decision.alike})
+
+    def contradicts(self, names: frozenset[str], explained: bool) -> bool:
+        """Whether it speaks against what a search by simulation says of the same recordings. names: of the effects that
+        the search names, with their classes; explained: they leave noise alone.
+
+        A search that leaves more than noise may have put several effects in the place of one that it does not know,
+        such as a spring that came in; and where the sets differ no more than stretches of either do, an effect that the
+        comparison tested mends the model."""
+        if self.named_effects:
+            return not (explained or names & self.named_effects)
+        differ = self.comparison is None or self.comparison.differ
+        return not differ and bool(names & self.tested_effects)
+
+    @property
     def tested_effects(self) -> frozenset[str]:
         """Effects that the comparison tested."""
         return frozenset(() if self.comparison is None else (each.fault.effect for each in self.comparison.faults))
