@@ -55,6 +55,8 @@ class Change:
     """Of a response: where it changed most."""
     peaks_hz: tuple[float, float] | None = None
     """Of a changed response: where it is strongest about there, then and now."""
+    unclear: bool = False
+    """Nothing was seen to change, and it was measured too inaccurately to see a change of the limit's size."""
 
 
 def compare_devices(
@@ -80,7 +82,8 @@ def _friction_changes(accepted: DeviceMeasures, today: DeviceMeasures, limits: C
         # A handle that no longer moves has changed: its friction is unknown, and large.
         stuck = np.isnan(now) or np.isnan(then)
         changed = stuck or _is_beyond(now - then, error, limits.friction_n, limits)
-        yield Change("friction", channel, then, now, error, limits.friction_n, "N", changed)
+        unclear = not changed and limits.deviations * error > limits.friction_n
+        yield Change("friction", channel, then, now, error, limits.friction_n, "N", changed, unclear=unclear)
 
 
 def _response_changes(then: FrequencyResponse, now: FrequencyResponse, limits: ChangeLimits) -> Iterator[Change]:
@@ -96,32 +99,38 @@ def _response_changes(then: FrequencyResponse, now: FrequencyResponse, limits: C
         gain = float(np.median(ratio))
         error = float(1.2533 * 1.4826 * np.median(np.abs(ratio - gain)) / np.sqrt(len(ratio)))
         changed = _is_beyond(np.log(gain), error / gain, np.log1p(limits.share), limits)
-        yield Change("gain", channel, 1.0, gain, error, limits.share, "", changed)
+        unclear = not changed and limits.deviations * error > limits.share
+        yield Change("gain", channel, 1.0, gain, error, limits.share, "", changed, unclear=unclear)
         yield _worst_band(then, now, axis, gain, limits)
 
 
 def _worst_band(
     then: FrequencyResponse, now: FrequencyResponse, axis: int, gain: float, limits: ChangeLimits
 ) -> Change:
-    """The third octave in which the response, less the common gain, differs most; noise is subtracted."""
+    """The third octave in which the response, less the common gain, differs most beyond the noise.
+
+    Noise of late and missed ticks comes in bursts that hit neighbouring lines alike: the difference counts beyond
+    `deviations` times the power that the scatter from period to period lets expect.
+    """
     band = np.floor(np.log2(then.frequency_hz / then.frequency_hz[0]) / limits.band_octaves)
     found = []
     for number in np.unique(band):
         lines = band == number
-        size = float(np.sum(np.abs(then.response[lines][:, :, axis]) ** 2))
-        power = float(np.sum(np.abs(now.response[lines][:, :, axis] / gain - then.response[lines][:, :, axis]) ** 2))
-        noise = now.noise_variance[lines][:, :, axis] / gain**2 + then.noise_variance[lines][:, :, axis]
-        expected = float(np.sum(noise))
-        spread = float(np.sqrt(np.sum(noise**2)))
+        before, after = then.response[lines][:, :, axis], now.response[lines][:, :, axis] / gain
+        noise = then.noise_variance[lines][:, :, axis] + now.noise_variance[lines][:, :, axis] / gain**2
+        size = float(np.sum(np.abs(before) ** 2))
+        power, expected = float(np.sum(np.abs(after - before) ** 2)) / size, float(np.sum(noise)) / size
         at_hz = then.frequency_hz[lines]
-        share = np.sqrt(max(power - expected, 0.0) / size)
-        found.append((share, expected, spread, power, size, (float(at_hz[0]), float(at_hz[-1]))))
-    share, expected, spread, power, size, band_hz = max(found)
-    changed = bool(share > limits.share and power > expected + limits.deviations * spread)
-    channel = then.input_channels[axis]
-    error = float(np.sqrt(spread / size))
+        surely = float(np.sqrt(max(power - limits.deviations * expected, 0.0)))
+        share = float(np.sqrt(max(power - expected, 0.0)))
+        found.append((surely, share, float(np.sqrt(expected)), (float(at_hz[0]), float(at_hz[-1]))))
+    surely, share, _, band_hz = max(found)
+    error = max(each[2] for each in found)
+    changed = surely > limits.share
+    unclear = not changed and error > limits.share
     peaks_hz = (_peak_hz(then, band_hz, axis), _peak_hz(now, band_hz, axis)) if changed else None
-    return Change("response", channel, 0.0, float(share), error, limits.share, "", changed, band_hz, peaks_hz)
+    channel = then.input_channels[axis]
+    return Change("response", channel, 0.0, share, error, limits.share, "", changed, band_hz, peaks_hz, unclear)
 
 
 def _peak_hz(response: FrequencyResponse, band_hz: tuple[float, float], axis: int) -> float:

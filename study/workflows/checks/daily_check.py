@@ -137,7 +137,8 @@ def _found_check(info: DeviceInfo) -> DeviceFinding:
         if check.passed:
             return DeviceFinding("Daily check", f"nothing changed since the acceptance ({when})", fine=True)
         changed = ", ".join(dict.fromkeys(str(each["kind"]) for each in check.changes if each["changed"]))
-        return DeviceFinding("Daily check", f"{changed} changed since the acceptance ({when})", False, advice, True)
+        said = f"{changed} changed since the acceptance" if changed else "measured too inaccurately to tell a change"
+        return DeviceFinding("Daily check", f"{said} ({when})", False, advice, True)
     return DeviceFinding("Daily check", "none yet", False, advice, warning=True)
 
 

@@ -14,6 +14,7 @@ CAUSES = {
     "noise": "Look at the sensor's plug, cable and shield, and at what shakes the table.",
 }
 FRICTION_FIRST = "That may come from the friction: mend it first."
+TOO_NOISY = "It was measured too inaccurately: close other programs, keep the table still, and check again."
 IF_IT_STAYS = "If it stays, name the cause with `hapteq diagnose`, or accept the device anew."
 
 
@@ -29,8 +30,12 @@ def _finding(kind: str, changes: Sequence[Change], rubs: bool) -> DeviceFinding:
     value = f"{'; '.join(_words(change) for change in changes)} ({_limit_words(changes[0])})"
     axes = ", ".join(change.axis for change in changes if change.changed)
     causes = FRICTION_FIRST if rubs and kind in ("gain", "response") else f"{CAUSES[kind]} {IF_IT_STAYS}"
-    advice = f"It changed ({axes}). {causes}" if axes else ""
-    return DeviceFinding(kind.capitalize(), value, fine=not axes, advice=advice)
+    advice = f"It changed ({axes}). {causes}"
+    if axes:
+        return DeviceFinding(kind.capitalize(), value, fine=False, advice=advice)
+    if unclear := ", ".join(change.axis for change in changes if change.unclear):
+        return DeviceFinding(kind.capitalize(), value, False, f"Not told ({unclear}). {TOO_NOISY}", warning=True)
+    return DeviceFinding(kind.capitalize(), value, fine=True)
 
 
 def _words(change: Change) -> str:

@@ -120,6 +120,11 @@ def test_changes_are_said_with_their_numbers_their_limits_and_what_to_do():
     assert not found[3].advice
 
 
+def test_what_was_measured_too_inaccurately_is_neither_changed_nor_fine():
+    (found,) = change_findings([change("response", today=0.16, band_hz=(50.0, 63.0), error=0.3, unclear=True)])
+    assert found.warning and not found.fine and "close other programs" in found.advice
+
+
 def test_a_handle_that_does_not_move_any_more_has_changed():
     (found,) = change_findings([change("friction", today=np.nan, unit="N", changed=True)])
     assert "the handle did not move" in found.value and found.wrong

@@ -87,3 +87,20 @@ def test_a_few_missed_ticks_change_nothing_and_many_are_refused(recorded, seed):
     no_sensor = replace(today.response, samples=np.full_like(today.response.samples, np.nan))
     with pytest.raises(DeviceError, match="100.0 % of its response is missing"):
         compare_recordings(baseline, replace(today, response=no_sensor))
+
+
+def shaken(recording: Recording, rms_mps2: float, seed: int) -> Recording:
+    """Under a sensor that is disturbed while the handle moves, and at rest not."""
+    random = np.random.default_rng(seed)
+    samples = recording.response.samples.copy()
+    for segment in recording.segments:
+        there = slice(segment.start, segment.stop)
+        samples[there] += rms_mps2 * random.standard_normal(samples[there].shape)
+    return replace(recording, response=replace(recording.response, samples=samples))
+
+
+@pytest.mark.parametrize("seed", [6])
+def test_what_noise_hides_is_not_called_a_change_and_not_fine(recorded, seed):
+    found = compare_recordings(recorded(1), shaken(recorded(2), 2.0, seed))
+    assert not any(change.changed for change in found)
+    assert {change.kind for change in found if change.unclear} >= {"response"}
