@@ -15,8 +15,6 @@ from study.devices.opening import accept_device, open_device
 from study.errors import DeviceError
 from study.workflows.checks import examine_setup
 
-TODAY = datetime.now(UTC).date()
-
 
 @pytest.fixture
 def locked(stub):
@@ -60,9 +58,10 @@ def test_another_device_firmware_or_library_voids_the_acceptance(stub, vendor, r
 
 
 def test_an_acceptance_expires_and_must_not_be_dated_in_the_future(stub, vendor, rigs):
-    vendor.accept("omega.3", on=(TODAY - VALID_FOR).isoformat())
+    today = datetime.now(UTC).date()
+    vendor.accept("omega.3", on=(today - VALID_FOR).isoformat())
     open_for_a_hand(rigs)
-    for day in (TODAY - VALID_FOR - timedelta(days=1), TODAY + timedelta(days=2)):
+    for day in (today - VALID_FOR - timedelta(days=1), today + timedelta(days=2)):
         vendor.accept("omega.3", on=day.isoformat())
         assert f"It was accepted on {day}" in refused(rigs)
 
