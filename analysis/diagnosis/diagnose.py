@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 
-from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.confirm.confirm_laws import (
     leaves_open,
@@ -145,6 +144,9 @@ def _search_beside_clean(
 
 
 def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper) -> tuple[Balance, ...]:
+    # Imported here: a given model has a balance of its own.
+    from analysis.diagnosis.balance.balances import find_balances
+
     weighed = partial(find_balances, recordings, frozenset(settings.without), settings.time_left, map_)
     return settings.guard.part(BALANCE, "its weighing", weighed, ())
 

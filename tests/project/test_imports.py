@@ -78,8 +78,8 @@ def test_a_diagnosis_begins_without_what_only_some_of_them_need():
     assert loaded.isdisjoint(needless), sorted(loaded & needless)
 
 
-CLOSURE_OF_DIAGNOSE = 256
-"""Our own files that are loaded before a diagnosis with a given model begins: 255 in November 2026, of which 47 are the
+CLOSURE_OF_DIAGNOSE = 251
+"""Our own files that are loaded before a diagnosis with a given model begins: 251 in November 2026, of which 47 are the
 catalogue of effects. The number may shrink only; what only some diagnoses need is imported where they need it."""
 OPTIONAL_ROOMS = (
     "analysis.diagnosis.contrast",  # only beside clean recordings

@@ -28,7 +28,7 @@ from analysis.diagnosis.balance.command_laws import (
 )
 from analysis.diagnosis.balance.inverse_balance import InverseBalance
 from analysis.diagnosis.balance.judge_laws import MOST_ALIKE, Balance, judge_laws
-from analysis.diagnosis.balance.judged_law import JudgedLaw, bootstrap_draws, gain_with_bound
+from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw, bootstrap_draws, gain_with_bound
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion
@@ -48,8 +48,6 @@ TOLD = 0.3
 ROUNDS = 8
 NEEDLESS = "a law of the command leaves as little without it"
 HOLDS_AT_REST = (*SLIDING, "presliding_hysteresis")
-NO_COLUMN = -1
-"""Place in a regression of a law that changes the force itself."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,9 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.judged_law import JudgedLaw
+from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, Structure, is_better
 from analysis.diagnosis.settings import STILL_SHARE

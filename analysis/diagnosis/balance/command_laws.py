@@ -10,8 +10,8 @@ from functools import partial
 
 import numpy as np
 
+from analysis.diagnosis.balance.judged_law import Formula
 from equalizer.effects.force_nonlinearity import square_law_force
-from equalizer.laws.law import ActsOn
 from equalizer.signals.signal import FloatArray
 
 DEAD, FULL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
@@ -32,16 +32,6 @@ MOVED = ("width", "limit", "square", "gap", "power")
 BENDS = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
 """Shares of the samples below a place where a piecewise linear function bends; of the command's size, a curve jumps
 there, too."""
-
-
-@dataclass(frozen=True, slots=True)
-class Formula:
-    """A law in the language of `equalizer.laws`; x is the position and f the command of its own axis."""
-
-    text: str
-    """Its free numbers are p0, p1, …"""
-    numbers: tuple[float, ...]
-    acts_on: ActsOn
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,13 +6,26 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.balance.command_laws import Formula
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.regression import Regression
+from equalizer.laws.law import ActsOn
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
 DRAWS, SEED, LEVEL = 2000, 1, 0.025
+
+NO_COLUMN = -1
+"""Place in a regression of a law that changes the force itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A law in the language of `equalizer.laws`; x is the position and f the command of its own axis."""
+
+    text: str
+    """Its free numbers are p0, p1, …"""
+    numbers: tuple[float, ...]
+    acts_on: ActsOn
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.judged_law import JudgedLaw
+from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
 from analysis.diagnosis.balance.structures import values_of
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.tuning import Tuning

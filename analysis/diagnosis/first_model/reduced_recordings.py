@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.judge_laws import Balance
+from analysis.diagnosis.balance.judged_law import NO_COLUMN
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.motion import Motion, motion_signal
 from analysis.diagnosis.data.observed_parts import parts_of

@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.judge_laws import SMALL, Balance
-from analysis.diagnosis.balance.judged_law import JudgedLaw
+from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
 from analysis.diagnosis.balance.structures import NOTICED
 from analysis.diagnosis.confirm.confirm_laws import CONSTANTS
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
