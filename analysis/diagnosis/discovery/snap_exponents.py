@@ -112,4 +112,4 @@ def simplify_powers(expression: str) -> str:
 
     expression = re.sub(r"abs\((\w+)\)\*\*(\d+)(?!\.)\*sign\(\1\)", signed, expression)
     expression = re.sub(r"abs\((\w+)\)\*\*(\d+)(?![\d.])", plain, expression)
-    return re.sub(r"\)\*\*1(?![\d.])", ")", expression)
+    return re.sub(r"(?<=[\w)])\*\*1(?![\d.])", "", expression)

@@ -145,6 +145,8 @@ def test_axes_are_called_as_the_recording_does():
         ("p0*abs(vx)**1.5*sign(vx)", "p0*abs(vx)**1.5*sign(vx)"),
         ("p0*abs(x)**1*vx", "p0*abs(x)*vx"),
         ("p0*maximum(x - p1, 0)**1", "p0*maximum(x - p1, 0)"),
+        ("p0*(1/abs(p1 - x)**1 - 1/p1**1)", "p0*(1/abs(p1 - x) - 1/p1)"),
+        ("p0*x**15", "p0*x**15"),
     ],
 )
 def test_formulas_are_written_as_a_reader_would(written, read):
