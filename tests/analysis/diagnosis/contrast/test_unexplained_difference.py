@@ -30,6 +30,21 @@ def test_nothing_is_left_open_between_recordings_of_the_same_device(rig, seed):
     assert not rig.contrast(seed=seed).left_open
 
 
+def test_the_comparison_overrules_a_search_that_leaves_more_than_noise_and_has_not_its_fault(rig):
+    found = rig.contrast("coulomb_friction", 0.6)
+    assert found.contradicts(frozenset({"extra_mode", "constant_force"}), explained=False)
+    assert found.contradicts(frozenset(), explained=False)
+    assert not found.contradicts(frozenset({"extra_mode", "coulomb_friction"}), explained=False)
+    assert not found.contradicts(frozenset({"extra_mode"}), explained=True)
+
+
+def test_where_nothing_sets_the_sets_apart_only_what_was_not_compared_is_named(rig):
+    found = rig.contrast(seed=2)
+    assert found.contradicts(frozenset({"coulomb_friction"}), explained=True)
+    assert not found.contradicts(frozenset({"pose_dependent_inertia"}), explained=True)
+    assert not found.contradicts(frozenset(), explained=False)
+
+
 def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_is(rig, monkeypatch):
     asked = []
 

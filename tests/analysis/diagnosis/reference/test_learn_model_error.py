@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned, learned_sentence
 from analysis.diagnosis.reference.learn_model_error import (
     learn_model_error,
@@ -88,6 +88,8 @@ def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, cl
     assert learned.references.gain_on_clean(lag).mean() > 0.2
     assert learned.references.gain_on_clean(rubbing).mean() < 0.01
     assert not learned.references.gain_on_clean(NOTHING).any()
+    assert learned.references.hold(combine(rubbing, lag), 1)
+    assert not learned.references.hold(combine(rubbing, lag), 0)
 
 
 def test_a_device_equal_to_its_model_teaches_hardly_any_error(diagnosed):
