@@ -25,7 +25,7 @@ from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.discovered_law import axis_names
 
-_COUPLED = re.compile(r"p0\*(v?)([a-z])")
+_COUPLED = re.compile(rf"p0\*(v?)([{AXES}])")
 """Linear in the motion of another axis; in its own the model is."""
 _BEGINS = 1e-9
 """Share of a force that its opposite begins with."""

@@ -111,7 +111,7 @@ class View:
 
 
 def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
-    """One view per driven axis, then one per channel of the response."""
+    """One view per driven axis, then one per channel of the response that the grammar has a name for."""
     model, placed = tuning.tune(fitted.deviations), fitted.hypothesis.placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
     seen = tuple(_filter_record(measure, record, own) for record, own in zip(measure.records, evidence, strict=True))
@@ -124,7 +124,7 @@ def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Vie
     edges = _edges(seen)
     pull = np.append(-fitted.deviations, 0.0)
     views = []
-    for output in range(residual.shape[1]):
+    for output in range(min(residual.shape[1], model.inputs + len(AXES))):
         acts_on: ActsOn = "force" if output < model.inputs else "response"
         axis = output if output < model.inputs else output - model.inputs
         constant = np.concatenate([each.column(np.ones(len(each.missing_force)), output) for each in seen])

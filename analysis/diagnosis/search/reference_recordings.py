@@ -18,6 +18,9 @@ ROUNDS = 4
 TRIED = 2
 """Starts that are followed to their end."""
 
+SETTLED = 1e-4
+"""Share of the cost below which a fit ends: smaller gains are no evidence."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceRecording:
@@ -41,10 +44,11 @@ class ReferenceRecording:
         without, with_it = self._left(self.base), self._left(best)
         return np.asarray(np.log(without) - np.log(np.maximum(with_it, np.finfo(float).tiny)))
 
-    def gain_of(self, fixed: Hypothesis) -> float:
-        """Fall of the cost by a hypothesis whose numbers are fixed, the model re-tuned beside it."""
+    def costs_of(self, fixed: Hypothesis) -> tuple[float, float]:
+        """Cost without and with a hypothesis whose numbers are fixed, the model re-tuned as far in either."""
         start = evaluate_fit(self.measure, self.tuning, self.base.deviations, fixed)
-        return self.base.cost - fit(self.measure, self.tuning, start, self.known, ROUNDS).cost
+        without, with_it = (fit(self.measure, self.tuning, each, self.known, ROUNDS) for each in (self.base, start))
+        return without.cost, with_it.cost
 
     def _starts(self, wanted: Hypothesis) -> list[Hypothesis]:
         """Starting points: the wanted hypothesis, and the last claim's starting values from this recording."""
@@ -81,7 +85,8 @@ class ReferenceRecordings:
         numbers = tuple(replace(parameter, fixed=True) for parameter in effect.parameters)
         held = replace(hypothesis.claims[claim], effect=replace(effect, parameters=numbers))
         fixed = hypothesis_of_claim(held, [placed.values for placed in hypothesis.of_claim(claim)])
-        return sum(each.gain_of(fixed) for each in self.each) > 0
+        without, with_it = np.sum([each.costs_of(fixed) for each in self.each], axis=0)
+        return bool(with_it < (1 - SETTLED) * without)
 
 
 def reference_recording(

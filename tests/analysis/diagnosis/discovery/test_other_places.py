@@ -1,6 +1,7 @@
 """Laws of commands, of readings and of pairs of axes are found in simulated recordings. Compiles."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, law_of_su
 from analysis.diagnosis.discovery.matched_filter import views_of
 from analysis.diagnosis.discovery.view_terms import reading_terms
 from analysis.diagnosis.document import Candidate, diagnosis_from_json
-from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.found_law import found_law
 from analysis.diagnosis.result.candidates import beside_given
@@ -33,6 +34,13 @@ from tests.lawful import arena_of, law, recorded
 
 def quiet(said, share):
     pass
+
+
+def test_a_force_that_grows_with_time_is_no_coupling_of_axes():
+    drift = Law("p0*t", (0.1,), (), "force", "x")
+    claim = Claim(law_effect(drift), "one", (0,))
+    fitted = SimpleNamespace(hypothesis=hypothesis_of_claim(claim, [law_values(drift)]))
+    assert not is_taken_by_coupling(None, fitted, ("fx", "fy"))
 
 
 def always():

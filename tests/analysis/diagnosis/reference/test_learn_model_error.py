@@ -90,6 +90,9 @@ def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, cl
     assert not learned.references.gain_on_clean(NOTHING).any()
     assert learned.references.hold(combine(rubbing, lag), 1)
     assert not learned.references.hold(combine(rubbing, lag), 0)
+    idle = Claim(BY_NAME["end_stop"], "one", (0,))  # never reached
+    stop = hypothesis_of_claim(idle, [{"position": 10.0, "stiffness": 1e3, "opposite": 0.0}])
+    assert not learned.references.hold(stop, 0)
 
 
 def test_a_device_equal_to_its_model_teaches_hardly_any_error(diagnosed):

@@ -27,7 +27,7 @@ PATIENT = {"stretch_in_use": 1000}
 PROGRAM_CLOSED, WATCHDOG = 4, 3
 """Why the force is off, as the device says."""
 
-STARTS = 5
+STARTS = 3
 
 PROGRAM = """
 import pickle, sys, time
@@ -148,13 +148,23 @@ def stays_zero(stub) -> bool:
     return True
 
 
+def holding_on(holding, stub):
+    """A program whose loop was sent the signals of a terminal, and holds its force all the same. One that a busy
+    computer made let go says so, and another is tried; a loop that ended would be LOST."""
+    for _ in range(STARTS):
+        held = holding()
+        assert os.getsid(held.loop_pid) != os.getsid(held.program.pid)
+        os.kill(held.loop_pid, signal.SIGINT)  # even so
+        os.kill(held.loop_pid, signal.SIGHUP)
+        time.sleep(0.5)
+        if runs(held.loop_pid) and not stays_zero(stub):
+            return held
+        assert held.end() == "STALLED\n"
+    pytest.fail(f"none of {STARTS} programs went on holding")
+
+
 def test_ctrl_c_in_the_terminal_reaches_the_program_alone_and_ends_with_a_fade(stub, holding):
-    held = holding()
-    assert os.getsid(held.loop_pid) != os.getsid(held.program.pid)
-    os.kill(held.loop_pid, signal.SIGINT)  # even so
-    os.kill(held.loop_pid, signal.SIGHUP)
-    time.sleep(0.2)
-    assert runs(held.loop_pid) and not stays_zero(stub)
+    held = holding_on(holding, stub)
     os.killpg(held.program.pid, signal.SIGINT)
     assert "KeyboardInterrupt" in held.end()
     becomes(lambda: not runs(held.loop_pid))
