@@ -1,5 +1,6 @@
 """What changed between two measurements of a device, each number beside the accepted one and its limit."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -80,7 +81,7 @@ def _friction_changes(accepted: DeviceMeasures, today: DeviceMeasures, limits: C
         then, now = float(accepted.friction_n[axis]), float(today.friction_n[axis])
         error = float(np.hypot(accepted.friction_error_n[axis], today.friction_error_n[axis]))
         # A handle that no longer moves has changed: its friction is unknown, and large.
-        stuck = np.isnan(now) or np.isnan(then)
+        stuck = math.isnan(now) or math.isnan(then)
         changed = stuck or _is_beyond(now - then, error, limits.friction_n, limits)
         unclear = not changed and limits.deviations * error > limits.friction_n
         yield Change("friction", channel, then, now, error, limits.friction_n, "N", changed, unclear=unclear)

@@ -131,6 +131,13 @@ def accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
     return check_accepted(info, today)
 
 
+def proof_force_n() -> float:
+    """What `accept_device` pushes the handle with."""
+    from study.devices.force_dimension.force_proof import FORCE_N
+
+    return FORCE_N
+
+
 def accept_device(
     name: str, settings: DeviceSettings, clock: Clock, operator: str, baseline: tuple[str, str] = ("", "")
 ) -> str:

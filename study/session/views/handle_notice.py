@@ -24,5 +24,13 @@ def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
     )
 
 
+def proof_notice(device: str, force_n: float) -> str:
+    """For the proof that a device lets go: without a spring, so that the handle moves freely."""
+    return (
+        f"No person may hold the handle: within some seconds '{device}' is pushed along x with {force_n:g} N for a "
+        "tenth of a second, and moves by some 15 mm. Keep hands away and the workspace free."
+    )
+
+
 def _duration_words(total_s: float) -> str:
     return f"for about {round(total_s / 60)} min" if total_s >= 60 else f"for about {max(1, round(total_s))} s"

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from study.devices.clock import Clock, RealClock
 from study.devices.device import Device, DeviceSettings
-from study.devices.opening import accept_device, examine_device, needs_real_time, open_device
+from study.devices.opening import accept_device, examine_device, needs_real_time, open_device, proof_force_n
 from study.errors import DeviceError, ExitCode, WrongUseError
 from study.session.stimulus.timing_verdict import judge_load
+from study.session.views.handle_notice import proof_notice
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.checks.check_device import check_device
@@ -107,5 +108,6 @@ def accept(name: str, examination: Examination, operator: str, moving: Moving) -
         raise DeviceError("The device was not accepted", f"Not fine: {found}.", "Mend that first, as said above.")
     sensed = all(finding.fine for finding in examination.findings if finding.name in NOT_NEEDED)
     baseline = record_baseline(name, moving) if sensed else ("", "")
+    moving.announce(proof_notice(name, proof_force_n()))
     said = accept_device(name, _settings(name, 0.0), RealClock(), operator, baseline)
     return said if sensed else f"{said}. Without an accelerometer no daily check will be possible."

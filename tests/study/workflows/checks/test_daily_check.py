@@ -1,6 +1,5 @@
 """The daily check on the stub of the vendor's library: unchanged it passes, what was changed on purpose is named."""
 
-import contextlib
 import json
 from dataclasses import replace
 from types import SimpleNamespace
@@ -9,67 +8,16 @@ import numpy as np
 import pytest
 
 from analysis.device_change.compare_devices import Change
-from protocols.definition.recording_segments import MultisineSegment
 from study.cli.main import main
-from study.devices.clock import VirtualClock
-from study.devices.device import DeviceInfo
 from study.devices.force_dimension.acceptance import Acceptance, acceptance_file, write_acceptance
 from study.devices.opening import device_folder
-from study.devices.safe import SafeDevice
 from study.errors import DeviceError, LeftError
 from study.session.views.views import DeviceFinding, DeviceReport
-from study.store.disk.provenance import sha256_of
-from study.store.formats.protocol_files import read_recording_protocol
-from study.store.formats.recording_file import read_recording
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.daily_check import Moving, check_on, compare_recordings, last_check
 from study.workflows.checks.device_changes import change_findings
 from study.workflows.checks.examine_setup import Examination
-from study.workflows.recording.record_device import RecordingPlan, record_on, recording_settings
-
-AS_NEW = {"friction": 0.15, "damping": 1.0, "mode_hz": 60.0, "noise": 0.05}
-QUIET = Moving(lambda notice: None, lambda done: None)
-
-
-def short():
-    """The shipped protocol with fewer and shorter periods: a fifth of its time."""
-    protocol = read_recording_protocol("daily_check").protocol
-    segments = tuple(
-        replace(segment, duration_s=1.0, periods=3)
-        if isinstance(segment, MultisineSegment)
-        else replace(segment, duration_s=4.0, settle_s=1.0)
-        for segment in protocol.segments
-    )
-    return replace(protocol, segments=segments, rest_s=0.5)
-
-
-@pytest.fixture
-def device_like(stepped_stub):
-    """A device as new, but for what is given; its accelerometer's noise from a seed."""
-
-    @contextlib.contextmanager
-    def made(seed: int, changed: dict[str, float]):
-        state = AS_NEW | changed
-        for name in ("friction", "damping", "mode_hz", "gain"):
-            stepped_stub.set(name, state.get(name, 1.0))
-        stepped_stub.noise_mps2, stepped_stub.random = state["noise"], np.random.default_rng(seed)
-        rig = stepped_stub.rig()
-        plan = RecordingPlan(short(), "omega3", (0.0, 0.0, 0.0), 1, device_folder() / f"{seed}.h5")
-        stepped_stub.move(0.0, 0.0, 0.0)
-        with contextlib.closing(SafeDevice(rig, recording_settings(plan), VirtualClock())) as device:
-            yield device, plan
-
-    return made
-
-
-@pytest.fixture
-def recorded(device_like):
-    def record(seed: int, **changed: float):
-        with device_like(seed, changed) as (device, plan):
-            record_on(device, plan, lambda done: None)
-        return read_recording(plan.out)
-
-    return record
+from tests.study.workflows.checks.conftest import INFO, QUIET, short
 
 
 def changed_kinds(baseline, today) -> set[str]:
@@ -128,23 +76,6 @@ def test_what_was_measured_too_inaccurately_is_neither_changed_nor_fine():
 def test_a_handle_that_does_not_move_any_more_has_changed():
     (found,) = change_findings([change("friction", today=np.nan, unit="N", changed=True)])
     assert "the handle did not move" in found.value and found.wrong
-
-
-INFO = DeviceInfo("omega.3", False, 1000.0, 12.0, 0.28, "serial 4242, firmware 2.41, SDK 3.17.5.0")
-
-
-@pytest.fixture
-def two_days(recorded, device_like, vendor):
-    """Accepted with a baseline, which is given back, and a function that checks that device once more."""
-    recorded(1)
-    baseline = device_folder() / "1.h5"
-    vendor.accept("omega.3", baseline=(baseline.name, sha256_of(baseline)))
-
-    def again(seed: int, **changed: float):
-        with device_like(seed, changed) as (device, plan):
-            return check_on(device, plan, QUIET)
-
-    return baseline, again
 
 
 def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, capsys):

@@ -1,0 +1,79 @@
+"""A device on the stub of the vendor's library that is as new but for what is given, and its recordings."""
+
+import contextlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from protocols.definition.recording_segments import MultisineSegment
+from study.devices.clock import VirtualClock
+from study.devices.device import DeviceInfo
+from study.devices.opening import device_folder
+from study.devices.safe import SafeDevice
+from study.store.disk.provenance import sha256_of
+from study.store.formats.protocol_files import read_recording_protocol
+from study.store.formats.recording_file import read_recording
+from study.workflows.checks.daily_check import Moving, check_on
+from study.workflows.recording.record_device import RecordingPlan, record_on, recording_settings
+
+AS_NEW = {"friction": 0.15, "damping": 1.0, "mode_hz": 60.0, "noise": 0.05}
+QUIET = Moving(lambda notice: None, lambda done: None)
+
+
+def short():
+    """The shipped protocol with fewer and shorter periods: a fifth of its time."""
+    protocol = read_recording_protocol("daily_check").protocol
+    segments = tuple(
+        replace(segment, duration_s=1.0, periods=3)
+        if isinstance(segment, MultisineSegment)
+        else replace(segment, duration_s=4.0, settle_s=1.0)
+        for segment in protocol.segments
+    )
+    return replace(protocol, segments=segments, rest_s=0.5)
+
+
+@pytest.fixture
+def device_like(stepped_stub):
+    """A device as new, but for what is given; its accelerometer's noise from a seed."""
+
+    @contextlib.contextmanager
+    def made(seed: int, changed: dict[str, float]):
+        state = AS_NEW | changed
+        for name in ("friction", "damping", "mode_hz", "gain"):
+            stepped_stub.set(name, state.get(name, 1.0))
+        stepped_stub.noise_mps2, stepped_stub.random = state["noise"], np.random.default_rng(seed)
+        rig = stepped_stub.rig()
+        plan = RecordingPlan(short(), "omega3", (0.0, 0.0, 0.0), 1, device_folder() / f"{seed}.h5")
+        stepped_stub.move(0.0, 0.0, 0.0)
+        with contextlib.closing(SafeDevice(rig, recording_settings(plan), VirtualClock())) as device:
+            yield device, plan
+
+    return made
+
+
+@pytest.fixture
+def recorded(device_like):
+    def record(seed: int, **changed: float):
+        with device_like(seed, changed) as (device, plan):
+            record_on(device, plan, lambda done: None)
+        return read_recording(plan.out)
+
+    return record
+
+
+INFO = DeviceInfo("omega.3", False, 1000.0, 12.0, 0.28, "serial 4242, firmware 2.41, SDK 3.17.5.0")
+
+
+@pytest.fixture
+def two_days(recorded, device_like, vendor):
+    """Accepted with a baseline, which is given back, and a function that checks that device once more."""
+    recorded(1)
+    baseline = device_folder() / "1.h5"
+    vendor.accept("omega.3", baseline=(baseline.name, sha256_of(baseline)))
+
+    def again(seed: int, **changed: float):
+        with device_like(seed, changed) as (device, plan):
+            return check_on(device, plan, QUIET)
+
+    return baseline, again
