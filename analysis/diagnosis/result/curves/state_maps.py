@@ -118,7 +118,7 @@ def state_maps(
 def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_Course | None, str]:
     regression = balance.search.regression
     names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
-    named = [law.place for law in balance.laws if law.law.effect in names]
+    named = [law.place for law in balance.laws if law.played_as in names]
     laws = named or [law.place for law in balance.laws]
     linear, whole = (regression.remainder(regression.columns_of(each)) for each in ((), laws))
     axis = min(regression.axis, len(regression.motions[0].channels) - 1)
