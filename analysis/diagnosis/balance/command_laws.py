@@ -101,24 +101,14 @@ def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:
     low, high = float(position.min()), float(position.max())
     for side, end in ((1.0, low), (-1.0, high)):
         for gap in GAPS:
-            for columns, of_command in ((_force_of_square, "f**2"), (AS_COMMANDED.columns, "f")):
-                formula = partial(_pull_formula, (side, end), of_command)
-                yield CommandLaw(
-                    "electromagnet", {"gap": gap * (high - low)}, columns, partial(_pull_at, side, end), True,
-                    formula=formula,
-                )  # fmt: skip
+            for columns in (_force_of_square, AS_COMMANDED.columns):
+                pull = partial(_pull_at, side, end)
+                yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, pull, True)
 
 
 def _pull_at(side: float, end: float, position: FloatArray, of: dict[str, float]) -> FloatArray:
     """side: 1 where the position is a distance that grows, from `end` on; -1 where it falls."""
     return np.asarray((of["gap"] + np.maximum(side * (position - end), 0.0)) ** -2)
-
-
-def _pull_formula(at: tuple[float, float], of_command: str, of: dict[str, float], scale: float) -> Formula:
-    """Takes the force that the linear model makes of the command away. at: side and end of `_pull_at`."""
-    (side, end), gap = at, of["gap"]
-    # Its pole lies this far from where positions are counted, on the other side.
-    return Formula(f"{scale:.6g}*{of_command}/(p0 {'+' if side > 0 else '-'} x)**2 - f", (gap - side * end,), "force")
 
 
 def _power_formula(of: dict[str, float], scale: float) -> Formula:

@@ -6,7 +6,6 @@ import pytest
 from analysis.diagnosis.diagnose_values import diagnose_values
 from equalizer.laws.law import law_of
 from tests.analysis.diagnosis.balance.invented_axis import recording
-from tests.analysis.diagnosis.balance.test_actuator_laws import pulled
 
 RATE_HZ = 100.0
 
@@ -47,11 +46,3 @@ def test_the_curve_of_a_valve_is_named_with_its_formula(seed):
 
 def test_a_drive_in_order_has_no_curve():
     assert "discovered_law" not in laws_named(driven(lambda u: u, 1))
-
-
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_the_pull_of_a_coil_is_named_with_its_formula(seed):
-    named = laws_named(pulled(lambda i, x: 2.9e-6 * i**2 / (0.01 - x) ** 2, seed))
-    law = named["discovered_law"].law
-    assert (law.acts_on, law.variables) == ("force", ("fx", "x"))
-    assert law_of(law.expression, "force", "x").numbers[1] == pytest.approx(0.01, rel=0.1)
