@@ -13,6 +13,7 @@ from analysis.device_change.measure_device import (
 )
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,8 @@ class Change:
     peaks_hz: tuple[float, float] | None = None
     """Of a changed response: where it is strongest about there, then and now."""
     unclear: bool = False
-    """Nothing was seen to change, and it was measured too inaccurately to see a change of the limit's size."""
+    """Nothing was seen to change, and it was measured too inaccurately to see a change of the limit's size, or (today
+    is NaN) not at all."""
 
 
 def compare_devices(
@@ -68,12 +70,26 @@ def compare_devices(
     Raises NotMeasurableError where one of them does not tell what is compared, or they do not belong together.
     """
     limits = limits or ChangeLimits()
+    _check_played_alike(baseline, recording)
     accepted, today = measure_device(baseline), measure_device(recording)
     return (
         *_friction_changes(accepted, today, limits),
         *_response_changes(accepted.response, today.response, limits),
+        *_lost_bands(accepted.response, today.response, limits),
         *_noise_changes(accepted, today, limits),
     )
+
+
+def _check_played_alike(baseline: Recording, recording: Recording) -> None:
+    then, now = ([(s.kind, s.amplitude, s.period) for s in each.segments] for each in (baseline, recording))
+    if len(then) != len(now):
+        raise NotMeasurableError(f"{len(now)} pieces were played, {len(then)} at the acceptance")
+    for before, after in zip(then, now, strict=True):
+        if before != after:
+            words = (
+                f"a {kind} of {amplitude:.3g} N, {period} samples long" for kind, amplitude, period in (after, before)
+            )
+            raise NotMeasurableError(" was played instead of ".join(words))
 
 
 def _friction_changes(accepted: DeviceMeasures, today: DeviceMeasures, limits: ChangeLimits) -> Iterator[Change]:
@@ -105,6 +121,27 @@ def _response_changes(then: FrequencyResponse, now: FrequencyResponse, limits: C
         yield _worst_band(then, now, axis, gain, limits)
 
 
+def _lost_bands(then: FrequencyResponse, now: FrequencyResponse, limits: ChangeLimits) -> Iterator[Change]:
+    """Bands most of whose lines were reliable at the acceptance only: whether anything changed there is not known."""
+    before_hz = then.frequency_hz[then.reliable]
+    lost = ~np.isin(before_hz, now.frequency_hz[now.reliable])
+    band = _bands(before_hz, limits)
+    for number in np.unique(band):
+        here = band == number
+        if 2 * lost[here].sum() > here.sum():
+            band_hz = (float(before_hz[here][0]), float(before_hz[here][-1]))
+            axes = ", ".join(then.input_channels)
+            yield Change(
+                "response", axes, 0.0, math.nan, math.nan, limits.share, "", False, band_hz=band_hz, unclear=True
+            )
+
+
+def _bands(frequency_hz: FloatArray, limits: ChangeLimits) -> FloatArray:
+    """Number of the band of each line, from the lowest on."""
+    number: FloatArray = np.floor(np.log2(frequency_hz / frequency_hz[0]) / limits.band_octaves)
+    return number
+
+
 def _worst_band(
     then: FrequencyResponse, now: FrequencyResponse, axis: int, gain: float, limits: ChangeLimits
 ) -> Change:
@@ -113,7 +150,7 @@ def _worst_band(
     Noise of late and missed ticks comes in bursts that hit neighbouring lines alike: the difference counts beyond
     `deviations` times the power that the scatter from period to period lets expect.
     """
-    band = np.floor(np.log2(then.frequency_hz / then.frequency_hz[0]) / limits.band_octaves)
+    band = _bands(then.frequency_hz, limits)
     found = []
     for number in np.unique(band):
         lines = band == number

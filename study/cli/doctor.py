@@ -61,7 +61,7 @@ def doctor(
     as_json: JsonOption = False,
 ) -> None:
     """Check the installation, the device with its sensor, and the 1 kHz timing. Nothing moves, unless --accept or
-    --daily asks for it: then it is said before, and confirmed."""
+    --daily asks for it: then it is said before and, in a terminal, confirmed."""
     from contextlib import nullcontext
 
     from study.cli.progress import bar
@@ -115,7 +115,7 @@ def _check_today(device: str, as_json: bool) -> None:
         for finding in checked.findings:
             _say_one(finding)
     typer.echo(str(checked.file), err=as_json)
-    if any(finding.wrong for finding in checked.findings):
+    if not all(finding.fine for finding in checked.findings):
         raise typer.Exit(ExitCode.DEVICE)
 
 

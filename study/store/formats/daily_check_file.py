@@ -20,11 +20,11 @@ class DailyCheck:
     passed: bool
     """Nothing changed beyond its limit."""
     sentences: tuple[str, ...]
-    """One for each kind of change, as the screen shows them."""
+    """One for each kind of change, as the screen shows them; or why the check broke off."""
     changes: tuple[dict[str, Any], ...]
     """Kind, axis, accepted and today's number, error, limit, unit, whether it changed, band."""
     recording: str
-    """File beside this one."""
+    """File beside this one; empty where it broke off before one was written."""
     recording_sha256: str
     baseline_sha256: str
 

@@ -12,6 +12,7 @@ from analysis.device_change.compare_devices import Change, compare_devices
 from analysis.device_change.measure_device import NotMeasurableError
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.document.hashing import protocol_hash
 from study.devices.clock import RealClock
 from study.devices.device import Device, DeviceInfo
 from study.devices.opening import accepted_baseline, device_folder, needs_real_time, open_device
@@ -52,7 +53,8 @@ def seconds_of_play() -> float:
 
 
 def record_baseline(name: str, moving: Moving) -> tuple[str, str]:
-    """Record what the daily checks compare with. Its name in `device_folder`, and its SHA-256. Raises StudyError."""
+    """Record what the daily checks compare with. Its name in `device_folder`, and its SHA-256. Raises StudyError, also
+    where it does not tell enough to compare with."""
     plan = _plan(name, BASELINES)
     with contextlib.closing(_open(plan)) as device:
         return _baseline_on(device, plan, moving)
@@ -61,7 +63,19 @@ def record_baseline(name: str, moving: Moving) -> tuple[str, str]:
 def _baseline_on(device: Device, plan: RecordingPlan, moving: Moving) -> tuple[str, str]:
     record_on(device, plan, moving.show, moving.announce)
     recorded = read_recording(plan.out)
-    compare_recordings(recorded, recorded)
+    facts = recorded.meta["segments"]
+    limited = [
+        each
+        for each in facts
+        if each["played_amplitude_n"] < each["requested_amplitude_n"] or each["sensor_clipped"] or each["total_clipped"]
+    ]
+    found = [f"Sensor or force was at its limit in {len(limited)} of {len(facts)} pieces."] if limited else []
+    # Compared with itself nothing differs: what is not fine was not measured well enough to tell a change later.
+    unsure = [finding for finding in change_findings(compare_recordings(recorded, recorded)) if not finding.fine]
+    found += [f"Too inaccurate to compare with: {finding.name}, {finding.value}." for finding in unsure]
+    if found:
+        do_now = "Look for what holds the handle, disturbs the sensor or shakes the table; then accept it again."
+        raise DeviceError("The device was not accepted", " ".join(found), do_now, f"The recording is {plan.out}.")
     return f"{BASELINES}/{plan.out.name}", sha256_of(plan.out)
 
 
@@ -80,24 +94,50 @@ def check_today(name: str, moving: Moving) -> CheckedToday:
 
 def check_on(device: Device, plan: RecordingPlan, moving: Moving) -> CheckedToday:
     """As `check_today`, on an open device."""
-    baseline, digest = _accepted_recording(device.info)
-    record_on(device, plan, moving.show, moving.announce)
-    changes = compare_recordings(baseline, read_recording(plan.out))
+    baseline, digest = _accepted_recording(device.info, plan.protocol)
+    begun: list[str] = []
+
+    def announce(notice: str) -> None:
+        moving.announce(notice)
+        begun.append(notice)
+
+    try:
+        record_on(device, plan, moving.show, announce)
+        changes = compare_recordings(baseline, read_recording(plan.out))
+    except BaseException as error:
+        if begun:  # an earlier pass of the day must not stand
+            with contextlib.suppress(StudyError, OSError):
+                why = str(error) or type(error).__name__
+                _write_check(device.info, plan, digest, False, (f"It broke off: {why}",), ())
+        raise
     findings = change_findings(changes)
+    passed = all(finding.fine for finding in findings)
+    sentences = tuple(f"{finding.name}: {finding.value}. {finding.advice}".strip() for finding in findings)
+    return CheckedToday(findings, _write_check(device.info, plan, digest, passed, sentences, changes))
+
+
+def _write_check(
+    info: DeviceInfo,
+    plan: RecordingPlan,
+    baseline_sha256: str,
+    passed: bool,
+    sentences: tuple[str, ...],
+    changes: tuple[Change, ...],
+) -> Path:
     check = DailyCheck(
-        device=device.info.name,
-        details=device.info.details,
+        device=info.name,
+        details=info.details,
         utc=datetime.now(UTC).isoformat(timespec="seconds"),
-        passed=all(finding.fine for finding in findings),
-        sentences=tuple(f"{finding.name}: {finding.value}. {finding.advice}".strip() for finding in findings),
+        passed=passed,
+        sentences=sentences,
         changes=tuple(_as_json(change) for change in changes),
-        recording=plan.out.name,
-        recording_sha256=sha256_of(plan.out),
-        baseline_sha256=digest,
+        recording=plan.out.name if plan.out.exists() else "",
+        recording_sha256=sha256_of(plan.out) if plan.out.exists() else "",
+        baseline_sha256=baseline_sha256,
     )
     file = plan.out.with_suffix(".json")
     write_daily_check(file, check)
-    return CheckedToday(findings, file)
+    return file
 
 
 def compare_recordings(baseline: Recording, today: Recording) -> tuple[Change, ...]:
@@ -134,6 +174,11 @@ def _found_check(info: DeviceInfo) -> DeviceFinding:
         when = f"{local_time(check.utc, machine_zone)}, {path}"
         if local_parts(check.utc, machine_zone)[0] != day:
             return DeviceFinding("Daily check", f"none today; the last one was {when}", False, advice, warning=True)
+        if check.baseline_sha256 != _accepted_digest(info):
+            said = f"none since it was accepted anew; the last one was {when}"
+            return DeviceFinding("Daily check", said, False, advice, warning=True)
+        if not check.changes:
+            return DeviceFinding("Daily check", f"it broke off ({when})", False, advice, warning=True)
         if check.passed:
             return DeviceFinding("Daily check", f"nothing changed since the acceptance ({when})", fine=True)
         changed = ", ".join(dict.fromkeys(str(each["kind"]) for each in check.changes if each["changed"]))
@@ -142,7 +187,15 @@ def _found_check(info: DeviceInfo) -> DeviceFinding:
     return DeviceFinding("Daily check", "none yet", False, advice, warning=True)
 
 
-def _accepted_recording(info: DeviceInfo) -> tuple[Recording, str]:
+def _accepted_digest(info: DeviceInfo) -> str:
+    """Empty where this device is not accepted now."""
+    try:
+        return accepted_baseline(info, datetime.now(UTC).date())[1]
+    except DeviceError:
+        return ""
+
+
+def _accepted_recording(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recording, str]:
     name, digest = accepted_baseline(info, datetime.now(UTC).date())
     again = f"Accept it anew: hapteq doctor --device {info.name.replace('.', '')} --timing 60 --accept 'NAME'."
     if not name:
@@ -152,7 +205,11 @@ def _accepted_recording(info: DeviceInfo) -> tuple[Recording, str]:
     path = device_folder() / name
     if not path.is_file() or sha256_of(path) != digest:
         raise DeviceError("There is nothing to compare with", f"{path} is gone, or is not what was accepted.", again)
-    return read_recording(path), digest
+    baseline = read_recording(path)
+    if baseline.meta["provenance"]["protocol_hash"] != protocol_hash(protocol):
+        happened = f"{path} was played by another version of the protocol {protocol.name!r}."
+        raise DeviceError("There is nothing to compare with", happened, again)
+    return baseline, digest
 
 
 def _not_comparable_error(refusal: NotMeasurableError) -> DeviceError:

@@ -33,7 +33,7 @@ def _finding(kind: str, changes: Sequence[Change], rubs: bool) -> DeviceFinding:
     advice = f"It changed ({axes}). {causes}"
     if axes:
         return DeviceFinding(kind.capitalize(), value, fine=False, advice=advice)
-    if unclear := ", ".join(change.axis for change in changes if change.unclear):
+    if unclear := ", ".join(dict.fromkeys(change.axis for change in changes if change.unclear)):
         return DeviceFinding(kind.capitalize(), value, False, f"Not told ({unclear}). {TOO_NOISY}", warning=True)
     return DeviceFinding(kind.capitalize(), value, fine=True)
 
@@ -42,6 +42,8 @@ def _words(change: Change) -> str:
     match change.kind:
         case "gain":
             return f"{change.axis} {signed_number(100 * (change.today - 1), 1)} %"
+        case "response" if math.isnan(change.today):
+            return f"{change.axis} not measured{_place_words(change)}"
         case "response":
             return f"{change.axis} {100 * change.today:.1f} %{_place_words(change)}"
         case _:

@@ -12,6 +12,7 @@ from study.devices.device import Fault, Health
 from study.errors import ExitCode
 from study.session.stimulus.timing_verdict import judge_lateness, judge_load, lateness_of
 from study.session.views.views import DeviceFinding, DeviceReport
+from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.check_timing import Timing
 from study.workflows.checks.examine_setup import Examination
 
@@ -197,3 +198,13 @@ def test_verdict_figures_summary_and_exit_code_agree(capsys, late_ms, load, simu
     assert (looked.exit_code, lines[-1]) == (code, summary)
     assert not any(line.lstrip().startswith("fine") and "too late" in line for line in lines)
     assert doctor._document(looked)["fine"] is (summary[:3] == "All")
+
+
+@pytest.mark.parametrize(("fine", "code"), [(True, ExitCode.DONE), (False, ExitCode.DEVICE)])
+def test_a_daily_check_that_told_nothing_is_no_success(run, monkeypatch, tmp_path, fine, code):
+    told = DeviceFinding("Noise", "", fine=fine, warning=not fine)
+    checked = daily_check.CheckedToday((told,), tmp_path / "a.json")
+    monkeypatch.setattr(daily_check, "check_today", lambda *_: checked)
+    setup = Examination((), DeviceReport("omega3", False, ()), None)
+    monkeypatch.setattr(examine_setup, "examine_setup", lambda *_, on_progress: setup)
+    assert run("--device", "omega3", "--data", tmp_path, "--daily")[0] == code

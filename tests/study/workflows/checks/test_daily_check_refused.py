@@ -2,14 +2,27 @@
 
 import json
 from dataclasses import replace
+from datetime import UTC, datetime
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from analysis.device_change import compare_devices
+from analysis.device_change.measure_device import measure_device
+from equalizer.signals.recording import Recording
+from study.cli.main import main
+from study.devices.opening import device_folder
+from study.errors import DeviceError
 from study.session.views.views import DeviceFinding, DeviceReport
+from study.store.disk.provenance import sha256_of
+from study.store.formats.daily_check_file import DailyCheck, write_daily_check
+from study.store.formats.recording_file import read_recording
 from study.workflows.checks import daily_check, examine_setup
-from study.workflows.checks.daily_check import Moving
+from study.workflows.checks.daily_check import Moving, check_on, compare_recordings, last_check
+from study.workflows.checks.device_changes import change_findings
 from study.workflows.checks.examine_setup import Examination, accept
+from tests.study.workflows.checks.conftest import INFO, QUIET
 
 
 @pytest.mark.parametrize("sensor", [True, False])
@@ -35,15 +48,112 @@ def test_a_handle_that_stuck_is_written_as_a_change(two_days, monkeypatch):
     _, check = two_days
     read = daily_check.read_recording
 
-    def stuck(path):
-        recording = read(path)
-        if path.name != "2.h5":
-            return recording
-        position = recording.position.samples * [0.0, 1.0, 1.0]
-        return replace(recording, position=replace(recording.position, samples=position))
-
-    monkeypatch.setattr(daily_check, "read_recording", stuck)
+    monkeypatch.setattr(
+        daily_check, "read_recording", lambda path: stuck(read(path)) if path.name == "2.h5" else read(path)
+    )
     document = json.loads(check(2).file.read_text())
     (friction,) = (each for each in document["changes"] if (each["kind"], each["axis"]) == ("friction", "fx"))
     assert friction["changed"] is True and friction["today"] is None
     assert document["passed"] is False
+
+
+def test_a_band_that_is_not_reliable_any_more_is_no_pass(recorded, monkeypatch):
+    recording = recorded(1)
+    found = measure_device(recording)
+    at_hz = found.response.frequency_hz
+    cut = replace(found.response, reliable=found.response.reliable & (at_hz < 70))
+    measured = iter([found, replace(found, response=cut)])
+    monkeypatch.setattr(compare_devices, "measure_device", lambda _: next(measured))
+    (response,) = (
+        each for each in change_findings(compare_recordings(recording, recording)) if each.name == "Response"
+    )
+    assert response.warning and not response.fine
+    assert "fx, fy, fz not measured at" in response.value and "Not told (fx, fy, fz)" in response.advice
+
+
+def lowered(recording: Recording) -> Recording:
+    first, *others = recording.meta["segments"]
+    weaker = first | {"played_amplitude_n": 0.7 * first["requested_amplitude_n"]}
+    return replace(recording, meta=recording.meta | {"segments": [weaker, *others]})
+
+
+def clipped(recording: Recording) -> Recording:
+    first, *others = recording.meta["segments"]
+    return replace(recording, meta=recording.meta | {"segments": [first | {"sensor_clipped": 3}, *others]})
+
+
+def stuck(recording: Recording) -> Recording:
+    position = recording.position.samples * [0.0, 1.0, 1.0]
+    return replace(recording, position=replace(recording.position, samples=position))
+
+
+def shaken(recording: Recording) -> Recording:
+    """While the handle moves."""
+    random, samples = np.random.default_rng(6), recording.response.samples.copy()
+    for segment in recording.segments:
+        there = slice(segment.start, segment.stop)
+        samples[there] += 2.0 * random.standard_normal(samples[there].shape)
+    return replace(recording, response=replace(recording.response, samples=samples))
+
+
+def test_a_baseline_that_tells_too_little_is_refused(device_like, monkeypatch):
+    with device_like(1, {}) as (device, plan):
+        assert daily_check._baseline_on(device, plan, QUIET)[0] == "baselines/1.h5"
+        good = read_recording(plan.out)
+        monkeypatch.setattr(daily_check, "record_on", lambda *_: None)
+        for spoil, said in (
+            (lowered, "at its limit in 1 of 6"),
+            (clipped, "at its limit in 1 of 6"),
+            (stuck, "Friction, fx the handle did not move"),
+            (shaken, "Too inaccurate to compare with: Response"),
+        ):
+            monkeypatch.setattr(daily_check, "read_recording", lambda _, spoil=spoil: spoil(good))
+            with pytest.raises(DeviceError, match=f"was not accepted.*{said}.*accept it again"):
+                daily_check._baseline_on(device, plan, QUIET)
+
+
+def test_what_was_played_otherwise_is_not_compared(two_days, device_like, recorded):
+    baseline = read_recording(two_days[0])
+    first, *others = baseline.segments
+    weaker = replace(baseline, segments=(replace(first, amplitude=0.7 * first.amplitude), *others))
+    with pytest.raises(DeviceError, match="a sine of 0.84 N.* was played instead of a sine of 1.2 N"):
+        compare_recordings(baseline, weaker)
+    with pytest.raises(DeviceError, match="5 pieces were played, 6 at the acceptance"):
+        compare_recordings(baseline, replace(baseline, segments=tuple(others)))
+
+    def never(notice: str) -> None:
+        raise AssertionError(notice)
+
+    with device_like(2, {}) as (device, plan):
+        other = replace(plan, protocol=replace(plan.protocol, rest_s=0.6))
+        with pytest.raises(DeviceError, match="was played by another version of the protocol"):
+            check_on(device, other, Moving(never, lambda done: None))
+
+
+def test_a_pass_ends_with_another_acceptance_and_with_a_check_that_broke_off(
+    two_days, device_like, vendor, monkeypatch
+):
+    baseline, _ = two_days
+    accepted = (baseline.name, sha256_of(baseline))
+    checks = device_folder() / "daily_checks"
+    checks.mkdir()
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    changes = ({"kind": "noise", "changed": False},)
+    write_daily_check(
+        checks / "1.json", DailyCheck(INFO.name, INFO.details, now, True, (), changes, "1.h5", "0", accepted[1])
+    )
+    assert last_check(INFO).fine
+    vendor.accept("omega.3", baseline=("other.h5", "1" * 64))
+    assert "none since it was accepted anew" in last_check(INFO).value and not last_check(INFO).fine
+    vendor.accept("omega.3", baseline=accepted)
+    assert last_check(INFO).fine
+
+    def broken(device, plan, show, announce):
+        announce("It moves.")
+        raise DeviceError("The device let go", "A cable.", "Look.")
+
+    monkeypatch.setattr(daily_check, "record_on", broken)
+    with device_like(2, {}) as (device, plan), pytest.raises(DeviceError, match="let go"):
+        check_on(device, replace(plan, out=checks / "2.h5"), QUIET)
+    assert "it broke off" in last_check(INFO).value and not last_check(INFO).fine
+    assert main(["validate", str(checks / "2.json")]) == 0
