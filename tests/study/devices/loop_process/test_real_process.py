@@ -26,7 +26,6 @@ PATIENT = {"stretch_in_use": 1000}
 
 PROGRAM_CLOSED, WATCHDOG = 4, 3
 """Why the force is off, as the device says."""
-
 STARTS = 3
 
 PROGRAM = """
