@@ -13,7 +13,6 @@ from equalizer.signals.signal import FloatArray, Signal
 STROKES_BELOW_HZ = 1.0
 """Sinusoids slower than this are strokes: the shipped daily check has 0.5 Hz, the lowest stimulus of a study 5 Hz."""
 
-
 MISSED_LIMIT = 0.02
 """Share of missed ticks at most: that of a trial in the shipped protocols."""
 

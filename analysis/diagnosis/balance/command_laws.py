@@ -113,8 +113,8 @@ def _pull_at(side: float, end: float, position: FloatArray, of: dict[str, float]
 
 def _power_formula(of: dict[str, float], scale: float) -> Formula:
     if not of["width"]:
-        return Formula(f"{scale:.6g}*sign(f)*abs(f)**p0", (of["power"],), "command")
-    return Formula(f"{scale:.6g}*sign(f)*maximum(abs(f) - p0, 0)**p1", (of["width"], of["power"]), "command")
+        return Formula(f"{scale:.6g}*sign(f)*abs(f)**p0", (of["power"],))
+    return Formula(f"{scale:.6g}*sign(f)*maximum(abs(f) - p0, 0)**p1", (of["width"], of["power"]))
 
 
 def _force_of_square(command: FloatArray, of: dict[str, float]) -> FloatArray:

@@ -8,7 +8,6 @@ import numpy.typing as npt
 
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.regression import Regression
-from equalizer.laws.law import ActsOn
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
@@ -20,12 +19,11 @@ NO_COLUMN = -1
 
 @dataclass(frozen=True, slots=True)
 class Formula:
-    """A law in the language of `equalizer.laws`; x is the position and f the command of its own axis."""
+    """A law of the command in the language of `equalizer.laws`; f is the command of its own axis."""
 
     text: str
     """Its free numbers are p0, p1, …"""
     numbers: tuple[float, ...]
-    acts_on: ActsOn
 
 
 @dataclass(frozen=True, slots=True, eq=False)

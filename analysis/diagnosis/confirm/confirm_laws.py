@@ -87,10 +87,7 @@ def require_enough_gain(seen: SearchResult, repeats: bool) -> SearchResult:
     must, and `explained` only where repeats show the noise. Constants are numbers of the model and need no proof."""
     found = seen.found
     while found.steps and not _takes_enough(seen.context, found):
-        if len(found.steps) > 1:
-            found = without_effect(seen.context, found, len(found.steps) - 1)
-        else:
-            found = replace(found, after=found.retuned, steps=())
+        found = without_effect(seen.context, found, len(found.steps) - 1)
         seen = replace(seen, found=found, judgement=judge(found), errors=None)
     names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed_effects()}
     if repeats or seen.judgement.verdict != "explained" or names <= set(CONSTANTS):
@@ -108,10 +105,7 @@ def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
         gain = held_out_gain(seen.context.whole, found.plain, seen.context.with_test_score(found.steps[place]))
         if gain is not None and gain.gain > 0:
             demoted.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, ONLY_BESIDE_CALIBRATION))
-        if len(found.steps) > 1:
-            found = without_effect(seen.context, found, place)
-        else:
-            found = replace(found, after=found.retuned, steps=())
+        found = without_effect(seen.context, found, place)
     if not doubtful:
         return seen
     kept = tuple(sorted(demoted, key=lambda each: -each.gain))

@@ -16,7 +16,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 CONSTANT = "constant_force"
-_SIGNAL = re.compile(r"\b[xf]\b")
+_COMMAND = re.compile(r"\bf\b")
 
 
 def can_be_played(own: int, judged: JudgedLaw) -> bool:
@@ -69,8 +69,8 @@ def hypothesis_of_judged(axis: int, judged: JudgedLaw, recording: Recording) -> 
         from equalizer.laws.law import Law
 
         name = axis_names(recording.command.channels)[axis]
-        text = _SIGNAL.sub(lambda found: name if found[0] == "x" else f"f{name}", judged.formula.text)
-        return hypothesis_of_law(Law(text, judged.formula.numbers, (), judged.formula.acts_on, name), axis, recording)
+        text = _COMMAND.sub(f"f{name}", judged.formula.text)
+        return hypothesis_of_law(Law(text, judged.formula.numbers, (), "command", name), axis, recording)
     effect = EFFECTS[judged.law.effect]
     return hypothesis_of_claim(
         Claim(effect, "one", (axis,)), [{p.name: judged.values[p.name] for p in effect.parameters}]

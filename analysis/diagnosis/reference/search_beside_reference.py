@@ -54,10 +54,7 @@ def _unname_what_was_there(seen: SearchResult, learned: LearnedError) -> SearchR
         if not learned.references.hold(whole, place):
             continue
         before.append(Unconfirmed(whole, 0.0, THERE_BEFORE, place))
-        if len(found.steps) > 1:
-            found = without_effect(seen.context, found, place)
-        else:
-            found = replace(found, after=found.retuned, steps=())
+        found = without_effect(seen.context, found, place)
     if not before:
         return seen
     judged = _judge_with_floor(seen.context.whole, found, bool(found.steps), learned.floor.beyond)

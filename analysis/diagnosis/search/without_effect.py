@@ -11,7 +11,9 @@ from analysis.diagnosis.search.search_context import FittedCandidate, SearchCont
 
 def without_effect(context: SearchContext, found: Explanation, number: int) -> Explanation:
     """The explanation without one effect; those after it are refitted. number: of the effect, in the order in which
-    they were found. There must be another."""
+    they were found; without the only one, the re-tuned model is left."""
+    if len(found.steps) == 1:
+        return replace(found, after=found.retuned, steps=())
     earlier, later = found.steps[:number], list(found.steps[number + 1 :])
     if not later:
         return replace(found, after=context.with_test_score(earlier[-1]), rounds=found.rounds[:number], steps=earlier)
