@@ -10,6 +10,7 @@ from analysis.psychophysics.anova import OneWayAnova, one_way_anova
 from analysis.psychophysics.catch_trials import CatchTally, catch_tallies
 from analysis.psychophysics.comparisons import Comparisons, compare_all
 from analysis.psychophysics.cues.cue_findings import CueFinding, cue_findings, cue_warnings
+from analysis.psychophysics.cues.delivered_cues import CueGap, cue_gaps
 from analysis.psychophysics.detection import detection_thresholds
 from analysis.psychophysics.equalized_delivery import deliveries, delivery_warning
 from analysis.psychophysics.group_contrasts import Contrast, contrasts
@@ -110,6 +111,7 @@ class StudyAnalysis(Summarised):
     catches: tuple[CatchTally, ...]
     practice: tuple[PracticeRun, ...]
     cues: tuple[CueFinding, ...]
+    cue_gaps: tuple[CueGap, ...]
     """What else than the direction differed as delivered, and whether answers followed it."""
 
     def summary(self) -> Summary:
@@ -141,11 +143,10 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
     table = threshold_table(rows, protocol.stimulus.frequencies_hz)
     detection, catches = detection_thresholds(trials, protocol), catch_tallies(trials)
     detection_table = threshold_table(detection, protocol.detection.frequencies_hz)
-    anova = one_way_anova(table.groups())
-    within = repeated_measures(table.subjects, table.values)
+    anova, within = one_way_anova(table.groups()), repeated_measures(table.subjects, table.values)
     comparisons = compare_all(anova, CONFIDENCE)
     primary = primary_analysis(count_answers(tested, table.frequencies_hz), rule.cap_n)
-    means, cues = _mean_contrasts(rows, protocol), cue_findings(tested)
+    means, cues, gaps = _mean_contrasts(rows, protocol), cue_findings(tested), cue_gaps(tested)
     return StudyAnalysis(
         protocol=protocol,
         population=population,
@@ -164,7 +165,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
         compared=comparison_text(primary, means, comparisons, table, rule),
         warnings=(
             *study_warnings(tested, rows, table, protocol),
-            *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested)), *cue_warnings(cues)]),
+            *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested)), *cue_warnings(cues, gaps)]),
             *side_warnings(catches, detection, table, detection_table),
         ),
         detection=detection,
@@ -172,6 +173,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
         catches=catches,
         practice=practice_runs(trials, protocol),
         cues=cues,
+        cue_gaps=gaps,
     )
 
 
@@ -215,6 +217,7 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "declared": asdict(analysis.protocol.analysis),
         "compared": analysis.compared,
         "cues": [asdict(cue) for cue in analysis.cues],
+        "cue_gaps": [asdict(gap) for gap in analysis.cue_gaps],
         "warnings": list(analysis.warnings),
     }
 

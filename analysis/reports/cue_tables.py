@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from analysis.psychophysics.cues.answers_on_delivery import RELYING, AnswersOnDelivery
 from analysis.psychophysics.cues.cue_ability import INTERNAL_NOISE_DB, USUAL_NOISE_DB
-from analysis.psychophysics.cues.cue_findings import CueFinding, cue_warnings
-from analysis.psychophysics.cues.delivered_cues import Cue
+from analysis.psychophysics.cues.cue_findings import CueFinding, cue_warnings, gap_text
+from analysis.psychophysics.cues.delivered_cues import CueGap
 from analysis.reports.page import Section, Table
 from analysis.wording import NONE, conjoin, number, p_value, signed_number
 
@@ -16,22 +16,20 @@ _MEANING = (
 )
 
 
-def cue_section(found: Sequence[CueFinding]) -> list[Section]:
+def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap]) -> list[Section]:
     """Empty where no trial was measured."""
     if not found:
         return []
-    said = cue_warnings(found) or (_nothing(found),)
+    said = (*(cue_warnings(found) or (_nothing(found),)), *filter(None, [gap_text(gaps)]))
     tables = (_ability_table(found), _answer_table(found))
     return [Section("Was direction the cue?", paragraphs=(_MEANING, *said), tables=tables)]
 
 
 def _nothing(found: Sequence[CueFinding]) -> str:
-    missing = [cue.value for cue in Cue if all(each.cue is not cue for each in found)]
     blind = [f"{each.cue.value} at {each.frequency_hz:g} Hz" for each in found if not each.answers.tells]
     return (
         "No difference that was measured is one that a usual judge notices, and no answers are shown to follow what "
         "was delivered."
-        + (f" Not measured: {conjoin(missing)}." if missing else "")
         + (
             f" Too little varied within a direction to tell whether answers would have followed: {conjoin(blind)}. "
             "A roved level (rove_db of [stimulus]) would tell for intensity."

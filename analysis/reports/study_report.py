@@ -55,7 +55,7 @@ def render_study_report(
         *_results(analysis, by_name),
         *_side_sections(analysis),
         *_delivery(analysis, by_name),
-        *cue_section(analysis.cues),
+        *cue_section(analysis.cues, analysis.cue_gaps),
         *_ellipsoids(ellipsoids, by_name),
         *_runs(analysis, pictures),
         Section("Methods", paragraphs=methods_text(analysis.protocol)),

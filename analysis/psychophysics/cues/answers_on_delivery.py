@@ -101,10 +101,10 @@ def _strength(trials: DeliveredTrials, strength_db: FloatArray | None, known: ND
 
 
 def _residuals(trials: DeliveredTrials, values_db: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """(n,), and where they are known: not for a participant with too few trials."""
+    """(n,), and where they are known: not for a trial without the value, nor a participant with too few of them."""
     residual, known = np.zeros(len(values_db)), np.zeros(len(values_db), dtype=np.bool_)
     for number in range(len(trials.subjects)):
-        mine = trials.person == number
+        mine = (trials.person == number) & np.isfinite(values_db)
         fit = same_level_difference(values_db[mine], trials.nominal_db[mine], trials.side[mine])
         if fit is not None:
             residual[mine], known[mine] = fit.residual_db, True

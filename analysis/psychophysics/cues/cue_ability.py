@@ -58,11 +58,12 @@ class CueAbility:
 
 
 def cue_abilities(trials: DeliveredTrials) -> tuple[CueAbility, ...]:
-    """By cue and participant; participants with too few trials for a spread are left out."""
+    """By cue and participant, over the trials measured for the cue; participants with too few of them for a spread are
+    left out."""
     found = []
     for cue, values_db in trials.values_db.items():
         for number, subject in enumerate(trials.subjects):
-            mine = trials.person == number
+            mine = (trials.person == number) & np.isfinite(values_db)
             fit = same_level_difference(values_db[mine], trials.nominal_db[mine], trials.side[mine])
             if fit is None:
                 continue

@@ -12,7 +12,7 @@ from analysis.psychophysics.cues.cue_ability import (
     CueAbility,
     cue_abilities,
 )
-from analysis.psychophysics.cues.delivered_cues import Cue, DeliveredTrials, delivered_trials
+from analysis.psychophysics.cues.delivered_cues import Cue, CueGap, DeliveredTrials, delivered_trials
 from analysis.psychophysics.group_contrasts import holm_correction
 from analysis.wording import conjoin, number, p_text, signed_number
 from protocols.trial import Trial
@@ -95,8 +95,9 @@ def _observed_d_prime(group: DeliveredTrials) -> float | None:
     return fmean(found) if found else None
 
 
-def cue_warnings(found: Sequence[CueFinding]) -> tuple[str, ...]:
-    """What must be known before the thresholds are read; empty where nothing stands out."""
+def cue_warnings(found: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tuple[str, ...]:
+    """What must be known before the thresholds are read; empty where nothing stands out. Of the gaps only those of
+    some trials: that a study measured no harmonics at all does not stand out."""
     noticed = [_noticed_text(each) for each in found if each.noticed_by]
     followed = [
         f"{each.cue.value} at {each.frequency_hz:g} Hz ({signed_number(each.answers.slope or 0.0)} logits per dB, "
@@ -115,7 +116,24 @@ def cue_warnings(found: Sequence[CueFinding]) -> tuple[str, ...]:
             f"Within a direction, answers followed what was delivered, so direction was not the only cue: "
             f"{conjoin(followed)}."
         )
+    if said := gap_text([gap for gap in gaps if gap.missing < gap.trials]):
+        sentences.append(said)
     return tuple(sentences)
+
+
+def gap_text(gaps: Sequence[CueGap]) -> str:
+    """Which trials tell nothing of a cue; empty where none is missing."""
+    if not gaps:
+        return ""
+    parts = [
+        f"{each.cue.value} at {each.frequency_hz:g} Hz in "
+        + ("any trial" if each.missing == each.trials else f"{each.missing} of {each.trials} trials")
+        for each in gaps
+    ]
+    return (
+        f"Whether direction was the cue is judged by the trials measured for it. Not measured: {conjoin(parts)}. "
+        "All other analyses take these trials, too."
+    )
 
 
 def _noticed_text(finding: CueFinding) -> str:

@@ -41,7 +41,17 @@ class DeliveredTrials:
     nominal_db: FloatArray
     """Level of the staircase, re 1 N."""
     values_db: dict[Cue, FloatArray]
-    """Cues that every trial was measured for."""
+    """NaN where a trial was not measured for the cue; without cues that no trial was measured for."""
+
+
+@dataclass(frozen=True, slots=True)
+class CueGap:
+    """Trials at one frequency that tell nothing of one cue, among those with a measured amplitude."""
+
+    frequency_hz: float
+    cue: Cue
+    missing: int
+    trials: int
 
 
 def delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
@@ -62,10 +72,23 @@ def delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
                 side=signs * np.array([3.0 - 2.0 * trial.direction_shown for trial in rows]),
                 answer=signs * np.array([3.0 - 2.0 * (trial.answer or 0) for trial in rows]),
                 nominal_db=_db([trial.staircase_n for trial in rows]),
-                values_db={cue: _db(values) for cue, value in _VALUES.items() if (values := _all_known(rows, value))},
+                values_db={cue: _db(values) for cue, value in _VALUES.items() if (values := _known(rows, value))},
             )
         )
     return tuple(found)
+
+
+def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
+    """By frequency and cue, only where something is missing."""
+    gaps = []
+    for group in delivered_trials(trials):
+        n = len(group.person)
+        for cue in Cue:
+            values_db = group.values_db.get(cue)
+            missing = n if values_db is None else int(np.isnan(values_db).sum())
+            if missing:
+                gaps.append(CueGap(group.frequency_hz, cue, missing, n))
+    return tuple(gaps)
 
 
 def _turned_people(trials: list[Trial]) -> frozenset[str]:
@@ -77,10 +100,11 @@ def _turned_people(trials: list[Trial]) -> frozenset[str]:
     return frozenset(name for name, known in angles.items() if len(known) == 2 and known[1] > known[2])
 
 
-def _all_known(rows: list[Trial], value: Callable[[Trial], float | None]) -> list[float]:
-    """Empty where one is missing or none is positive: a cue that only some trials tell would compare other trials."""
+def _known(rows: list[Trial], value: Callable[[Trial], float | None]) -> list[float]:
+    """NaN where a trial has no value; empty where none has."""
     values = [value(trial) for trial in rows]
-    return [each for each in values if each is not None] if all(each is not None for each in values) else []
+    known = any(each is not None for each in values)
+    return [math.nan if each is None else each for each in values] if known else []
 
 
 def _intensity(trial: Trial) -> float | None:

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.psychophysics.cues.cue_ability import INTERNAL_NOISE_DB
 from analysis.psychophysics.cues.cue_findings import cue_findings, cue_warnings
-from analysis.psychophysics.cues.delivered_cues import Cue
+from analysis.psychophysics.cues.delivered_cues import Cue, cue_gaps
 from analysis.psychophysics.study_analysis import analyse_study, anova_document
 from analysis.reports.study_report import render_study_report
 
@@ -88,6 +88,35 @@ def test_swapped_labels_do_not_cancel_a_difference_of_the_device(simulate_study)
 
 def test_without_measurements_nothing_is_said(simulate_study):
     assert cue_findings([replace(trial, delivered_mps2=None) for trial in simulate_study(2, ABLE_N, 1)]) == ()
+
+
+def test_trials_without_harmonics_are_counted_and_the_others_are_judged(simulate_study, protocol):
+    whole = delivered(simulate_study(4, ABLE_N, 1), 3.0, Cue.SPECTRUM, seed=6)
+    at_25 = [number for number, trial in enumerate(whole) if trial.frequency_hz == 25.0]
+    some = list(whole)
+    for number in at_25[::20]:
+        some[number] = replace(some[number], harmonics_mps2=None)
+    for number, trial in enumerate(some):
+        if trial.frequency_hz == 45.0:
+            some[number] = replace(trial, off_axis_mps2=None)
+    gaps = {(gap.frequency_hz, gap.cue): (gap.missing, gap.trials) for gap in cue_gaps(some)}
+    lost, slow = len(at_25[::20]), sum(trial.frequency_hz == 45.0 for trial in some)
+    assert gaps == {(25.0, Cue.SPECTRUM): (lost, len(at_25)), (45.0, Cue.COUPLING): (slow, slow)}
+    analysis = analyse_study(some, protocol)
+    (named,) = (each for each in analysis.cues if each.noticed_by)
+    assert (named.cue, named.frequency_hz, len(named.noticed_by)) == (Cue.SPECTRUM, 25.0, 4)
+    assert sum(each.trials for each in named.people) == named.answers.trials == len(at_25) - lost
+    other = {(each.frequency_hz, each.cue): each for each in cue_findings(whole)}
+    for each in analysis.cues:  # nothing else changes but Holm's correction, which has a test less
+        if each is not named:
+            assert replace(each, p_holm=None) == replace(other[each.frequency_hz, each.cue], p_holm=None)
+    said = f"spectrum at 25 Hz in {lost} of {len(at_25)} trials"
+    assert [said in warning and "45 Hz" not in warning for warning in analysis.warnings].count(True) == 1
+    page = render_study_report(analysis, (), {}, "today")
+    assert page.count(said) == 2 and f"{said} and coupling at 45 Hz in any trial" in page
+    assert {"frequency_hz": 25.0, "cue": "spectrum", "missing": lost, "trials": len(at_25)} in anova_document(analysis)[
+        "cue_gaps"
+    ]
 
 
 def test_the_report_and_the_document_name_the_planted_mismatch(simulate_study, protocol):
