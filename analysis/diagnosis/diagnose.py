@@ -181,5 +181,7 @@ def _assemble(
     linear = linear_remarks(balances, channels) if settings.fitted else ()
     remarks = tuple(dict.fromkeys((*early, *look.chosen.remarks, *result.remarks, *linear, *whole.remarks)))
     reached = balance_errors(diagnosis, balances, channels)
-    found_here = replace(whole, diagnosis=diagnosis, remarks=remarks, fitted=settings.fitted)
+    named = {effect.effect for effect in diagnosis.effects}
+    curves = tuple(curve for curve in whole.signatures if curve.effect in named)
+    found_here = replace(whole, diagnosis=diagnosis, remarks=remarks, fitted=settings.fitted, signatures=curves)
     return replace(found_here, reached=reached, state_maps=maps)

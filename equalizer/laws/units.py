@@ -73,26 +73,29 @@ class _Reader:
         self.signals = signals
         self.found: dict[int, Dimension] = {}
 
-    def dimension_of(self, node: Node) -> Dimension | None:
+    def dimension_of(self, node: Node, literal: Dimension | None = NONE) -> Dimension | None:
+        """literal: dimension of a number that the formula states; None = unknown, as of one with a unit of its own."""
         match node:
             case Number() | Variable("pi"):
-                return NONE
+                return literal
             case Free(place):
                 return self.found.get(place)
             case Variable(name):
                 return self.signals.get(name)
             case Apply("+" | "-" | "minimum" | "maximum" | "neg" | "abs", parts):
-                return next((known for part in parts if (known := self.dimension_of(part)) is not None), None)
+                return next((known for part in parts if (known := self.dimension_of(part, literal)) is not None), None)
             case Apply("lag" | "play" | "delay", (signal, _)):
-                return self.dimension_of(signal)
+                return self.dimension_of(signal, literal)
             case Apply("*" | "/" as name, (left, right)):
-                return _add_dimensions(self.dimension_of(left), self.dimension_of(right), 1.0 if name == "*" else -1.0)
+                return _add_dimensions(
+                    self.dimension_of(left, literal), self.dimension_of(right, literal), 1.0 if name == "*" else -1.0
+                )
             case Apply("**", (base, exponent)):
-                return _scale_dimension(self.dimension_of(base), self._value(exponent))
+                return _scale_dimension(self.dimension_of(base, literal), self._value(exponent))
             case Apply("sqrt", (inner,)):
-                return _scale_dimension(self.dimension_of(inner), 0.5)
+                return _scale_dimension(self.dimension_of(inner, literal), 0.5)
             case Apply("integral", (inner,)):
-                return _add_dimensions(self.dimension_of(inner), SECOND)
+                return _add_dimensions(self.dimension_of(inner, literal), SECOND)
         return NONE
 
     def _value(self, node: Node) -> float | None:
@@ -112,8 +115,10 @@ class _Reader:
                 if wanted is not None:
                     self.found.setdefault(place, wanted)
             case Apply("+" | "-" | "minimum" | "maximum" | "neg" | "abs", parts):
+                # A signal tells more than what is wanted: the number by which a sum is multiplied may have a unit.
+                common = self.dimension_of(node, None) or wanted or self.dimension_of(node)
                 for part in parts:
-                    self.assign(part, self.dimension_of(node) if wanted is None else wanted)
+                    self.assign(part, common)
             case Apply("*" | "/" as name, (left, right)):
                 sign = 1.0 if name == "*" else -1.0
                 self.assign(left, _add_dimensions(wanted, self.dimension_of(right), -sign))

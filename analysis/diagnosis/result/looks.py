@@ -70,16 +70,19 @@ def _black_box(context: SearchContext, found: Explanation) -> BlackBox | None:
 def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, ...]:
     """Each named effect's, against the final model without it alone."""
     measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
+    if not fitted.hypothesis.claims:
+        return ()
     recording = measure.records[0].recording
     said, drawn = labels_of(recording, tuning.model), []
     names = Names(
         tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.system
     )
+    complete = gather_evidence(measure, tuning, fitted)[0].predicted
     for number in range(len(fitted.hypothesis.claims)):
         others = without_claim(fitted.hypothesis, number)
         bare = gather_evidence(measure, tuning, evaluate_fit(measure, tuning, fitted.deviations, others))
         main = max(fitted.hypothesis.of_claim(number), key=lambda placed: _strength(placed.values))
-        drawn.append(signature_of(bare[0], main, others.placed_effects(), names, recording.hold))
+        drawn.append(signature_of(bare[0], complete, main, names, recording.hold))
     return tuple(drawn)
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from equalizer.effects.discovered_law import Channels, law_units
-from equalizer.laws.law import law_of
+from equalizer.laws.law import Law, law_of
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 
 
@@ -19,6 +19,7 @@ from equalizer.signals.unit_system import LINEAR, ROTATIONAL
         ("0.1*fx*(1 + 0.2*tanh(vy/0.05))", ("1", "1", "m/s")),
         ("0.3/(x + 0.02)", ("N m", "m")),
         ("0.3*0.2*x", ("?", "?")),
+        ("0.01*maximum(x - 0.02, 0)**1.5", ("N/m^1.5", "m", "1")),
     ],
 )
 def test_units_of_a_force(text: str, units: tuple[str, ...]):
@@ -30,3 +31,8 @@ def test_units_of_a_torque_and_of_a_response():
         "N m s^2/rad^2",
     )
     assert law_units(law_of("ax + 0.2*ax**3", "response", "x"), Channels(), LINEAR) == ("s^4/m^2",)
+
+
+def test_a_sum_with_a_signal_tells_units_where_its_factor_is_part_of_the_form():
+    threshold = Law("0.93*sign(fx)*maximum(abs(fx) - p0, 0)**p1", (0.1, 0.4), (), "command", "x")
+    assert law_units(threshold, Channels(), LINEAR) == ("N", "1")

@@ -2,7 +2,7 @@
 where no variable alone does, against the law's own value."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,11 +32,15 @@ class _Variable:
 def law_signature(
     evidence: Evidence, placed: PlacedEffect, axes: tuple[str, ...], system: UnitSystem
 ) -> Signature | None:
-    """The curve of a discovered law along the measured motion; None where it does not act on the force, or asks for a
-    signal that is neither time nor an axis's motion or command. axes: name of each driven axis."""
-    if placed.effect.law is None or placed.effect.law.acts_on != "force":
+    """The curve of a discovered law along the measured motion; of a law of the command, by what it changes there. None
+    where it acts on a response, or asks for a signal that is neither time nor an axis's motion or command. axes: name
+    of each driven axis."""
+    if placed.effect.law is None or placed.effect.law.acts_on == "response":
         return None
     law = law_with_values(placed.effect.law, placed.values)
+    if law.acts_on == "command":
+        command = COMMAND + axis_names(axes)[placed.sites[0]]
+        law = replace(law, expression=f"({law.expression}) - {command}", acts_on="force", units=())
     variables = _variables(evidence, axes, system)
     if not law.variables or not set(law.variables) <= variables.keys():
         return None

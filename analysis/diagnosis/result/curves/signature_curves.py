@@ -1,7 +1,7 @@
 """Signature curve of a named effect: what is missing without it against the variable that it depends on, and the fitted
 law, simulated and averaged over the same kind of bins."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -66,10 +66,9 @@ class Names:
     system: UnitSystem = LINEAR
 
 
-def signature_of(
-    evidence: Evidence, placed: PlacedEffect, others: Sequence[PlacedEffect], names: Names, hold: Hold
-) -> Signature:
-    """The curve of one effect. evidence: of the final model with all its effects but this one; others: those."""
+def signature_of(evidence: Evidence, complete: FloatArray, placed: PlacedEffect, names: Names, hold: Hold) -> Signature:
+    """The curve of one effect. evidence: of the final model with all its effects but this one; complete: (n, p),
+    prediction of the final model with all its effects."""
     law = law_signature(evidence, placed, names.axes, names.system)
     if law is not None:
         return law
@@ -83,7 +82,7 @@ def signature_of(
         if along == "reading":
             return _of_reading(evidence, placed, changed - evidence.predicted, names)
         return _of_time(evidence, placed, changed - evidence.predicted, names, along)
-    return _of_frequency(evidence, placed, others, names, hold)
+    return _of_frequency(evidence, complete - evidence.predicted, placed, names)
 
 
 def _of_motion(evidence: Evidence, placed: PlacedEffect, along: Along, names: Names, hold: Hold) -> Signature:
@@ -171,15 +170,9 @@ def _of_time(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names
     return Signature(placed.effect.name, names.channels[here], "time (s)", what, at, mean, spread, law_at, law)
 
 
-def _of_frequency(
-    evidence: Evidence, placed: PlacedEffect, others: Sequence[PlacedEffect], names: Names, hold: Hold
-) -> Signature:
+def _of_frequency(evidence: Evidence, change: FloatArray, placed: PlacedEffect, names: Names) -> Signature:
     rate_hz, used = evidence.sample_rate_hz, evidence.used > 0
-    whole, without = (
-        simulate_mechanism(evidence.model, evidence.command, rate_hz, effects, hold).response
-        for effects in ((*others, placed), tuple(others))
-    )
-    change, errors = whole - without, evidence.response - evidence.predicted
+    errors = evidence.response - evidence.predicted
     here = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
     frequency_hz, measured, spread = _spectrum(errors[used, here], rate_hz)
     _, law, _ = _spectrum(change[used, here], rate_hz)

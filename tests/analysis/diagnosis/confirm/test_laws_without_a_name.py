@@ -29,14 +29,16 @@ def valve(u):
     return np.sign(u) * np.maximum(np.abs(u) - 0.1, 0.0) ** 0.4
 
 
-def laws_named(shot):
-    return {effect.effect: effect for effect in diagnose_values([shot]).diagnosis.effects}
+def effects_by_name(found):
+    return {effect.effect: effect for effect in found.diagnosis.effects}
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
 def test_the_curve_of_a_valve_is_named_with_its_formula(seed):
-    named = laws_named(driven(valve, seed))
+    found = diagnose_values([driven(valve, seed)])
+    named = effects_by_name(found)
     assert set(named) == {"discovered_law"}
+    assert [(curve.effect, curve.along) for curve in found.signatures] == [("discovered_law", "command of x (N)")]
     law = named["discovered_law"].law
     assert (law.acts_on, law.variables) == ("command", ("fx",))
     width, power = law_of(law.expression, "command", "x").numbers[1:]
@@ -45,4 +47,4 @@ def test_the_curve_of_a_valve_is_named_with_its_formula(seed):
 
 
 def test_a_drive_in_order_has_no_curve():
-    assert "discovered_law" not in laws_named(driven(lambda u: u, 1))
+    assert "discovered_law" not in effects_by_name(diagnose_values([driven(lambda u: u, 1)]))

@@ -77,6 +77,13 @@ def test_an_axis_with_a_name_of_its_own_is_called_by_it(curve):
     assert curve("-2e7*x**3", axes=("motor",)).along == "position of motor (m)"
 
 
+def test_a_law_of_the_command_is_drawn_by_what_it_changes(curve):
+    found = curve("fx - 0.3*tanh(0.8*fx)", acts_on="command")
+    assert (found.along, found.of) == ("command of x (N)", "missing force (N)")
+    assert distance(found) < 0.2
+    assert np.allclose(found.law, -0.3 * np.tanh(0.8 * found.law_at))
+
+
 def test_a_law_of_a_response_has_no_curve_of_forces(curve):
     assert curve("1.1*ax", acts_on="response", axis="ax") is None
 

@@ -10,6 +10,7 @@ from analysis.diagnosis.result.curves.signature_bins import bin_law_means
 from analysis.diagnosis.result.curves.signature_curves import Names, signature_of
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
+from equalizer.effects.simulation.simulator import simulate_response
 from equalizer.signals.recording import Hold
 
 BY_NAME = {effect.name: effect for effect in CATALOGUE}
@@ -27,7 +28,10 @@ def signature(diagnosed):
         measure, tuning = FreeSimulation((seen,), noise, noise), tuning_of(model, recording.command.channels)
         without = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
         names = Names(tuple("xyz"[:axes]), recording.response.channels, "m/s^2")
-        return signature_of(gather_evidence(measure, tuning, without)[0], placed, (), names, Hold.ZERO_ORDER)
+        complete = simulate_response(
+            model, recording.command.samples, recording.sample_rate_hz, (placed,), recording.hold
+        ).response
+        return signature_of(gather_evidence(measure, tuning, without)[0], complete, placed, names, Hold.ZERO_ORDER)
 
     return of
 
