@@ -1,5 +1,7 @@
-"""`hapteq stream`: a running session's facts as markers for the lab streaming layer."""
+"""`hapteq stream`: a running session's facts, forces and motion for the lab streaming layer."""
 
+import contextlib
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -12,13 +14,25 @@ def stream(
     session: Annotated[str, typer.Argument(help="Session folder, or its name in the data folder.")],
     data: DataOption = Path("data"),
 ) -> None:
-    """Follow a running session from a second terminal and send each of its facts as an LSL marker, until it is
-    finished or Ctrl-C. Needs pip install '.[lsl]'."""
+    """Follow a running session from a second terminal and send each of its facts as an LSL marker, with force,
+    acceleration and motion of each tick beside, until it is finished or Ctrl-C. Needs pip install '.[lsl]'."""
+    from study.errors import StudyError
+    from study.session.watching.requests import NoteAsked
     from study.store.sessions.archive import find_session
-    from study.workflows.views.stream_session import MarkerOutlet, stream_session
+    from study.store.sessions.request_inbox import RequestInbox
+    from study.workflows.views.lsl_outlets import MarkerOutlet
+    from study.workflows.views.stream_session import Beside, stream_session
+    from study.workflows.views.stream_signals import SignalStreams
 
     folder = find_session(session, data)
-    outlet = MarkerOutlet(folder.log)
-    typer.echo(f"Streaming markers of {folder.name}; Ctrl-C ends it, and not the session.", err=True)
-    sent = stream_session(folder.log, outlet, on_marker=typer.echo)
-    typer.echo(f"{sent} markers; the session is finished.", err=True)
+    outlet, inbox = MarkerOutlet(folder.log), RequestInbox(folder.path)
+    signals = SignalStreams(folder.path, outlet.signal_outlet)
+
+    def note(offset_s: float) -> None:
+        text = f"LSL's clock was {offset_s:.6f} s ahead of the session's when that said {time.monotonic():.3f} s."
+        with contextlib.suppress(StudyError):  # the markers say it too
+            inbox.send(NoteAsked("program", text))
+
+    typer.echo(f"Streaming {folder.name}; Ctrl-C ends it, and not the session.", err=True)
+    sent = stream_session(folder.log, outlet, on_marker=typer.echo, beside=Beside(note, signals.push))
+    typer.echo(f"{sent} markers and {signals.sent} ticks; the session is finished.", err=True)

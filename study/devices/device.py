@@ -122,6 +122,12 @@ class Device(Protocol):
     @property
     def info(self) -> DeviceInfo: ...
 
+    @property
+    def telemetry(self) -> str:
+        """Path of the ring into which its loop writes every tick (`study.devices.telemetry`); empty if there is none,
+        as in virtual time."""
+        ...
+
     def hold(self, stimulus: HeldStimulus) -> None:
         """Fade in and repeat until `release`. Returns at once.
 

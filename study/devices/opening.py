@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from study.devices.admission import HAND_STIMULUS_CAP_N as HAND_STIMULUS_CAP_N
 from study.devices.clock import Clock
@@ -17,6 +17,9 @@ from study.devices.device import Device, DeviceInfo, DeviceSettings
 from study.devices.force_dimension.models import MODELS
 from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
+
+if TYPE_CHECKING:
+    from study.devices.telemetry import TelemetryReader
 
 SIMULATED = "simulated"
 
@@ -44,9 +47,12 @@ def needs_real_time(name: str) -> bool:
     return name not in SIMULATIONS and not name.startswith(REPLAY)
 
 
-def open_device(name: str, settings: DeviceSettings, clock: Clock, seed: int, *, own_process: bool = True) -> Device:
+def open_device(
+    name: str, settings: DeviceSettings, clock: Clock, seed: int, *, own_process: bool = True, telemetry: str = ""
+) -> Device:
     """`seed` drives what is random in a simulated device. own_process: a real device's loop in a process of its own,
-    the only one that holds it; False is for that process, and for tests. Raises `DeviceError`."""
+    the only one that holds it; False is for that process, and for tests. telemetry: path of the
+    caller's ring for it. Raises `DeviceError`."""
     if name not in SIMULATIONS and name not in REAL and not name.startswith(REPLAY):
         raise DeviceError(
             f"There is no device called {name!r}",
@@ -63,13 +69,25 @@ def open_device(name: str, settings: DeviceSettings, clock: Clock, seed: int, *,
         return open_remotely(name, settings, seed)
     from study.devices.rigs_by_name import rig_named
     from study.devices.safe import SafeDevice
+    from study.devices.telemetry import Ring
 
     rig = rig_named(name, settings, seed)
+    ring: Ring | None = None
     try:
-        return SafeDevice(rig, settings, clock)
+        ring = Ring(telemetry) if telemetry or (own_process and not clock.virtual) else None
+        return SafeDevice(rig, settings, clock, ring)
     except BaseException:
         rig.close()
+        if ring is not None:
+            ring.remove()
         raise
+
+
+def telemetry_of(path: str) -> "TelemetryReader":
+    """Reads what a running loop writes, from now on. Raises `StudyError` where it has ended or cannot be read."""
+    from study.devices.telemetry import TelemetryReader
+
+    return TelemetryReader(Path(path))
 
 
 def before_others() -> AbstractContextManager[object]:

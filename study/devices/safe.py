@@ -23,6 +23,7 @@ from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import VirtualDrive
 from study.devices.governor.governor import SETTLE_S, Governor
 from study.devices.rig import CompiledRig, Rig
+from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
@@ -38,14 +39,19 @@ PATIENCE_S = 1.0
 class SafeDevice:
     """Raises `DeviceError` from the start for settings that are not safe, and later as the port says."""
 
-    def __init__(self, rig: Rig | CompiledRig, settings: DeviceSettings, clock: Clock) -> None:
+    def __init__(
+        self, rig: Rig | CompiledRig, settings: DeviceSettings, clock: Clock, ring: Ring | None = None
+    ) -> None:
+        """ring: where each tick is told; removed at the end by the program that made it."""
         check_settings(settings, rig.info)
         if not isinstance(rig, CompiledRig):
             check_hardware(rig.drops_force_after_s, rig.info, settings)
         self._info = rig.info
         self._limits = settings.limits
         self._clock = clock
-        self._governor = Governor(rig.info, settings)
+        self._ring = ring
+        rows = ring.rows(rig.info.sample_rate_hz) if ring is not None else None
+        self._governor = Governor(rig.info, settings, rows)
         self._runner = self._runner_of(rig)
         self._drive = self._drive_of(clock)
         self._held: HeldStimulus | None = None
@@ -57,6 +63,10 @@ class SafeDevice:
     @property
     def info(self) -> DeviceInfo:
         return self._info
+
+    @property
+    def telemetry(self) -> str:
+        return self._ring.path if self._ring is not None else ""
 
     def hold(self, stimulus: HeldStimulus) -> None:
         self._must_be_idle()
@@ -119,6 +129,8 @@ class SafeDevice:
                 self._drive.close()
             finally:
                 self._runner.disconnect()
+                if self._ring is not None:
+                    self._ring.remove()
         # Last, so that a close that was interrupted is made good for when the program ends.
         self._closed = True
         atexit.unregister(self._close_at_exit)

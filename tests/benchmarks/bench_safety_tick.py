@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from study.devices.clock import VirtualClock
-from study.devices.drive.runner import run_block
+from study.devices.drive.runner import PUBLISHED, run_block
 from study.devices.governor import govern
 from study.devices.governor.governor import Governor
 from study.devices.opening import open_device
@@ -44,13 +44,19 @@ def ns_per_tick(rig: CompiledRig, tick) -> float:
     limits = replace(rigs.LIMITS, longest_hold_s=600.0, watchdog_s=5.0)
     governor = Governor(rig.info, replace(rigs.SETTINGS, limits=limits))
     governor.begin_hold(rigs.sine(2.0))
-    arrays = (governor.state, governor.settings, governor.loop, governor.buffer, governor.force)
+    arrays = (governor.state, governor.settings, governor.loop, governor.buffer, governor.force, governor.ring)
 
     def run() -> None:
         governor.state[govern.TICK] = governor.state[govern.LAST_SIGN] = 0.0
         governor.settings[govern.WATCHDOG_TICKS] = np.inf
         run_block(
-            rig.sense, tick, rig.advance, (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE)), arrays, TICKS
+            rig.sense,
+            tick,
+            rig.advance,
+            PUBLISHED,
+            (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE)),
+            arrays,
+            TICKS,
         )
 
     return best_of(7, run) / TICKS * 1e9

@@ -121,6 +121,7 @@ class RealtimeDrive:
             self._last_s = math.inf  # a long preparation is no late tick
             begin()
             self._started_s = self._last_s = self._clock.now_s()
+            self._governor.note_begin(self._started_s)
             self._run = 0
             self._awake.set()
             return True

@@ -14,16 +14,17 @@ from numba.experimental.function_type import _get_wrapper_address
 from study.devices.device import Fault
 from study.devices.drive.seen import Seen
 from study.devices.governor import cells
-from study.devices.governor.govern import ROWS, TICK_SIGNATURE, VECTOR, tick
+from study.devices.governor.govern import PUBLISH_SIGNATURE, ROWS, TICK_SIGNATURE, VECTOR, publish, tick
 from study.devices.governor.governor import Governor
 from study.devices.rig import READING_SIZE, CompiledRig
 
 _NOISE = types.uint64[::1]
 _SENSE = types.FunctionType(types.void(VECTOR, VECTOR, _NOISE, VECTOR))
 _TICK = types.FunctionType(TICK_SIGNATURE)
+_PUBLISH = types.FunctionType(PUBLISH_SIGNATURE)
 _ADVANCE = types.FunctionType(types.void(VECTOR, VECTOR, VECTOR))
 _RIG = types.Tuple((VECTOR, VECTOR, _NOISE, VECTOR))  # type: ignore[no-untyped-call]
-_GOVERNOR = types.Tuple((VECTOR, VECTOR, ROWS, ROWS, VECTOR))  # type: ignore[no-untyped-call]
+_GOVERNOR = types.Tuple((VECTOR, VECTOR, ROWS, ROWS, VECTOR, ROWS))  # type: ignore[no-untyped-call]
 
 
 class Part(types.WrapperAddressProtocol):
@@ -45,23 +46,31 @@ class Part(types.WrapperAddressProtocol):
 
 
 def parts(sense: Any, advance: Any) -> tuple[Part, Part, Part]:
-    """The three parts of a tick of one rig, in the order in which `run_block` takes them."""
+    """The three parts of a tick of one rig, as the three first arguments of `run_block`."""
     return Part(sense, _SENSE), Part(tick, _TICK), Part(advance, _ADVANCE)
 
 
-@njit(types.void(_SENSE, _TICK, _ADVANCE, _RIG, _GOVERNOR, types.int64), cache=True, nogil=True, error_model="numpy")
-def run_block(sense: Any, govern: Any, advance: Any, rig: Any, governor: Any, ticks: int) -> None:
+PUBLISHED = Part(publish, _PUBLISH)
+_BLOCK = types.void(_SENSE, _TICK, _ADVANCE, _PUBLISH, _RIG, _GOVERNOR, types.int64)
+
+
+@njit(_BLOCK, cache=True, nogil=True, error_model="numpy")
+def run_block(  # noqa: PLR0913 - compiled code takes function pointers one by one
+    sense: Any, govern: Any, advance: Any, publish: Any, rig: Any, governor: Any, ticks: int
+) -> None:
     """At most `ticks` ticks, fewer if all is over before.
 
     rig = (state, parameters, noise) of the CompiledRig and room for a reading; governor = (state, settings, loop,
-    buffer, force) of `study.devices.governor.govern.tick`; sense, govern, advance: `parts`.
+    buffer, force) of `study.devices.governor.govern.tick`, and the telemetry ring; sense, govern, advance: `parts`;
+    publish: `PUBLISHED`.
     """
     rig_state, parameters, noise, reading = rig
-    state, settings, loop, buffer, force = governor
+    state, settings, loop, buffer, force, ring = governor
     for _ in range(ticks):
         sense(rig_state, parameters, noise, reading)
         over = govern(state, settings, loop, buffer, reading, force)
         advance(rig_state, parameters, force)
+        publish(state, settings, ring, reading)
         if over:
             break
 
@@ -179,5 +188,5 @@ class CompiledRunner:
 
     def _run_block(self, ticks: int) -> None:
         governor = self._governor
-        arrays = (governor.state, governor.settings, governor.loop, governor.buffer, governor.force)
-        run_block(*self._parts, self._arrays, arrays, ticks)
+        arrays = (governor.state, governor.settings, governor.loop, governor.buffer, governor.force, governor.ring)
+        run_block(*self._parts, PUBLISHED, self._arrays, arrays, ticks)

@@ -150,6 +150,7 @@ class SteppedRunner:
         finally:
             self._writing = False
         self._deciding = False
+        govern.publish(governor.state, governor.settings, governor.ring, reading)
         if not over:
             self._seen = Seen(reading, self._rig.buttons())
         return bool(over)

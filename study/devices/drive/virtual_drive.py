@@ -24,6 +24,7 @@ class VirtualDrive:
             return False
         begin()
         self._started_s = self._clock.now_s()
+        self._governor.note_begin(self._started_s)
         self._run = 0
         return True
 

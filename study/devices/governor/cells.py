@@ -15,6 +15,8 @@ LET_GO_TICKS >= 1; VELOCITY_SHARE and ACCELERATION_SHARE: how far a low-pass goe
     STOP_ASKED, RELEASE_ASKED, LET_GO_ASKED, SIGN_OF_LIFE,
     # When the reading was taken, s, by a clock of the loop; 0 where the tick's number says it.
     STAMP_S,
+    # When the tick before START was due, s, by the same clock.
+    BEGAN_S,
     # What is played: written while nothing moves. In ticks; LENGTH is inf for a loop, LEAD rows of it are played once.
     START, FADE_IN, FADE_OUT, RAISED_COSINE, SPRING_RAMP, LENGTH, LEAD, LONGEST, RECORD_FROM,
     # How it goes.
@@ -31,7 +33,7 @@ LET_GO_TICKS >= 1; VELOCITY_SHARE and ACCELERATION_SHARE: how far a low-pass goe
     LAST_STEP, _SY, _SZ, CHANGED, _CY, _CZ, MOVING_FORCE, _MY, _MZ, EXPECTED, _DY, _DZ, EXPECTED_SPEED, _UY, _UZ,
     LEAST, _AY, _AZ, MOST, _BY, _BZ,
     STATE_SIZE,
-) = range(76)  # fmt: skip
+) = range(77)  # fmt: skip
 """Cells of `state`."""
 
 STILL, PLAYING, RELEASING, LETTING_GO = range(4)
@@ -43,3 +45,12 @@ NO_FAULT, NOT_A_NUMBER, STALLED, HELD_TOO_LONG, STOPPED, LOST, FORCE_LEFT, OUTSI
 
 ROW_SIZE = 15
 """A row of the recording: command, excitation, position, acceleration, true acceleration."""
+
+(
+    RING_INDEX, RING_TIME_S, RING_TICK, RING_POSITION, _PY, _PZ, RING_VELOCITY, _RV, _RW, RING_ACCELERATION, _RY, _RZ,
+    RING_COMMANDED, _KY, _KZ, RING_APPLIED, _QY, _QZ, RING_PHASE, RING_FAULT, RING_MISSED, RING_CHECK, RING_WIDTH,
+) = range(23)  # fmt: skip
+"""A row of the telemetry ring: one tick. RING_CHECK is the exclusive or of the bits of all other cells."""
+
+RING_COUNT, RING_RATE_HZ, RING_FORMAT = range(3)
+"""Cells of the ring's first row, its header: rows written so far, ticks per second, what the rows are."""

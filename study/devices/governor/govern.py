@@ -15,6 +15,7 @@ from study.devices.governor.compiling import fingerprint, part
 from study.devices.governor.confine import BEYOND, WITHIN, below, clear, confine, norm_of
 from study.devices.governor.feedback import add_feedback
 from study.devices.governor.plausibility import fault_of_reading
+from study.devices.governor.telemetry_row import write_row
 from study.devices.rig import SENSOR_CLIPPED
 
 # isort: off
@@ -38,6 +39,7 @@ LEAST_ELAPSED = 1e-3
 
 VECTOR, ROWS = types.float64[::1], types.float64[:, ::1]
 TICK_SIGNATURE = types.boolean(VECTOR, VECTOR, ROWS, ROWS, VECTOR, VECTOR)
+PUBLISH_SIGNATURE = types.void(VECTOR, VECTOR, ROWS, VECTOR)
 
 
 @part
@@ -179,6 +181,17 @@ def _record(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
         state[RECORDED] += 1
 
 
+def _publishing(sources: int) -> Any:
+    @njit(PUBLISH_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def publish(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
+        """After a tick and its force: one row into the telemetry ring, if it has room for any."""
+        _ = sources
+        if ring.shape[0] > 1:
+            write_row(state, settings, ring, reading)
+
+    return publish
+
+
 def _entry_points(sources: int) -> tuple[Any, Any]:
     @njit(types.void(VECTOR, ROWS, VECTOR), cache=True, nogil=True, error_model="numpy")
     def record(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
@@ -221,4 +234,6 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
     return tick, record
 
 
-tick, record = _entry_points(fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py"))
+_SOURCES = fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
+tick, record = _entry_points(_SOURCES)
+publish = _publishing(_SOURCES)

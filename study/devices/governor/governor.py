@@ -29,7 +29,8 @@ class Governor:
     The asking methods may be called from any thread at any time. `begin_*` and `rows` only while nothing moves.
     """
 
-    def __init__(self, info: DeviceInfo, settings: DeviceSettings) -> None:
+    def __init__(self, info: DeviceInfo, settings: DeviceSettings, ring: FloatArray | None = None) -> None:
+        """ring: of `study.devices.telemetry`, where each tick writes a row; None: nowhere."""
         self._rate_hz = info.sample_rate_hz
         self._longest_s = settings.limits.longest_hold_s
         self._keep_s = settings.keep_s
@@ -38,6 +39,7 @@ class Governor:
         self._late_ticks, self._latest_s = 0, 0.0
         self.loop: FloatArray = np.zeros((1, 3))
         self.buffer: FloatArray = np.zeros((1, cells.ROW_SIZE))
+        self.ring: FloatArray = np.zeros((1, cells.RING_WIDTH)) if ring is None else ring
         self.force = np.zeros(3)
 
     @property
@@ -86,6 +88,10 @@ class Governor:
         state[cells.LENGTH] = len(commands)
         state[cells.LONGEST] = math.inf
         state[cells.PHASE] = cells.PLAYING
+
+    def note_begin(self, now_s: float) -> None:
+        """The first tick is due one tick from now."""
+        self.state[cells.BEGAN_S] = now_s
 
     def sign_of_life(self) -> None:
         self.state[cells.SIGN_OF_LIFE] = 1.0

@@ -16,6 +16,7 @@ from equalizer.signals.signal import Signal
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
 from study.devices.loop_process.line import CLOSE_S, Call, Line, LoopGoneError
 from study.devices.loop_process.start import LoopProcess
+from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
@@ -38,12 +39,14 @@ NEVER_HELD = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
 def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevice":
     """Raises what opening the device in the process raised, or `DeviceError` where that ended or hangs."""
     process: LoopProcess | None = None
+    ring = Ring()
     try:
         process = LoopProcess()
-        info: DeviceInfo = process.work.begin("open", name, settings, seed).answer(OPENING_S)
-        return RemoteDevice(process, info, settings)
+        info: DeviceInfo = process.work.begin("open", name, settings, seed, ring.path).answer(OPENING_S)
+        return RemoteDevice(process, info, settings, ring)
     except LoopGoneError as gone:
         assert process is not None
+        ring.remove()
         process.hang_up()
         raise DeviceError(
             "The device was not opened",
@@ -51,6 +54,7 @@ def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevi
             "Try again. If it happens again, report what was written above.",
         ) from gone
     except BaseException:
+        ring.remove()
         if process is not None:
             process.hang_up()
             process.end(CLOSE_S)
@@ -58,8 +62,11 @@ def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevi
 
 
 class RemoteDevice:
-    def __init__(self, process: LoopProcess, info: DeviceInfo, settings: DeviceSettings) -> None:
+    def __init__(
+        self, process: LoopProcess, info: DeviceInfo, settings: DeviceSettings, ring: Ring | None = None
+    ) -> None:
         self._process = process
+        self._ring = ring
         self._info = info
         limits = settings.limits
         self._fade_s = limits.release_s + limits.watchdog_s
@@ -81,6 +88,10 @@ class RemoteDevice:
     @property
     def info(self) -> DeviceInfo:
         return self._info
+
+    @property
+    def telemetry(self) -> str:
+        return self._ring.path if self._ring is not None else ""
 
     def hold(self, stimulus: HeldStimulus) -> None:
         self._must_be_idle()
@@ -176,6 +187,8 @@ class RemoteDevice:
             self._closed = True
             self._process.hang_up()
         self._process.end(CLOSE_S)
+        if self._ring is not None:
+            self._ring.remove()
         # Last, so that a close that was interrupted is made good for when the program ends.
         self._ended = True
         atexit.unregister(self._close_at_exit)

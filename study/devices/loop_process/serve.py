@@ -143,9 +143,9 @@ class Lifetime:
 
 
 def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
-    name, settings, seed = ends[0].recv()[1]
+    name, settings, seed, telemetry = ends[0].recv()[1]
     try:
-        device = open_device(name, settings, RealClock(), seed, own_process=False)
+        device = open_device(name, settings, RealClock(), seed, own_process=False, telemetry=telemetry)
     except BaseException as error:  # noqa: BLE001 - the caller raises it
         ends[0].send((ERROR, _sendable(error)))
         return

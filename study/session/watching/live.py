@@ -29,3 +29,5 @@ class Live:
     """In the present stimulus."""
     monotonic_s: float | None = None
     """Reading of the session's monotonic clock at `utc`, as in its log; None from older versions."""
+    telemetry: str = ""
+    """Path of the ring into which the device's loop writes every tick; empty if there is none."""

@@ -55,7 +55,7 @@ def read_live(folder: Path) -> Live | None:
 
 
 def _fits(values: dict[str, Any]) -> bool:
-    values = {"monotonic_s": None, **values}
+    values = {"monotonic_s": None, "telemetry": "", **values}
     number = (int, float)
     kinds: dict[str, tuple[type, ...]] = {
         "utc": (str,),
@@ -68,6 +68,7 @@ def _fits(values: dict[str, Any]) -> bool:
         "sensor_clipped": (bool,),
         "missed_ticks": (int,),
         "monotonic_s": (*number, type(None)),
+        "telemetry": (str,),
     }
     return (
         values.keys() == kinds.keys()

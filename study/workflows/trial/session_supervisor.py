@@ -138,4 +138,5 @@ class SessionSupervisor:
             sensor_clipped=look.sensor_clipped,
             missed_ticks=look.missed_ticks,
             monotonic_s=self._clock.now_s(),
+            telemetry=self._device.telemetry,
         )

@@ -4,28 +4,28 @@ A program of its own follows the log, so that nothing of it can delay or end the
 monotonic clock; the offset of LSL's clock to it is measured again and again and is a marker too.
 """
 
-import hashlib
 import json
+import math
 import os
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from study.errors import StudyError
 from study.store.disk.regular_file import TABLE_BYTES, open_regular
+from study.workflows.views.lsl_outlets import not_followed_error
 
 EVERY_S = 0.02
 """Between two looks at the log: a marker comes so late, its time stamp does not."""
 OFFSET_EVERY_S = 10.0
 OFFSET_TRIES = 10
 """The closest pair of readings counts: any other was interrupted in between."""
+NOTED_S = 0.001
+"""A smaller change of the offset is not noted again in the session's log."""
 FRESH_S = 5.0
 """An older fact has another clock (a simulated session's, or that of before a restart): its marker is stamped when it
 is sent, and says so."""
-
-LONGEST_FIRST_BYTES = 2**20
-"""Of a log's first line, which says what session it is of."""
 
 TOLD = (
     "event", "run", "trial", "attempt", "phase", "frequency_hz", "level_n", "direction", "angle_deg", "polarity",
@@ -48,40 +48,17 @@ class Outlet(Protocol):
         ...
 
 
-class MarkerOutlet:
-    """An outlet of the library for one session's log. Raises StudyError where the library is not installed or the log
-    cannot be read."""
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What else is done between two looks at the log."""
 
-    def __init__(self, log: Path) -> None:
-        try:
-            import pylsl
-        except (ImportError, RuntimeError, OSError) as problem:  # installed, but without the C library
-            raise StudyError(
-                "Nothing can be streamed",
-                f"The lab streaming layer is not installed here ({problem}).",
-                "Install it: pip install '.[lsl]'. Where its wheel has no library for this system, install liblsl too.",
-                saved="The session is not touched.",
-            ) from problem
-        described = pylsl.StreamInfo("hapteq markers", "Markers", 1, pylsl.IRREGULAR_RATE, "string", source_id(log))
-        self._outlet = pylsl.StreamOutlet(described)
-        self._clock = pylsl.local_clock
-
-    def clock_s(self) -> float:
-        return float(self._clock())
-
-    def push(self, marker: str, at_s: float) -> None:
-        self._outlet.push_sample([marker], at_s)
+    on_offset: Callable[[float], None]
+    """Told the offset of the clocks at first, and whenever it has changed by `NOTED_S`."""
+    push_signals: Callable[[float], int]
+    """Given that offset: sends what the device's loop did meanwhile, and answers how many ticks were lost."""
 
 
-def source_id(log: Path) -> str:
-    """By which a recorder finds the stream again after a restart: of this session alone, wherever its folder lies, and
-    telling nothing of it to the network. Raises StudyError."""
-    try:
-        with open_regular(log) as file:
-            first = file.readline(LONGEST_FIRST_BYTES)
-    except OSError as problem:
-        raise _not_followed(log, problem) from problem
-    return f"hapteq {hashlib.sha256(first).hexdigest()[:16]}"
+NOTHING_BESIDE = Beside(lambda offset_s: None, lambda offset_s: 0)
 
 
 class LogFollower:
@@ -109,9 +86,11 @@ def stream_session(
     on_marker: Callable[[str], None],
     now_s: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
+    beside: Beside = NOTHING_BESIDE,
 ) -> int:
     """Follow the log until the session is closed or Ctrl-C; of one that is closed already nothing is sent. Returns how
     many facts became markers. Raises StudyError."""
+    noted_s = math.inf
     try:
         follower, sent, offset_s, next_offset_s = LogFollower(log), 0, 0.0, now_s()
         if any(LAST.encode() in line and _fact(line).get("event") == LAST for line in follower.lines()):
@@ -120,6 +99,11 @@ def stream_session(
             if now_s() >= next_offset_s:
                 offset_s, next_offset_s = measured_offset_s(outlet, now_s), now_s() + OFFSET_EVERY_S
                 outlet.push(_text({"event": "clock", "lsl_minus_monotonic_s": offset_s}), outlet.clock_s())
+                if not abs(offset_s - noted_s) < NOTED_S:
+                    noted_s = offset_s
+                    beside.on_offset(offset_s)
+            if lost := beside.push_signals(offset_s):
+                outlet.push(_text({"event": "signals_lost", "ticks": lost}), outlet.clock_s())
             for line in follower.lines():
                 fact = _fact(line)
                 _send(fact, outlet, offset_s, now_s(), on_marker)
@@ -128,7 +112,7 @@ def stream_session(
                     return sent
             sleep(EVERY_S)
     except (OSError, ValueError, RecursionError) as problem:
-        raise _not_followed(log, problem) from problem
+        raise not_followed_error(log, problem) from problem
 
 
 def measured_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
@@ -147,15 +131,6 @@ def _fact(line: bytes) -> dict[str, Any]:
     if not isinstance(fact, dict):
         raise ValueError(f"a line of it is no fact: {line[:40]!r}")
     return fact
-
-
-def _not_followed(log: Path, problem: Exception) -> StudyError:
-    return StudyError(
-        "The session's log cannot be followed",
-        f"{log.name} in {log.parent.name}: {problem}.",
-        "Check it with: hapteq validate FILE",
-        saved="The session is not touched.",
-    )
 
 
 def _send(

@@ -189,7 +189,7 @@ serve.OVERDUE_S = 0.5
 if where == "exit":
     atexit.register(hang)
 pairs = [Pipe() for _ in serve.LINES]
-pairs[0][0].send(("open", ("omega3", settings, 1)))
+pairs[0][0].send(("open", ("omega3", settings, 1, "")))
 serve.run(0, *[end.fileno() for _, end in pairs])
 """
 """Its parent is another process than it was told, as if that had ended, and both ends of its pipes are open."""

@@ -274,7 +274,7 @@ pairs = [Pipe() for _ in serve.LINES]
 ours = [end for end, _ in pairs]
 
 def ask() -> None:
-    ours[0].send(("open", ("omega3", settings, 1)))
+    ours[0].send(("open", ("omega3", settings, 1, "")))
     assert ours[0].recv()[0] == serve.VALUE
     print(gc.isenabled(), gc.get_freeze_count() > 0)
     print(*sorted({name.partition(".")[0] for name in sys.modules}))

@@ -14,7 +14,8 @@ from study.cli.main import main
 from study.errors import StudyError
 from study.store.disk.regular_file import open_regular
 from study.workflows.views import stream_session as module
-from study.workflows.views.stream_session import FRESH_S, MarkerOutlet, measured_offset_s, stream_session
+from study.workflows.views.lsl_outlets import MarkerOutlet, source_id
+from study.workflows.views.stream_session import FRESH_S, Beside, measured_offset_s, stream_session
 
 OFFSET_S = 1000.25
 
@@ -106,6 +107,30 @@ def test_the_offset_is_measured_again_and_again(tmp_path):
     lines = [b""] * round(2.5 * module.OFFSET_EVERY_S / module.EVERY_S)
     pushed, _ = streamed(tmp_path, [*lines, line("session_closed", monotonic_s=50.0)])
     assert [marker["event"] for marker, _ in pushed].count("clock") == 3
+
+
+def test_the_offset_is_noted_at_first_and_when_it_has_changed(tmp_path):
+    noted: list[float] = []
+    log = tmp_path / "events.jsonl"
+    log.write_bytes(b"")
+    lines = [b""] * round(3.5 * module.OFFSET_EVERY_S / module.EVERY_S)
+    clock = Clock(log, [*lines, line("session_closed", monotonic_s=50.0)])
+    outlet = Kept(clock)
+    drift = 0.6 * module.NOTED_S / module.OFFSET_EVERY_S
+    outlet.clock_s = lambda: clock.now + OFFSET_S + drift * (clock.now - 50.0)
+    stream_session(log, outlet, print, clock.now_s, clock.sleep, Beside(noted.append, lambda offset_s: 0))
+    assert len(noted) == 2 and noted[1] - noted[0] == pytest.approx(2 * 0.6 * module.NOTED_S, rel=0.1)
+
+
+def test_lost_ticks_are_a_marker(tmp_path):
+    lost = [0, 7, 0]
+    log = tmp_path / "events.jsonl"
+    log.write_bytes(b"")
+    clock = Clock(log, [b"", b"", line("session_closed", monotonic_s=50.0)])
+    outlet = Kept(clock)
+    beside = Beside(lambda offset_s: None, lambda offset_s: lost.pop(0) if lost else 0)
+    stream_session(log, outlet, lambda marker: None, clock.now_s, clock.sleep, beside)
+    assert {"event": "signals_lost", "ticks": 7} in [marker for marker, _ in outlet.pushed]
 
 
 def test_an_interrupted_reading_of_the_clocks_does_not_count():
@@ -211,7 +236,7 @@ def test_markers_arrive_at_another_end_with_their_times(tmp_path):
     following = threading.Thread(target=stream_session, args=(log, outlet, lambda marker: None))
     following.start()
     try:
-        found = pylsl.resolve_byprop("source_id", module.source_id(log), timeout=20)
+        found = pylsl.resolve_byprop("source_id", source_id(log), timeout=20)
         inlet = pylsl.StreamInlet(found[0])
         inlet.open_stream(timeout=20)
         written = []

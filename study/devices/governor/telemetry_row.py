@@ -1,0 +1,66 @@
+"""What a tick tells readers of the telemetry ring: one row, written where the oldest one was.
+
+There is one writer, the loop, which never waits: readers keep their own place and only ever read. A row that is being
+written is told by its index and its check, on any processor: no order of the stores is relied on.
+"""
+
+import math
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.governor.cells import (
+    BEGAN_S,
+    EXCITATION,
+    FAULT,
+    FORCE,
+    MISSED,
+    PHASE,
+    PLAYING,
+    RELEASING,
+    RING_ACCELERATION,
+    RING_APPLIED,
+    RING_CHECK,
+    RING_COMMANDED,
+    RING_COUNT,
+    RING_FAULT,
+    RING_INDEX,
+    RING_MISSED,
+    RING_PHASE,
+    RING_POSITION,
+    RING_TICK,
+    RING_TIME_S,
+    RING_VELOCITY,
+    STAMP_S,
+    START,
+    TICK,
+    TICK_S,
+    VELOCITY,
+)
+from study.devices.governor.compiling import part
+
+
+@part
+def write_row(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
+    """After `tick`, which has counted the tick already. ring (1 + rows, RING_WIDTH): a header, then the rows."""
+    count = ring[0, RING_COUNT]
+    row = ring[1 + int(count) % (ring.shape[0] - 1)]
+    aims = state[PHASE] in (PLAYING, RELEASING)
+    row[RING_INDEX] = count
+    row[RING_TIME_S] = state[STAMP_S]
+    if not state[STAMP_S] > 0.0:
+        row[RING_TIME_S] = state[BEGAN_S] + (state[TICK] - state[START]) * settings[TICK_S]
+    row[RING_TICK] = state[TICK] - 1.0
+    for i in range(3):
+        row[RING_POSITION + i] = reading[i]
+        row[RING_ACCELERATION + i] = reading[3 + i]
+        row[RING_APPLIED + i] = state[FORCE + i]
+        row[RING_COMMANDED + i] = state[EXCITATION + i] if aims else 0.0
+        row[RING_VELOCITY + i] = state[VELOCITY + i] if aims else math.nan
+    row[RING_PHASE], row[RING_FAULT], row[RING_MISSED] = state[PHASE], state[FAULT], state[MISSED]
+    bits = row.view(np.int64)
+    check = np.int64(0)
+    for i in range(RING_CHECK):
+        check ^= bits[i]
+    bits[RING_CHECK] = check
+    ring[0, RING_COUNT] = count + 1.0

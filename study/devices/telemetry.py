@@ -1,0 +1,211 @@
+"""The telemetry ring: what each tick of a device's loop saw and sent, in memory that other programs can read meanwhile.
+
+One writer, the loop (`governor.telemetry_row`), any number of readers. The writer never waits and knows of no reader;
+a reader that comes too late is told how many rows it lost. The ring is a file in memory (Linux: /dev/shm; elsewhere
+the folder for temporary files), made and removed by the program that opened the device, so that nothing is left when
+the loop's process is killed.
+"""
+
+import contextlib
+import mmap
+import os
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.governor import cells
+from study.errors import StudyError
+
+ROWS = 16384
+"""16 s at 1 kHz: a reader may stand still for so long and loses nothing."""
+
+FORMAT = 1.0
+PREFIX, SUFFIX = "hapteq-", ".ring"
+ROW_BYTES = 8 * cells.RING_WIDTH
+LEFT_AFTER_S = 60.0
+"""A younger file may belong to a program that is just making it."""
+
+
+class Ring:
+    """path: "" makes a ring, which `remove` removes; else that of another program is used. Its `path` is empty where
+    the system gave no room: then nothing is written, and the device works all the same."""
+
+    def __init__(self, path: str = "", rows: int = ROWS) -> None:
+        self.path = path
+        self._descriptor: int | None = None
+        if not path:
+            _remove_left_ones()
+            with contextlib.suppress(OSError):
+                self._make(rows)
+
+    def rows(self, rate_hz: float) -> FloatArray | None:
+        """For the loop, (1 + rows, RING_WIDTH), with every page there before the first tick needs it. None where there
+        is no ring."""
+        if not self.path:
+            return None
+        try:
+            rows = _mapped(Path(self.path), mmap.ACCESS_WRITE)
+        except (OSError, ValueError):
+            return None
+        rows[1:, cells.RING_INDEX] = -1.0
+        rows[0, cells.RING_RATE_HZ] = rate_hz
+        return rows
+
+    def remove(self) -> None:
+        """Who reads it keeps what is in it. Never raises; may be called again."""
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            with contextlib.suppress(OSError):
+                os.close(descriptor)
+            with contextlib.suppress(OSError):
+                Path(self.path).unlink()
+            self.path = ""
+
+    def _make(self, rows: int) -> None:
+        # Kept open: as long as it is locked, the ring is in use.
+        self._descriptor, self.path = tempfile.mkstemp(SUFFIX, PREFIX, _folder())
+        blank = np.zeros((1 + rows, cells.RING_WIDTH))
+        blank[0, cells.RING_FORMAT] = FORMAT
+        try:
+            # Written, not reserved: a page that the system cannot give must fail here and not in the loop.
+            whole = _lock(self._descriptor) and Path(self.path).write_bytes(blank.tobytes()) == blank.nbytes
+        except OSError:
+            whole = False
+        if not whole:
+            self.remove()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Telemetry:
+    """Ticks, oldest first. Each array has a row a tick."""
+
+    time_s: FloatArray
+    """(n,) when the tick's reading was taken, on the session's monotonic clock."""
+    tick: FloatArray
+    """(n,) of its stimulus: 0 is the first of it, below 0 the handle is brought to rest."""
+    position_m: FloatArray
+    velocity_m_per_s: FloatArray
+    """As the damper uses it, low-passed at 50 Hz; NaN while the force is let go."""
+    acceleration_mps2: FloatArray
+    commanded_n: FloatArray
+    """The stimulus, within its cap and with its fade."""
+    applied_n: FloatArray
+    """What was sent to the device: with spring, damper, slew limit and total cap."""
+    phase: FloatArray
+    """(n,) 0 still, 1 playing, 2 being released, 3 let go by the safety layer."""
+    fault: FloatArray
+    """(n,) place in `study.devices.device.Fault`; 0 = none."""
+    missed: FloatArray
+    """(n,) ticks of this stimulus that were missed so far."""
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+class TelemetryReader:
+    """Reads from now on. Raises `StudyError` for what is no ring."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self._rows = _mapped(path, mmap.ACCESS_READ)
+        except (OSError, ValueError) as problem:
+            raise StudyError(
+                "The device's loop cannot be followed",
+                f"{path.name}: {problem}.",
+                "Begin the sitting anew; its recordings are written all the same.",
+            ) from problem
+        self.rate_hz = float(self._rows[0, cells.RING_RATE_HZ])
+        self._next = int(self._rows[0, cells.RING_COUNT])
+        self.lost = 0
+        """Rows that were overwritten before they were read, since the beginning."""
+
+    def read(self) -> Telemetry:
+        """The rows since the last call."""
+        size = len(self._rows) - 1
+        count = int(self._rows[0, cells.RING_COUNT])
+        first = max(self._next, count - size)
+        wanted = np.arange(first, count)
+        rows = self._rows[1 + wanted % size]  # a copy
+        good = _whole(rows) & (rows[:, cells.RING_INDEX] == wanted)
+        # What was not seen whole was overwritten meanwhile, and is lost, or is too new, and waits for the next call.
+        too_new = wanted[~good & (wanted > int(self._rows[0, cells.RING_COUNT]) - size)]
+        if len(too_new):
+            count = int(too_new[0])
+        kept = good & (wanted < count)
+        self.lost += count - self._next - int(np.count_nonzero(kept))
+        self._next = count
+        return _telemetry(rows[kept])
+
+
+def _whole(rows: FloatArray) -> np.ndarray:
+    bits = rows.view(np.int64)
+    checks: np.ndarray = np.bitwise_xor.reduce(bits[:, : cells.RING_CHECK], axis=1) == bits[:, cells.RING_CHECK]
+    return checks
+
+
+def _telemetry(rows: FloatArray) -> Telemetry:
+    def three(first: int) -> FloatArray:
+        return rows[:, first : first + 3]
+
+    return Telemetry(
+        time_s=rows[:, cells.RING_TIME_S],
+        tick=rows[:, cells.RING_TICK],
+        position_m=three(cells.RING_POSITION),
+        velocity_m_per_s=three(cells.RING_VELOCITY),
+        acceleration_mps2=three(cells.RING_ACCELERATION),
+        commanded_n=three(cells.RING_COMMANDED),
+        applied_n=three(cells.RING_APPLIED),
+        phase=rows[:, cells.RING_PHASE],
+        fault=rows[:, cells.RING_FAULT],
+        missed=rows[:, cells.RING_MISSED],
+    )
+
+
+def _mapped(path: Path, access: int) -> FloatArray:
+    """(1 + rows, RING_WIDTH). Raises OSError, ValueError."""
+    with path.open("rb" if access == mmap.ACCESS_READ else "r+b") as file:
+        memory = mmap.mmap(file.fileno(), 0, access=access)
+    if len(memory) < 2 * ROW_BYTES or len(memory) % ROW_BYTES:
+        raise ValueError("it is no telemetry ring")
+    rows = np.frombuffer(memory, dtype=np.float64).reshape(-1, cells.RING_WIDTH)
+    if rows[0, cells.RING_FORMAT] != FORMAT:
+        raise ValueError("it is a telemetry ring of another version")
+    return rows
+
+
+def _folder() -> str:
+    memory = Path("/dev/shm")
+    return str(memory) if memory.is_dir() else tempfile.gettempdir()
+
+
+def _lock(descriptor: int) -> bool:
+    """False where another program has it. Where the system has no such locks, always True."""
+    if sys.platform == "win32":
+        return True
+    import fcntl
+
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _remove_left_ones() -> None:
+    """Rings of programs that were killed. Never raises. Windows gives a file no lock here: there they stay."""
+    if sys.platform == "win32":
+        return
+    for path in Path(_folder()).glob(f"{PREFIX}*{SUFFIX}"):
+        with contextlib.suppress(OSError):
+            descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW)
+            try:
+                mine = os.fstat(descriptor).st_uid == os.getuid()
+                if mine and time.time() - os.fstat(descriptor).st_mtime > LEFT_AFTER_S and _lock(descriptor):
+                    path.unlink()
+            finally:
+                os.close(descriptor)

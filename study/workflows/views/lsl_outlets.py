@@ -1,0 +1,97 @@
+"""Outlets of the lab streaming layer (LSL), whose library is imported only where something is streamed."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from equalizer.signals.signal import FloatArray
+from study.errors import StudyError
+from study.store.disk.regular_file import open_regular
+
+LONGEST_FIRST_BYTES = 2**20
+"""Of a log's first line, which says what session it is of."""
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """A stream of samples as other programs see it."""
+
+    name: str
+    kind: str
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+class SignalOutlet(Protocol):
+    def push(self, samples: FloatArray, at_s: FloatArray) -> None:
+        """samples (n, channels); at_s (n,): on LSL's clock."""
+        ...
+
+
+class MarkerOutlet:
+    """An outlet of the library for one session's log. Raises StudyError where the library is not installed or the log
+    cannot be read."""
+
+    def __init__(self, log: Path) -> None:
+        self._library = _library()
+        self._source = source_id(log)
+        described = ("hapteq markers", "Markers", 1, self._library.IRREGULAR_RATE, "string", self._source)
+        self._outlet = self._library.StreamOutlet(self._library.StreamInfo(*described))
+
+    def clock_s(self) -> float:
+        return float(self._library.local_clock())
+
+    def push(self, marker: str, at_s: float) -> None:
+        self._outlet.push_sample([marker], at_s)
+
+    def signal_outlet(self, stream: Described, rate_hz: float) -> SignalOutlet:
+        """Another outlet of the same session."""
+        return _Signals(self._library, f"{self._source} {stream.name}", stream, rate_hz)
+
+
+class _Signals:
+    def __init__(self, library: Any, source: str, stream: Described, rate_hz: float) -> None:
+        info = library.StreamInfo(stream.name, stream.kind, len(stream.channels), rate_hz, "double64", source)
+        channels = info.desc().append_child("channels")
+        for label, unit in zip(stream.channels, stream.units, strict=True):
+            channel = channels.append_child("channel")
+            for key, value in (("label", label), ("unit", unit), ("type", stream.kind)):
+                channel.append_child_value(key, value)
+        self._outlet = library.StreamOutlet(info)
+
+    def push(self, samples: FloatArray, at_s: FloatArray) -> None:
+        self._outlet.push_chunk(samples, at_s.tolist())
+
+
+def source_id(log: Path) -> str:
+    """By which a recorder finds the stream again after a restart: of this session alone, wherever its folder lies, and
+    telling nothing of it to the network. Raises StudyError."""
+    try:
+        with open_regular(log) as file:
+            first = file.readline(LONGEST_FIRST_BYTES)
+    except OSError as problem:
+        raise not_followed_error(log, problem) from problem
+    return f"hapteq {hashlib.sha256(first).hexdigest()[:16]}"
+
+
+def not_followed_error(log: Path, problem: Exception) -> StudyError:
+    return StudyError(
+        "The session's log cannot be followed",
+        f"{log.name} in {log.parent.name}: {problem}.",
+        "Check it with: hapteq validate FILE",
+        saved="The session is not touched.",
+    )
+
+
+def _library() -> Any:
+    try:
+        import pylsl
+    except (ImportError, RuntimeError, OSError) as problem:  # installed, but without the C library
+        raise StudyError(
+            "Nothing can be streamed",
+            f"The lab streaming layer is not installed here ({problem}).",
+            "Install it: pip install '.[lsl]'. Where its wheel has no library for this system, install liblsl too.",
+            saved="The session is not touched.",
+        ) from problem
+    return pylsl

@@ -1,0 +1,83 @@
+"""What a running session's device does, tick by tick, as signals beside its markers: from the loop's telemetry ring, by
+a program of its own, while a trial runs."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.opening import telemetry_of
+from study.errors import StudyError
+from study.store.sessions.live_file import read_live
+from study.workflows.views.lsl_outlets import Described, SignalOutlet
+
+if TYPE_CHECKING:
+    from study.devices.telemetry import TelemetryReader
+
+LOOK_EVERY = 10
+"""Calls between two looks whether the session runs on another ring (a resumed one does)."""
+
+
+def _three(name: str) -> tuple[str, str, str]:
+    return (f"{name}_x", f"{name}_y", f"{name}_z")
+
+
+STREAMS = (
+    Described("hapteq force", "Force", (*_three("commanded"), *_three("applied")), ("N",) * 6),
+    Described("hapteq acceleration", "Acceleration", _three("acceleration"), ("m/s^2",) * 3),
+    Described("hapteq motion", "Motion", (*_three("position"), *_three("velocity")), ("m",) * 3 + ("m/s",) * 3),
+    Described("hapteq loop", "Status", ("tick", "phase", "fault", "missed_ticks"), ("",) * 4),
+)
+
+
+class SignalStreams:
+    """folder: of the session. open_outlet(stream, rate_hz): called when a loop is there for the first time."""
+
+    def __init__(self, folder: Path, open_outlet: Callable[[Described, float], SignalOutlet]) -> None:
+        self._folder = folder
+        self._open_outlet = open_outlet
+        self._path, self._calls = "", 0
+        self._reader: TelemetryReader | None = None
+        self._outlets: tuple[SignalOutlet, ...] = ()
+        self.sent = 0
+        """Ticks."""
+
+    def push(self, offset_s: float) -> int:
+        """Send the ticks since the last call; offset_s: LSL's clock less the session's. How many ticks were lost."""
+        lost = self._push_new(offset_s)
+        if self._calls % LOOK_EVERY == 0:
+            self._look()
+        self._calls += 1
+        return lost
+
+    def _look(self) -> None:
+        live = read_live(self._folder)
+        if live is None or live.telemetry == self._path:
+            return
+        self._path = live.telemetry
+        try:
+            self._reader = telemetry_of(self._path) if self._path else None
+        except StudyError:  # that sitting is over; the next one has another ring
+            self._reader = None
+        if self._reader is not None and not self._outlets:
+            self._outlets = tuple(self._open_outlet(stream, self._reader.rate_hz) for stream in STREAMS)
+
+    def _push_new(self, offset_s: float) -> int:
+        if self._reader is None:
+            return 0
+        lost_before = self._reader.lost
+        read = self._reader.read()
+        if len(read):
+            status: FloatArray = np.stack([read.tick, read.phase, read.fault, read.missed], axis=1)
+            signals = (
+                np.hstack([read.commanded_n, read.applied_n]),
+                read.acceleration_mps2,
+                np.hstack([read.position_m, read.velocity_m_per_s]),
+                status,
+            )
+            for outlet, samples in zip(self._outlets, signals, strict=True):
+                outlet.push(samples, read.time_s + offset_s)
+            self.sent += len(read)
+        return self._reader.lost - lost_before
