@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from study.cli.results import JsonOption
+from study.cli.scheduler import SchedulerOption
 from study.cli.seed import check_seed
 from study.errors import WrongUseError
 
@@ -38,10 +39,7 @@ def power(
     threshold_n: Annotated[float, typer.Option(min=0.01, max=100, help="Median threshold at the others, in N.")] = 0.7,
     studies: Annotated[int, typer.Option(min=10, max=100_000, help="Simulated studies of each size.")] = 200,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Of a dask scheduler, instead of --workers."),
-    ] = None,
+    scheduler: SchedulerOption = None,
     protocol: Annotated[str, typer.Option(help="Protocol with staircase and frequencies.")] = "direction_threshold",
     out: Annotated[Path, typer.Option(help="Folder of the results; a broken run goes on there.")] = Path("power"),
     curve: CurveOption = "weibull",

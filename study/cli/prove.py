@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from study.cli.results import JsonOption
+from study.cli.scheduler import SchedulerOption, cluster_if
 from study.cli.seed import check_seed
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ def prove(
         int, typer.Option(min=0, callback=check_seed, help="Seed of all draws but the salt of the labels.")
     ] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
+    scheduler: SchedulerOption = None,
     brief: Annotated[bool, typer.Option("--brief", help="Short recordings: a quick look.")] = False,
     controls: Annotated[
         bool, typer.Option("--controls", help="Also ask what must change, or must not: minutes more.")
@@ -43,11 +45,13 @@ def prove(
     from study.evaluation.bank.sealed_bank import BankOptions
     from study.evaluation.bank.write_proof import write_proof, write_table
 
-    plan, options = BankPlan(seed, cases, brief), BankOptions(workers, keep, controls)
-    if laws:
-        _prove_laws(out, plan, options, table, as_json)
-        return
-    proof = _with_steps(lambda said: proved(out, plan, options, said))
+    plan = BankPlan(seed, cases, brief)
+    with cluster_if(scheduler) as cluster:
+        options = BankOptions(workers, keep, controls, cluster)
+        if laws:
+            _prove_laws(out, plan, options, table, as_json)
+            return
+        proof = _with_steps(lambda said: proved(out, plan, options, said))
     write_proof(proof)
     if table is not None:
         write_table(table, proof)

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
+from study.cli.scheduler import SchedulerOption, cluster_if
 from study.cli.seed import check_seed
 
 
@@ -31,6 +32,7 @@ def real(
         ),
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Of the draws of these faults.")] = 1,
+    scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Diagnose a folder of real recordings: what was named, what is left, what an expert would object.
@@ -44,8 +46,8 @@ def real(
     from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
     from study.evaluation.real.real_summary import real_lines
 
-    with steps("Real recordings") as show:
-        done = diagnose_folder(RealPlan(folder, out, seconds, inject, seed), show)
+    with cluster_if(scheduler) as cluster, steps("Real recordings") as show:
+        done = diagnose_folder(RealPlan(folder, out, seconds, inject, seed), show, executor=cluster)
     if as_json:
         typer.echo(json.dumps([real_answer_to_json(answer) for answer in done.results.answers], indent=2))
     else:

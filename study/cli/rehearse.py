@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption, show
+from study.cli.scheduler import SchedulerOption, cluster_if
 from study.cli.seed import check_seed
 from study.cli.study import ModelOption, ProtocolOption, protocol_or_default
 
@@ -16,6 +17,7 @@ def rehearse(
     protocol: ProtocolOption = None,
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the population and of all draws.")] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
+    scheduler: SchedulerOption = None,
     model: ModelOption = None,
     observer: Annotated[
         str,
@@ -41,6 +43,6 @@ def rehearse(
         source.protocol, source.text, subjects=subjects, seed=seed, data=out, model=model, observer=observer
     )
     rehearsed_observer(rehearsal, 0)
-    with bar(f"{subjects} simulated participants", total=subjects) as advance:
-        rehearse_study(rehearsal, workers=workers, on_finished=advance)
+    with cluster_if(scheduler) as cluster, bar(f"{subjects} simulated participants", total=subjects) as advance:
+        rehearse_study(rehearsal, cluster or workers, advance)
     show(analyze_data(out, out / ANALYSIS_NAME), as_json)

@@ -4,7 +4,7 @@ Each worker imports hapteq itself, so that all must have the version that asks: 
 """
 
 from collections.abc import Iterator
-from concurrent.futures import Executor
+from concurrent.futures import CancelledError, Executor
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
@@ -20,13 +20,17 @@ INSTALL = "pip install 'hapteq[cluster]'"
 
 
 @contextmanager
-def cluster_workers(address: str) -> Iterator[Executor]:
+def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Executor]:
     """address: of the scheduler, such as tcp://10.0.0.5:8786. A piece of work whose worker dies is done by another.
+    one_thread: refuse workers that do several pieces at once, for work that draws figures or measures processor time.
 
-    Raises StudyError where no scheduler answers, it has no workers, or a worker has another version.
+    Raises StudyError where no scheduler answers, it has no workers, a worker has another version, or, later, where
+    the scheduler is lost or workers die at the same piece again and again.
     """
     try:
-        from distributed import Client
+        import dask
+        from distributed import Client, KilledWorker
+        from distributed.comm import CommClosedError
     except ImportError as missing:
         raise StudyError(
             "There is no access to a cluster",
@@ -43,10 +47,19 @@ def cluster_workers(address: str) -> Iterator[Executor]:
             "Start it with: dask scheduler. Then give the address that it prints.",
             saved="Nothing was begun.",
         ) from problem
-    with client:
-        _require_workers(client, address)
-        with client.get_executor(pure=False) as executor:
-            yield executor
+    # A recording goes to its worker as a value: distributed would advise against so large a piece.
+    with client, dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 GB"}):
+        _require_workers(client, address, one_thread)
+        try:
+            with client.get_executor(pure=False) as executor:
+                yield executor
+        except (KilledWorker, CommClosedError, CancelledError) as problem:
+            raise StudyError(
+                "The cluster did not do this",
+                f"{type(problem).__name__}: {problem}.",
+                "Look at the scheduler and its workers, then run the same command again: it goes on where it stopped.",
+                saved="What was finished is kept.",
+            ) from problem
 
 
 def own_version() -> str:
@@ -57,7 +70,7 @@ def own_version() -> str:
         return ""
 
 
-def _require_workers(client: "Client", address: str) -> None:
+def _require_workers(client: "Client", address: str, one_thread: bool) -> None:
     found: dict[str, str] = {}
     try:
         found = client.run(own_version)
@@ -70,6 +83,12 @@ def _require_workers(client: "Client", address: str) -> None:
         raise _cluster_error(
             f"Workers at {address} have hapteq {', '.join(wrong)}; here it is {own}.",
             "Install the same version for all of them.",
+        )
+    threads = [worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values()]
+    if one_thread and max(threads) > 1:
+        raise _cluster_error(
+            f"Workers at {address} have up to {max(threads)} threads, and this work needs a process for each piece.",
+            f"Start them with: dask worker {address} --nthreads 1 --nworkers auto.",
         )
 
 

@@ -67,6 +67,16 @@ def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: 
     return results
 
 
+@contextmanager
+def unforked() -> Iterator[None]:
+    """Within it nothing is forked, as on a worker beside which others use the other cores. The results are the same."""
+    _within.append(True)
+    try:
+        yield
+    finally:
+        _within.pop()
+
+
 class _Shared:
     """Pieces of work that several processes take one after another."""
 
@@ -84,11 +94,8 @@ class _Shared:
         try:
             while len(children) < others and self._fork_worker(children):
                 pass
-            _within.append(True)
-            try:
+            with unforked():
                 found = self._take_pieces(guarded=False)
-            finally:
-                _within.pop()
             while children:
                 found.update(_receive(children[0][1], self._known))
                 with _hold_signals():

@@ -5,14 +5,18 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from tempfile import TemporaryDirectory
 
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import ANSWER, DIED, RECORDING, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
-from study.store.disk.text_file import write_text
+from study.store.disk.carried_folder import Files, read_files, write_files
+from study.store.disk.text_file import read_text, write_text
+from study.workflows.pieces import finished_pieces
 
 PATIENCE_S = 1200.0
 """Longest wait for one case (s); a case takes seconds to a minute."""
@@ -80,11 +84,18 @@ class Engine:
             )
 
 
-def ask_engine(folder: ProofFolder, names: Sequence[str], workers: int, on_answered: Callable[[str], None]) -> None:
+Workers = int | Executor
+"""So many processes of this computer, or an executor whose workers are sent the cases: they may share no disk."""
+
+
+def ask_engine(folder: ProofFolder, names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]) -> None:
     """Diagnose all cases that have no answer yet; blocks until done. `on_answered(name)` is called in this thread
     after each. Raises StudyError if all worker processes ended early."""
     left, answered = SimpleQueue[str](), SimpleQueue[str]()
     wanted = [name for name in names if not is_answered(folder.open / name)]
+    if isinstance(workers, Executor):
+        _send_cases(folder, wanted, workers, on_answered)
+        return
     for name in wanted:
         left.put(name)
     with _engines(folder, min(workers, len(wanted)), left, answered) as threads:
@@ -98,6 +109,33 @@ def ask_engine(folder: ProofFolder, names: Sequence[str], workers: int, on_answe
                 continue
             missing -= 1
             on_answered(name)
+
+
+def _send_cases(
+    folder: ProofFolder, wanted: Sequence[str], executor: Executor, on_answered: Callable[[str], None]
+) -> None:
+    cases = ((name, (name, read_files(folder.open / name))) for name in wanted)
+    for name, said in finished_pieces(executor, answer_sent_case, cases):
+        if said is None:
+            _write_failure(folder.open / name)
+        else:
+            write_text(folder.open / name / ANSWER, said, overwrite=True)
+        on_answered(name)
+
+
+def answer_sent_case(name: str, case: Files) -> str | None:
+    """Runs on a worker: the text of answer.json, from a process that is given nothing but the files of the case. None
+    if it died or timed out, as often as is tried."""
+    with TemporaryDirectory() as place:
+        folder = ProofFolder(Path(place))
+        write_files(folder.open / name, case)
+        engine = Engine(folder)
+        try:
+            done = any(engine.ask(name) for _ in range(TRIES))
+        finally:
+            engine.end()
+            engine.close()
+        return read_text(folder.open / name / ANSWER) if done else None
 
 
 @contextmanager

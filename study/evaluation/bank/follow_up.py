@@ -17,7 +17,7 @@ from analysis.diagnosis.next_experiment.experiment_menu import Experiment, exper
 from analysis.evaluation.proof.follow_up import FollowUp
 from analysis.evaluation.proof.outcome import Outcome
 from study.evaluation.bank.answer_cases import others_sha256
-from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
+from study.evaluation.bank.ask_engine import Workers, ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
 from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redraw_recording
@@ -38,11 +38,11 @@ def follow_up(
     folder: ProofFolder,
     plan: BankPlan,
     outcomes: Sequence[Outcome],
-    options: tuple[int, bool],
+    options: tuple[Workers, bool],
     on_done: Callable[[int, int], None],
 ) -> tuple[FollowUp, ...]:
-    """Follow up single-effect cases with several returned effects. options: number of processes, and whether
-    recordings are kept after they are answered. Resumable: after an interruption the same call continues. Raises
+    """Follow up single-effect cases with several returned effects. options: the workers, and whether recordings
+    are kept after they are answered. Resumable: after an interruption the same call continues. Raises
     StudyError."""
     workers, keep = options
     starts = [

@@ -81,7 +81,7 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
             folder,
             plan,
             outcomes,
-            (options.workers, options.keep),
+            (options.answering, options.keep),
             lambda done, of: on_progress("following up", done, of),
         )
         controls = _controls(path, plan, options, on_progress)
@@ -114,5 +114,5 @@ def _controls(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pro
     found: tuple[ControlOutcome, ...] = ()
     for seed in range(plan.seed, plan.seed + CONTROL_TURNS) if options.controls else ():
         there = path / "controls" / str(seed)
-        found += run_controls(there, seed, options.workers, lambda done, of: on_progress("controls", done, of))
+        found += run_controls(there, seed, options.answering, lambda done, of: on_progress("controls", done, of))
     return found

@@ -8,7 +8,7 @@ from pathlib import Path
 from analysis.diagnosis.document import Diagnosis, diagnosis_from_json
 from analysis.evaluation.proof.controlled import ControlOutcome, judge_control
 from study.errors import StudyError
-from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
+from study.evaluation.bank.ask_engine import Workers, ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.challenge.controls import CONTROLS, Control, ControlInput
@@ -24,7 +24,7 @@ SHORT = Rig((0,), 1000, 3, steps=80)
 def run_controls(
     path: Path,
     seed: int,
-    workers: int,
+    workers: Workers,
     on_done: Callable[[int, int], None],
     controls: Sequence[Control] = CONTROLS,
     rig: Rig = SHORT,

@@ -1,13 +1,14 @@
 """Steps that all sealed banks share: answer the open cases, check the seals, reveal the labels."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 from study.errors import LeftError
-from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
+from study.evaluation.bank.ask_engine import Workers, ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import ANSWER, ProofFolder
 from study.evaluation.bank.proof_seals import (
     answers_sealed_case,
@@ -28,10 +29,17 @@ class BankOptions:
     """How a bank is run."""
 
     workers: int = 2
+    """Processes of this computer that draw and seal, and diagnose where there is no executor."""
     keep: bool = False
     """Keep recordings after they are answered."""
     controls: bool = False
     """Also run the controls."""
+    executor: Executor | None = None
+    """Diagnoses on its workers."""
+
+    @property
+    def answering(self) -> Workers:
+        return self.workers if self.executor is None else self.executor
 
 
 @contextmanager
@@ -63,7 +71,7 @@ def answer_bank(
             forget_recording(folder.open / name)
         on_progress("diagnosing", done, len(every))
 
-    ask_engine(folder, asked, options.workers, on_answered)
+    ask_engine(folder, asked, options.answering, on_answered)
 
 
 def reveal_bank(

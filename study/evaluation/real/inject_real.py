@@ -14,7 +14,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.evaluation.bank.answer_cases import others_sha256
-from study.evaluation.bank.ask_engine import ask_engine, is_answered
+from study.evaluation.bank.ask_engine import Workers, ask_engine, is_answered
 from study.evaluation.bank.proof_folder import CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
 from study.evaluation.bank.seal_cases import settings_text
@@ -130,7 +130,11 @@ def _nameless(recording: Recording) -> Recording:
 
 
 def run_injections(
-    path: Path, carried: Sequence[Carrier], draws: tuple[int, int], on_done: Callable[[int, int], None]
+    path: Path,
+    carried: Sequence[Carrier],
+    draws: tuple[int, int],
+    on_done: Callable[[int, int], None],
+    workers: Workers = 2,
 ) -> tuple[InjectedOutcome, ...]:
     """Seal, diagnose and reveal injected faults. draws: number of cases, and seed. Resumable. Raises StudyError."""
     count, seed = draws
@@ -144,7 +148,7 @@ def run_injections(
         answered += 1
         on_done(answered, count)
 
-    ask_engine(folder, names, 2, one_more)
+    ask_engine(folder, names, workers, one_more)
     labels = [read_label(folder.label(number)) for number in range(len(names))]
     answers = [read_answer(folder.open / name) for name in names]
     if broken := [

@@ -3,9 +3,12 @@
 import errno
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.search.time_budget import CountedBudget
@@ -13,6 +16,7 @@ from analysis.diagnosis.types import TimeBudget
 from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import LeftError, StudyError, WrongUseError
+from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, report_crash
 from study.evaluation.real.inject_real import carriers, run_injections
 from study.evaluation.real.kept_answers import (
@@ -26,14 +30,16 @@ from study.evaluation.real.real_folder import RealFolder, RealRecording, read_re
 from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_time
+from study.store.disk.carried_folder import Files, read_files, write_files
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.new_folder import new_folder
 from study.store.disk.provenance import Provenance
 from study.store.formats.mechanical_model_file import write_mechanical_model
-from study.store.formats.real_answer_file import write_real_answer
+from study.store.formats.real_answer_file import read_answer_and_origin, write_real_answer
 from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
-from study.workflows.forked_map import processor_s
+from study.workflows.forked_map import processor_s, unforked
+from study.workflows.pieces import finished_pieces
 
 RETUNED_NAME = "retuned.toml"
 DIAGNOSED_OF_BOTH = 0.5
@@ -41,6 +47,8 @@ DIAGNOSED_OF_BOTH = 0.5
 EVALUATIONS = 4000
 """Limit of the search for one recording, counted in evaluations (a structure weighed, a law simulated or fitted); it
 then ends with its best result. A count, because seconds would make answers depend on the load of the machine."""
+FOLDERS_AHEAD = 16
+"""Sub-folders of recordings in memory at once, on their way to workers."""
 BESIDE_S = 25.0
 """Seconds for fitting a model, page and figures beside the search, where seconds are asked for."""
 
@@ -59,16 +67,28 @@ class RealPlan:
     """Seed of these draws."""
 
 
-def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None = None) -> WrittenReal:
-    """Diagnose a folder and write page and table. `on_progress(step, share)`. Resumable after LeftError. Raises
-    StudyError."""
+def diagnose_folder(
+    plan: RealPlan, on_progress: Progress, clock: Clock | None = None, executor: Executor | None = None
+) -> WrittenReal:
+    """Diagnose a folder and write page and table. `on_progress(step, share)`. executor: does it on its workers, which
+    may share no disk. Resumable after LeftError. Raises StudyError."""
+    if executor is not None and plan.seconds is not None:
+        raise WrongUseError(
+            "Seconds are of this computer's processor",
+            "With --seconds and --scheduler together, answers would depend on which worker gave them.",
+            "Leave --seconds out: searches then end by a count of evaluations, the same on every machine.",
+            saved="Nothing was written.",
+        )
     found = _found(plan)
     time = clock or RealClock()
     kept = kept_answers(plan.out, found.recordings, plan.seconds)
     _make_writable(plan.out)
     try:
-        answers = _answers(plan, found, kept, on_progress, time)
-        injected = _inject_faults(plan, found, answers, on_progress)
+        if executor is None:
+            answers = _answers(plan, found, kept, on_progress, time)
+        else:
+            answers = _sent_answers(plan, found, kept, on_progress, executor)
+        injected = _inject_faults(plan, found, answers, on_progress, executor or 2)
         on_progress("writing the page", 0.98)
         return write_real(
             plan.out, RealResults(answers, found.troubles, injected), local_time(time.utc(), machine_zone)
@@ -113,7 +133,7 @@ def _make_writable(out: Path) -> None:
 
 
 def _inject_faults(
-    plan: RealPlan, found: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress
+    plan: RealPlan, found: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress, workers: Workers
 ) -> tuple[InjectedOutcome, ...]:
     if plan.inject == 0:
         return ()
@@ -124,7 +144,7 @@ def _inject_faults(
     def show(done: int, of: int) -> None:
         on_progress(f"injected faults, {done} of {of}", begun + (0.98 - begun) * done / max(of, 1))
 
-    return run_injections(plan.out / INJECTED_NAME, carried, (plan.inject, plan.seed), show)
+    return run_injections(plan.out / INJECTED_NAME, carried, (plan.inject, plan.seed), show, workers)
 
 
 def _answers(
@@ -147,6 +167,35 @@ def _answers(
         answers.append(there or _answer(plan, recording, budget, show, clock))
         left[recording.folder.name] -= processor_s() - begun
     return tuple(answers)
+
+
+def _sent_answers(
+    plan: RealPlan,
+    found: RealFolder,
+    kept: Mapping[Path, RealAnswer],
+    on_progress: Progress,
+    executor: Executor,
+) -> tuple[RealAnswer, ...]:
+    places = [answer_place(plan.out, each) for each in found.recordings]
+    left = [(place, each) for place, each in zip(places, found.recordings, strict=True) if place not in kept]
+    sent = ((place, (each.folder.name, each.name, read_files(each.folder))) for place, each in left)
+    answers, end = dict(kept), DIAGNOSED_OF_BOTH if plan.inject else 0.98
+    for place, files in finished_pieces(executor, answer_sent_recording, sent, FOLDERS_AHEAD):
+        with _new_folder_in_parents(place) as part:
+            write_files(part, files)
+        answers[place] = read_answer_and_origin(place / ANSWER_NAME)[0]
+        on_progress(f"{len(answers)} of {len(places)} answered", end * len(answers) / len(places))
+    return tuple(answers[place] for place in places)
+
+
+def answer_sent_recording(folder: str, name: str, files: Files) -> Files:
+    """Runs on a worker: the results of one recording. folder, files: the sub-folder that it lies in."""
+    with TemporaryDirectory() as place, unforked():
+        plan = RealPlan(Path(place) / "recordings", Path(place) / "out")
+        write_files(plan.folder / folder, files)
+        (wanted,) = (each for each in read_real_folder(plan.folder).recordings if each.name == name)
+        _answer(plan, wanted, 0.0, lambda what, share: None, RealClock())
+        return read_files(answer_place(plan.out, wanted))
 
 
 def _answer(
@@ -178,13 +227,20 @@ def _answer(
 
 def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:
     """Write the results of one recording atomically."""
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise CannotWriteError(folder, problem) from problem
-    with new_folder(folder) as part:
+    with _new_folder_in_parents(folder) as part:
         if done.findings is not None:
             write_diagnosis_into(part, done.findings, done.parents)
             assert done.findings.retuned is not None
             write_mechanical_model(part / RETUNED_NAME, done.findings.retuned)
         write_real_answer(part / ANSWER_NAME, done.answer, origin)
+
+
+@contextmanager
+def _new_folder_in_parents(folder: Path) -> Iterator[Path]:
+    """As `new_folder`, with its parents. Raises StudyError."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise CannotWriteError(folder, problem) from problem
+    with new_folder(folder) as part:
+        yield part

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from study.store.disk.json_document import write_json
 from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import read_text
 from study.workflows.picture_files import write_pictures
+from study.workflows.pieces import finished_pieces
 
 CHUNK = 10
 """Studies per piece of work: some seconds, so that little is lost when a worker dies."""
@@ -65,18 +66,11 @@ def simulate_power(
     todo = [(n, first) for n in plan.people for first in range(0, plan.studies, CHUNK) if (n, first) not in done]
     finished = sum(map(len, done.values()))
     on_finished(finished)
-    futures = {executor.submit(judge_piece, plan, piece): piece for piece in todo}
-    try:
-        for future in as_completed(futures):
-            verdicts = future.result()
-            done[futures[future]] = verdicts
-            _append(path, {"piece": futures[future], "verdicts": [asdict(v) for v in verdicts]})
-            finished += len(verdicts)
-            on_finished(finished)
-    except BaseException:
-        for future in futures:
-            future.cancel()
-        raise
+    for piece, verdicts in finished_pieces(executor, judge_piece, ((piece, (plan, piece)) for piece in todo)):
+        done[piece] = verdicts
+        _append(path, {"piece": piece, "verdicts": [asdict(v) for v in verdicts]})
+        finished += len(verdicts)
+        on_finished(finished)
     # In the order of the plan, not of finishing: sums of the same numbers are then the same to the bit.
     points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
     payload = {"plan": _plan_facts(plan), "points": [asdict(point) for point in points]}

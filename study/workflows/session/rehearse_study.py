@@ -1,12 +1,12 @@
 """Rehearse a whole study with simulated participants, several at once; begun sessions are resumed, finished ones
 kept."""
 
-import signal
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
-from multiprocessing import get_context
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
@@ -14,13 +14,18 @@ from study.errors import LeftError, StudyError
 from study.participants.observer import Observer
 from study.participants.observers import observer_named
 from study.participants.population import KINDS, member
+from study.store.disk.carried_folder import Files, read_file, read_files, write_files
+from study.store.disk.new_folder import new_folder
+from study.store.disk.privacy import make_folder
 from study.store.disk.provenance import sha256_of
 from study.store.sessions.archive import SessionFolder, session_folders
+from study.workflows.pieces import finished_pieces
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import finish_tables, write_tables
-from study.workflows.session.conduct_session import conduct_new, conduct_resumed
+from study.workflows.session.conduct_session import Conducted, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_participant import seat_observer
+from study.workflows.worker_processes import worker_processes
 
 DEVICE = "simulated"
 
@@ -48,36 +53,55 @@ def rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
     return observer_named(kind, rehearsal.seed)
 
 
-def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[int], None]) -> None:
-    """Run all participants, calling `on_finished(count)`. After an interruption the same call continues.
+def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: Callable[[int], None]) -> None:
+    """Run all participants, calling `on_finished(count)`. After an interruption the same call continues: running
+    sessions are finished within seconds, no other is begun.
+
+    workers: so many processes of this computer; or an executor whose workers may share no disk with it. From these
+    whole sessions come back, and what one that dies had begun is played anew by another.
 
     Raises StudyError where the folder holds a rehearsal of another protocol, seed or model.
     """
     _check_same(rehearsal)
-    # Forking a process with numba's and the device's threads in it is not safe; a spawned one starts clean.
-    context = get_context("spawn")
-    with ProcessPoolExecutor(max_workers=workers, mp_context=context, initializer=_leave_ctrl_c_to_the_parent) as pool:
-        futures = [pool.submit(_sit, rehearsal, number) for number in range(rehearsal.subjects)]
-        try:
-            for done, future in enumerate(as_completed(futures), start=1):
-                future.result()
+    with _resumable(rehearsal):
+        if isinstance(workers, Executor):
+            _rehearse_elsewhere(rehearsal, workers, on_finished)
+            return
+        every = ((number, (rehearsal, number)) for number in range(rehearsal.subjects))
+        with worker_processes(workers) as pool:
+            for done, _ in enumerate(finished_pieces(pool, _sit, every), start=1):
                 on_finished(done)
-        except KeyboardInterrupt as interruption:
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise LeftError(
-                "Interrupted",
-                "The rehearsal is not finished.",
-                "Run the same command again: it goes on where it stopped.",
-                saved=f"All sessions begun so far are in {rehearsal.data}.",
-            ) from interruption
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
 
 
-def _leave_ctrl_c_to_the_parent() -> None:
-    """Ignore Ctrl-C in a worker. Running sessions finish within seconds; no other is begun."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _rehearse_elsewhere(rehearsal: Rehearsal, executor: Executor, on_finished: Callable[[int], None]) -> None:
+    """A session that was begun in the folder is finished here."""
+    held = session_folders(rehearsal.data)
+    begun = {number for number in range(rehearsal.subjects) if any(f.subject == subject_code(number) for f in held)}
+    model = {} if rehearsal.model is None else read_file(rehearsal.model)
+    left = [number for number in range(rehearsal.subjects) if number not in begun]
+    for done, number in enumerate(sorted(begun), start=1):
+        _sit(rehearsal, number)
+        on_finished(done)
+    played = finished_pieces(executor, play_apart, ((each, (rehearsal, model, each)) for each in left))
+    for done, (_, (session, files, why)) in enumerate(played, start=len(begun) + 1):
+        make_folder(rehearsal.data, private=True)
+        with new_folder(rehearsal.data / session) as part:
+            write_files(part, files)
+        _require_finished(session, why)
+        on_finished(done)
+
+
+@contextmanager
+def _resumable(rehearsal: Rehearsal) -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt as interruption:
+        raise LeftError(
+            "Interrupted",
+            "The rehearsal is not finished.",
+            "Run the same command again: it goes on where it stopped.",
+            saved=f"All sessions begun so far are in {rehearsal.data}.",
+        ) from interruption
 
 
 def subject_code(number: int) -> str:
@@ -102,18 +126,7 @@ def _sit(rehearsal: Rehearsal, number: int) -> None:
         return
     begun = _begun(rehearsal.data, subject_code(number))
     if begun is None:
-        plan = SessionPlan(
-            protocol=rehearsal.protocol,
-            protocol_text=rehearsal.protocol_text,
-            protocol_locked=False,
-            subject=subject_code(number),
-            observer=observer.name,
-            seed=seed,
-            data=rehearsal.data,
-            participant_number=number,
-            model=rehearsal.model,
-        )
-        conducted = conduct_new(plan, DEVICE, seat_observer(observer, seed, VirtualClock()))
+        conducted = _play_new(rehearsal, number)
     elif (folded := fold_session(begun)).state.closed:
         finish_tables(begun, folded)
         return
@@ -121,10 +134,41 @@ def _sit(rehearsal: Rehearsal, number: int) -> None:
         clock = VirtualClock.not_before(folded.state.sitting.last.utc)
         conducted = conduct_resumed(begun, DEVICE, seat_observer(observer, seed, clock))
     write_tables(conducted.folder)
-    if conducted.left:
+    _require_finished(conducted.folder.name, conducted.left)
+
+
+def play_apart(rehearsal: Rehearsal, model: Files, number: int) -> tuple[str, Files, str]:
+    """Runs on a worker: plays a session in a folder of its own. model: the model's file. Returns the name of the
+    session, its files, and why it ended early (empty: it did not)."""
+    with TemporaryDirectory() as place:
+        write_files(Path(place), model)
+        path = None if rehearsal.model is None else Path(place) / rehearsal.model.name
+        conducted = _play_new(replace(rehearsal, data=Path(place) / "data", model=path), number)
+        write_tables(conducted.folder)
+        return conducted.folder.name, read_files(conducted.folder.path), conducted.left
+
+
+def _play_new(rehearsal: Rehearsal, number: int) -> Conducted:
+    observer, seed = rehearsed_observer(rehearsal, number), subject_seed(rehearsal.seed, number)
+    plan = SessionPlan(
+        protocol=rehearsal.protocol,
+        protocol_text=rehearsal.protocol_text,
+        protocol_locked=False,
+        subject=subject_code(number),
+        observer=observer.name,
+        seed=seed,
+        data=rehearsal.data,
+        participant_number=number,
+        model=rehearsal.model,
+    )
+    return conduct_new(plan, DEVICE, seat_observer(observer, seed, VirtualClock()))
+
+
+def _require_finished(session: str, why: str) -> None:
+    if why:
         raise StudyError(
             "A simulated participant did not finish",
-            f"{conducted.folder.name}: {conducted.left}.",
+            f"{session}: {why}.",
             "Change what stops it in the protocol, and rehearse in another folder.",
             saved="Everything so far is in the folder.",
         )

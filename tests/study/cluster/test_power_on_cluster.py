@@ -1,7 +1,5 @@
 """A dask scheduler with two workers on this computer: the same numbers, also where a worker dies."""
 
-import os
-import signal
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -28,14 +26,6 @@ def plan():
 
 
 @pytest.fixture(scope="module")
-def local():
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0"
-    ) as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
 def here(plan, tmp_path_factory):
     with ThreadPoolExecutor(1) as pool:
         return simulate_power(plan, tmp_path_factory.mktemp("here") / "power", pool, lambda _: None)
@@ -50,17 +40,10 @@ def test_a_cluster_gives_the_same_numbers_to_the_bit(plan, local, here, tmp_path
 
 
 @pytest.mark.timeout(300)
-def test_a_worker_that_dies_loses_no_study(plan, local, here, tmp_path):
-    killed = []
-
-    def kill(finished):
-        if finished and not killed:
-            killed.append(next(iter(local.workers.values())).pid)
-            os.kill(killed[0], signal.SIGKILL)
-
+def test_a_worker_that_dies_loses_no_study(plan, local, here, kill_a_worker, tmp_path):
     with cluster_workers(local.scheduler_address) as pool:
-        assert simulate_power(plan, tmp_path / "power", pool, kill) == here
-    assert killed
+        assert simulate_power(plan, tmp_path / "power", pool, kill_a_worker) == here
+    assert kill_a_worker.killed
 
 
 @pytest.mark.timeout(300)
@@ -75,6 +58,25 @@ def test_a_scheduler_without_workers_is_refused():
     alone = distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0")
     with alone, pytest.raises(StudyError, match="has no workers"), cluster_workers(alone.scheduler_address):
         pass
+
+
+@pytest.mark.timeout(120)
+def test_workers_with_several_threads_are_refused_for_work_that_needs_a_process():
+    two = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0"
+    )
+    refused = pytest.raises(StudyError, match="--nthreads 1")
+    with two, refused, cluster_workers(two.scheduler_address, one_thread=True):
+        pass
+
+
+@pytest.mark.timeout(120)
+def test_a_scheduler_that_is_lost_is_reported(plan, tmp_path):
+    lost = distributed.LocalCluster(n_workers=1, host="127.0.0.1", dashboard_address="127.0.0.1:0")
+    with lost, pytest.raises(StudyError, match="did not do this"), cluster_workers(lost.scheduler_address) as pool:
+        simulate_power(plan, tmp_path / "power", pool, lambda finished: finished and lost.close())
+    kept = (tmp_path / "power" / "studies.jsonl").read_text("utf-8").splitlines()
+    assert 1 < len(kept) < 7  # the plan, and some of six pieces
 
 
 def test_no_scheduler_is_reported_and_nothing_is_begun(tmp_path, monkeypatch, capsys):

@@ -1,0 +1,28 @@
+"""`--scheduler`, where a command can hand its work to a cluster."""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from typing import Annotated
+
+import typer
+
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Of a dask scheduler, whose workers (dask worker ADDRESS --nthreads 1) do it; no common disk is needed.",
+    ),
+]
+
+
+@contextmanager
+def cluster_if(scheduler: str | None) -> Iterator[Executor | None]:
+    """None without a scheduler. Raises StudyError where the cluster cannot be used."""
+    if scheduler is None:
+        yield None
+        return
+    from study.workflows.cluster import cluster_workers
+
+    with cluster_workers(scheduler, one_thread=True) as executor:
+        yield executor

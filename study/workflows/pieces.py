@@ -1,0 +1,44 @@
+"""Pieces of work on an executor, at home or on a cluster: each with its result as soon as that is there."""
+
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from itertools import islice
+from typing import Any, TypeVar
+
+Key = TypeVar("Key")
+Result = TypeVar("Result")
+AHEAD = 100
+"""Pieces handed over at once, more than a cluster has workers: results and inputs of no more of them are in memory."""
+
+
+def finished_pieces(
+    executor: Executor,
+    function: Callable[..., Result],
+    pieces: Iterable[tuple[Key, tuple[Any, ...]]],
+    ahead: int = AHEAD,
+) -> Iterator[tuple[Key, Result]]:
+    """Call `function(*arguments)` for each (key, arguments), and yield (key, result) in the order of finishing.
+
+    function, arguments and results are sent between processes. Exceptions of the function are raised here; whatever
+    ends this early cancels what was not begun. pieces: taken as they are needed.
+    """
+    waiting, running = iter(pieces), dict[Future[Result], Key]()
+    try:
+        while True:
+            for key, arguments in islice(waiting, ahead - len(running)):
+                running[executor.submit(_work, tuple(sys.argv), function, arguments)] = key
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                key = running.pop(future)
+                yield key, future.result()
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _work(command: tuple[str, ...], function: Callable[..., Result], arguments: tuple[Any, ...]) -> Result:
+    """Runs in a worker. command: what was typed, which the provenance of results says, and not how a worker began."""
+    sys.argv = list(command)
+    return function(*arguments)
