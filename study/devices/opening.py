@@ -19,6 +19,7 @@ from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
 
 if TYPE_CHECKING:
+    from study.devices.onset_line import OnsetLine
     from study.devices.telemetry import TelemetryReader
 
 SIMULATED = "simulated"
@@ -88,6 +89,15 @@ def telemetry_of(path: str) -> "TelemetryReader":
     from study.devices.telemetry import TelemetryReader
 
     return TelemetryReader(Path(path))
+
+
+def onset_line() -> "OnsetLine | None":
+    """The line for onset pulses that the lab's file names; None where it names none. Raises `DeviceError`."""
+    from study.devices.force_dimension.lab import read_lab
+    from study.devices.onset_line import open_onset_line
+
+    settings = read_lab().pulse
+    return None if settings is None else open_onset_line(settings)
 
 
 def before_others() -> AbstractContextManager[object]:

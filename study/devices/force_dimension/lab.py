@@ -11,6 +11,7 @@ from pydantic.dataclasses import dataclass
 from protocols.definition.staircase_rule import STRICT
 from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.serial_reader import SerialAccelerometer, open_serial
+from study.devices.onset_line import PulseSettings
 from study.errors import DeviceError
 
 Triple = tuple[float, float, float]
@@ -51,6 +52,8 @@ class LabSettings:
     effective_mass_kg: float | None = Field(default=None, ge=0.01, le=5)
     """What the centring spring moves, at the handle. None: the assumption in the table of models."""
     accelerometer: SensorSettings | None = None
+    pulse: PulseSettings | None = None
+    """A line that gets a pulse at the onset of each trial's force."""
 
 
 def lab_file() -> Path:

@@ -16,6 +16,7 @@ from study.session.facts.events import (
     Event,
     FormFilled,
     NoteTaken,
+    OnsetPulsed,
     PauseTaken,
     PlaceTaken,
     RestTaken,
@@ -92,6 +93,9 @@ def _describe_other(event: Event) -> str:
             return "The demonstration is over."
         case PauseTaken():
             return f"A pause of {_seconds(event.paused_s)}, asked for by the {event.who}."
+        case OnsetPulsed():
+            sent = "was sent" if event.pulsed_s is not None else f"was lost: {_one_line(event.trouble)}"
+            return f"Onset pulse, {_one_line(event.line)}: {sent}."
         case NoteTaken():
             return f"{'Adverse event' if event.adverse else 'Note'} by the {event.who}: {_one_line(event.text)}"
         case _:

@@ -36,6 +36,7 @@ from study.session.facts.sitting_events import (
     DoseElsewhere,
     FormFilled,
     NoteTaken,
+    OnsetPulsed,
     PauseTaken,
     PlaceTaken,
     RestTaken,
@@ -54,6 +55,7 @@ __all__ = [
     "Event",
     "FormFilled",
     "NoteTaken",
+    "OnsetPulsed",
     "PauseTaken",
     "PlaceTaken",
     "RestTaken",
@@ -228,6 +230,7 @@ Event = (
     | PauseTaken
     | PlaceTaken
     | NoteTaken
+    | OnsetPulsed
     | SessionInterrupted
     | SessionResumed
     | SessionClosed

@@ -79,6 +79,22 @@ class DemoPlayed:
 
 
 @dataclass(frozen=True, config=FACT)
+class OnsetPulsed:
+    """A pulse on the lab's line, sent as the device had begun the trial's force; logged when the trial is over."""
+
+    utc: UtcTime
+    run: Index
+    trial: Index
+    attempt: Index
+    line: str
+    pulsed_s: Seconds | None
+    """Monotonic clock of the session as the line had taken it; null: lost, see `trouble`."""
+    trouble: str = ""
+    monotonic_s: Seconds | None = None
+    event: Literal["onset_pulsed"] = "onset_pulsed"
+
+
+@dataclass(frozen=True, config=FACT)
 class DemoFinished:
     utc: UtcTime
     monotonic_s: Seconds | None = None

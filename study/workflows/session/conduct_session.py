@@ -1,12 +1,12 @@
 """Conduct a whole sitting, from opening the device to closing the log."""
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault
-from study.devices.opening import open_device
+from study.devices.opening import onset_line, open_device
 from study.session.state.state import SessionState
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import write_live
@@ -30,7 +30,7 @@ from study.workflows.session.run_session import run_session
 from study.workflows.trial.display import Display, Hand
 from study.workflows.trial.requests_port import ManyRequests, QueuedRequests, Requests
 from study.workflows.trial.session_supervisor import SessionSupervisor
-from study.workflows.trial.sitting import Sitting, tell, tell_clock_steps
+from study.workflows.trial.sitting import Pulse, Sitting, no_pulse, tell, tell_clock_steps
 
 
 def _ignore_opened(folder: SessionFolder, device: Device) -> None:
@@ -66,10 +66,13 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
     """Open the device, then a new session, and run it."""
     check_playable(plan.protocol, plan.model)
     settings = device_settings(plan.protocol)
-    with contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device:
+    with (
+        _pulses(participant.clock) as pulse,
+        contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
+    ):
         equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
         with open_session(plan, device.info, equalized, participant.clock) as opened:
-            return _run(opened, device, equalized, participant)
+            return _run(opened, At(device, equalized, pulse), participant)
 
 
 def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> Conducted:
@@ -78,17 +81,39 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
     if state.opened.equalized is not None:
         load_equalizer()
     settings = device_settings(state.protocol)
-    with contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device:
+    with (
+        _pulses(participant.clock) as pulse,
+        contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
+    ):
         equalized = reload_equalizer(folder, state, device.info)
         with resume_session(folder, device.info, participant.clock) as opened:
-            return _run(opened, device, equalized, participant, known_steps=len(state.sitting.clock_steps))
+            known_steps = len(state.sitting.clock_steps)
+            return _run(opened, At(device, equalized, pulse), participant, known_steps)
 
 
-def _run(
-    opened: OpenedSession, device: Device, equalized: Equalized, participant: Participant, known_steps: int = 0
-) -> Conducted:
+@contextlib.contextmanager
+def _pulses(clock: Clock) -> Iterator[Callable[[], Pulse | None]]:
+    """On the lab's line; none in virtual time, which passes faster than a recorder's."""
+    line = None if clock.virtual else onset_line()
+    try:
+        yield no_pulse if line is None else line.pulse
+    finally:
+        if line is not None:
+            line.close()
+
+
+@dataclass(frozen=True, slots=True)
+class At:
+    """What the participant is at."""
+
+    device: Device
+    equalized: Equalized
+    pulse: Callable[[], Pulse | None]
+
+
+def _run(opened: OpenedSession, at: At, participant: Participant, known_steps: int = 0) -> Conducted:
     """Run the session. known_steps: clock steps before this sitting; only new ones are reported."""
-    folder, protocol = opened.folder, opened.state.protocol
+    folder, protocol, device = opened.folder, opened.state.protocol, at.device
     participant.on_opened(folder, device)
     place_m = device_settings(protocol).place_m
     inbox = RequestInbox(folder.path)
@@ -105,11 +130,12 @@ def _run(
         log=opened.log,
         clock=participant.clock,
         device=device,
-        equalizer=equalized.equalizer,
+        equalizer=at.equalized.equalizer,
         display=participant.display,
         hand=participant.hand,
         supervisor=supervisor,
         place_m=place_m,
+        pulse=at.pulse,
     )
     tell_clock_steps(opened.state.sitting.clock_steps[known_steps:], sitting)
     for name in opened.state.sitting.not_counted:

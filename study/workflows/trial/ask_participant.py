@@ -10,7 +10,7 @@ from study.session.state.state import SessionState
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.stimulus import direction_vector, held_stimulus
 from study.session.views.views import Answered, PlayingNotice, Question, Reply, Unanswered
-from study.workflows.trial.sitting import Sitting, release_device
+from study.workflows.trial.sitting import Pulse, Sitting, release_device
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +29,8 @@ class Asked:
     """It still has to be released."""
     health: Health | None = None
     """Counters of the device at the answer; None if the question was not reached."""
+    pulse: Pulse | None = None
+    """At the onset of the force; None where the lab has no line for it, or the force did not begin."""
 
 
 def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
@@ -37,34 +39,38 @@ def ask_participant(state: SessionState, present: Present, question: Question, s
     if present.phase is Phase.DETECTION:
         return _in_one_of_two_intervals(state, present, question, sitting)
     sitting.device.hold(_stimulus(state, present, sitting))
+    pulse = sitting.pulse()
     sitting.hand.feel(present, state.answers)
     started_s = sitting.clock.now_s()
     reply = _reply_to(question, sitting)
     sitting.device.keep_alive()
     health = sitting.device.health()
-    return Asked(reply, started_s, health.fault is Fault.NONE, played=None, holding=True, health=health)
+    whole = health.fault is Fault.NONE
+    return Asked(reply, started_s, whole, played=None, holding=True, health=health, pulse=pulse)
 
 
 def _in_one_of_two_intervals(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
     played: Played | None = None
+    pulse: Pulse | None = None
     sitting.hand.feel(present, state.answers)
     for interval in (1, 2):
         holding = interval == present.label
         if holding:
             sitting.device.hold(_stimulus(state, present, sitting))
+            pulse = sitting.pulse()
         cut = _wait(f"Interval {interval}", interval, state.protocol.detection.interval_s, sitting)
         if cut is not None:
-            return Asked(cut, sitting.clock.now_s(), False, played, holding)
+            return Asked(cut, sitting.clock.now_s(), False, played, holding, pulse=pulse)
         if holding:
             played = release_device(sitting)
         cut = _wait("", 0, state.protocol.detection.gap_s, sitting) if interval == 1 else None
         if cut is not None:
-            return Asked(cut, sitting.clock.now_s(), False, played, holding=False)
+            return Asked(cut, sitting.clock.now_s(), False, played, holding=False, pulse=pulse)
     started_s = sitting.clock.now_s()
     reply = _reply_to(question, sitting)
     health = played.health if played is not None else None
     whole = health is not None and health.fault is Fault.NONE
-    return Asked(reply, started_s, whole, played, holding=False, health=health)
+    return Asked(reply, started_s, whole, played, holding=False, health=health, pulse=pulse)
 
 
 def _reply_to(question: Question, sitting: Sitting) -> Reply:

@@ -8,7 +8,7 @@ from protocols.definition.apparatus import Plane
 from protocols.definition.exposure import GateSettings
 from protocols.trial import Phase, VoidCause
 from study.devices.device import Fault, Played
-from study.session.facts.events import AnswerGiven
+from study.session.facts.events import AnswerGiven, OnsetPulsed
 from study.session.state.due_trial import Present, labels_are_swapped
 from study.session.state.progress import progress
 from study.session.state.state import SessionState, repeats_left
@@ -18,7 +18,7 @@ from study.session.views.views import HandleView, Question, Task, Unanswered, pi
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
 from study.workflows.trial.ask_participant import Asked, ask_participant
 from study.workflows.trial.judge_trial import cause_of, judge
-from study.workflows.trial.sitting import Sitting, record, release_device
+from study.workflows.trial.sitting import Pulse, Sitting, record, release_device
 from study.workflows.trial.trial_facts import Outcome, answer_health, trial_measured, trial_presented, trial_spoiled
 
 
@@ -98,6 +98,8 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
     question = question_of(state, present)
     state = record(state, trial_presented(present, sitting), sitting)
     asked = ask_participant(state, present, question, sitting)
+    if asked.pulse is not None:
+        state = _log_pulse(state, present, asked.pulse, sitting)
     if isinstance(asked.reply, Unanswered):
         return _void(state, present, asked, asked.reply, sitting)
     answer = AnswerGiven(
@@ -112,6 +114,23 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
     state = record(state, answer, sitting)
     played = asked.played if asked.played is not None else release_device(sitting)
     return _close(state, present, played, asked, sitting)
+
+
+def _log_pulse(state: SessionState, present: Present, pulse: Pulse, sitting: Sitting) -> SessionState:
+    """Now, and not as it was sent: no write to the disk may fall between the onset and the question."""
+    fact = OnsetPulsed(
+        utc=sitting.clock.utc(),
+        run=present.run,
+        trial=present.trial,
+        attempt=present.attempt,
+        line=pulse.line,
+        pulsed_s=pulse.at_s,
+        trouble=pulse.trouble,
+    )
+    state = record(state, fact, sitting)
+    if pulse.trouble:
+        sitting.display.trouble(f"The onset pulse of this trial was lost ({pulse.line}: {pulse.trouble}).")
+    return state
 
 
 def _close(state: SessionState, present: Present, played: Played, asked: Asked, sitting: Sitting) -> AfterTrial:

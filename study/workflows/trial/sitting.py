@@ -1,7 +1,9 @@
 """The ports of one sitting, and how facts enter its state: only through the log."""
 
 import contextlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from equalizer.tracking.feedforward.equalizer import Equalizer
 from study.devices.clock import Clock
@@ -17,6 +19,23 @@ from study.workflows.trial.display import Display, Hand
 from study.workflows.trial.session_supervisor import SessionSupervisor
 
 
+class Pulse(Protocol):
+    """As `study.devices.onset_line` gives it."""
+
+    @property
+    def line(self) -> str: ...
+
+    @property
+    def at_s(self) -> float | None: ...
+
+    @property
+    def trouble(self) -> str: ...
+
+
+def no_pulse() -> None:
+    """Where the lab has no line for onset pulses."""
+
+
 @dataclass(frozen=True, slots=True)
 class Sitting:
     folder: SessionFolder
@@ -29,6 +48,8 @@ class Sitting:
     supervisor: SessionSupervisor
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Centre of the spring, where the handle belongs."""
+    pulse: Callable[[], Pulse | None] = no_pulse
+    """Gives a pulse on the lab's line, right after the device has begun a trial's force. Never raises."""
 
 
 def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:

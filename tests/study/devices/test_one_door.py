@@ -38,7 +38,10 @@ NAMED_IN = {
 CALLED_IN = {
     "CompiledRig": {"study/devices/simulated/omega3.py", "study/devices/replay/replay_rig.py"},
     "advance": {"study/devices/drive/runner.py"},
-    "write": {"study/devices/drive/stepped_runner.py"},
+    "write": {
+        "study/devices/drive/stepped_runner.py",
+        "study/devices/onset_line.py",  # to a serial line, no rig
+    },
 }
 """`write` and `advance` count inside study/devices only: files are written elsewhere."""
 

@@ -25,9 +25,10 @@ def test_the_tests_named_in_the_hardware_page_exist():
     assert missing == []
 
 
-def test_the_example_of_a_lab_s_file_is_one():
-    (example,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
-    lab = TypeAdapter(LabSettings).validate_python(tomllib.loads(example))
+def test_the_examples_of_a_lab_s_file_are_one():
+    examples = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    lab = TypeAdapter(LabSettings).validate_python(tomllib.loads("".join(examples)))
+    assert lab.pulse is not None
     assert lab.effective_mass_kg == MODELS["omega3"].effective_mass_kg
     assert lab.accelerometer is not None
 

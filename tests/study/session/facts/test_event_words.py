@@ -16,6 +16,7 @@ from study.session.facts.events import (
     Event,
     FormFilled,
     NoteTaken,
+    OnsetPulsed,
     PauseTaken,
     PlaceTaken,
     RestTaken,
@@ -72,6 +73,8 @@ SENTENCES = [
     (DemoPlayed(UTC, 5.0, 2.0, 1, 135.0, 2.0), "Demonstration: direction 1 at 5 Hz, 2 N, for 2 s."),
     (DemoFinished(UTC), "The demonstration is over."),
     (PauseTaken(UTC, "participant", 185.0), "A pause of 3 min, asked for by the participant."),
+    (OnsetPulsed(UTC, 0, 1, 0, "DTR of COM3", 2.5), "Onset pulse, DTR of COM3: was sent."),
+    (OnsetPulsed(UTC, 0, 1, 0, "DTR", None, "gone"), "Onset pulse, DTR: was lost: gone."),
     (NoteTaken(UTC, "experimenter", "door\nslammed"), "Note by the experimenter: door slammed"),
     (NoteTaken(UTC, "experimenter", "numb thumb", adverse=True), "Adverse event by the experimenter: numb thumb"),
 ]
