@@ -85,6 +85,39 @@ class SetupSettings:
 
 
 @dataclass(frozen=True, config=STRICT)
+class MaskingSettings:
+    """Noise that the program plays from its own sound output, so that the device is not heard: pink, as that of
+    `hapteq noise`."""
+
+    play: Annotated[
+        bool,
+        Field(
+            description="Whether the program plays it, from before the demonstration to the end but for pauses, and "
+            "begins no session of a person where it cannot. Default: no, the lab plays the file of `hapteq noise`."
+        ),
+    ] = False
+    level_db: Annotated[
+        float,
+        Field(
+            ge=-60,
+            le=0,
+            description="Level, re the file of `hapteq noise`; its highest sample lies 3 dB below full scale. What a "
+            "participant hears depends on the output: measure it there. Default -20.",
+        ),
+    ] = -20.0
+    low_hz: Annotated[float, Field(ge=1, le=20_000, description="Lower corner. Default 40.")] = 40.0
+    high_hz: Annotated[float, Field(ge=1, le=20_000, description="Upper corner. Default 8000.")] = 8000.0
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1, description="Another seed gives other noise. Default 1.")] = 1
+
+    @model_validator(mode="after")
+    def _has_band(self) -> Self:
+        if self.high_hz < self.low_hz + 1:
+            wrong = f"is {self.high_hz:g}, not above low_hz by 1 Hz"
+            refuse([Problem("high_hz", wrong, f"at least {self.low_hz + 1:g}")])
+        return self
+
+
+@dataclass(frozen=True, config=STRICT)
 class DemoSettings:
     """Both directions at every frequency, labelled, before anything is asked."""
 

@@ -13,6 +13,7 @@ from protocols.definition.preparation import (
     ConsentSettings,
     DebriefQuestion,
     DemoSettings,
+    MaskingSettings,
     PracticeSettings,
     SetupSettings,
 )
@@ -263,6 +264,7 @@ class StudyProtocol:
     measurement: MeasurementSettings = Field(default_factory=MeasurementSettings)
     consent: ConsentSettings = Field(default_factory=ConsentSettings)
     setup: SetupSettings = Field(default_factory=SetupSettings)
+    masking: MaskingSettings = Field(default_factory=MaskingSettings)
     demo: DemoSettings = Field(default_factory=DemoSettings)
     practice: PracticeSettings = Field(default_factory=PracticeSettings)
     detection: DetectionSettings = Field(default_factory=DetectionSettings)

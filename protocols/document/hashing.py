@@ -7,7 +7,13 @@ from typing import Any
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.definition.plausibility import UNTOUCHED
-from protocols.definition.preparation import ConsentSettings, DemoSettings, PracticeSettings, SetupSettings
+from protocols.definition.preparation import (
+    ConsentSettings,
+    DemoSettings,
+    MaskingSettings,
+    PracticeSettings,
+    SetupSettings,
+)
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.dumping import protocol_values
@@ -17,6 +23,7 @@ Untouched = str | float | bool | list[Any] | dict[str, Any]
 TABLES_SINCE = {
     "consent": ConsentSettings(),
     "setup": SetupSettings(),
+    "masking": MaskingSettings(),
     "demo": DemoSettings(),
     "practice": PracticeSettings(),
     "detection": DetectionSettings(),

@@ -19,6 +19,7 @@ from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
 
 if TYPE_CHECKING:
+    from study.devices.masking_sound import MaskingSound, Samples
     from study.devices.onset_line import OnsetLine
     from study.devices.telemetry import TelemetryReader
 
@@ -98,6 +99,13 @@ def onset_line() -> "OnsetLine | None":
 
     settings = read_lab().pulse
     return None if settings is None else open_onset_line(settings)
+
+
+def masking_sound(samples: "Samples", rate_hz: int) -> "MaskingSound":
+    """Noise in a loop from the system's sound output, silent as yet. Raises `DeviceError` where there is none."""
+    from study.devices.masking_sound import MaskingSound, open_stream
+
+    return MaskingSound(samples, rate_hz, open_stream)
 
 
 def before_others() -> AbstractContextManager[object]:

@@ -15,6 +15,7 @@ from study.session.facts.events import (
     DeviceFacts,
     Event,
     FormFilled,
+    MaskingPlayed,
     NoteTaken,
     OnsetPulsed,
     PauseTaken,
@@ -93,13 +94,24 @@ def _describe_other(event: Event) -> str:
             return "The demonstration is over."
         case PauseTaken():
             return f"A pause of {_seconds(event.paused_s)}, asked for by the {event.who}."
-        case OnsetPulsed():
-            sent = "was sent" if event.pulsed_s is not None else f"was lost: {_one_line(event.trouble)}"
-            return f"Onset pulse, {_one_line(event.line)}: {sent}."
+        case OnsetPulsed() | MaskingPlayed():
+            return _describe_beside(event)
         case NoteTaken():
             return f"{'Adverse event' if event.adverse else 'Note'} by the {event.who}: {_one_line(event.text)}"
         case _:
             return f"{event.event.replace('_', ' ').capitalize()}."
+
+
+def _describe_beside(event: OnsetPulsed | MaskingPlayed) -> str:
+    if isinstance(event, OnsetPulsed):
+        sent = "was sent" if event.pulsed_s is not None else f"was lost: {_one_line(event.trouble)}"
+        return f"Onset pulse, {_one_line(event.line)}: {sent}."
+    if event.trouble:
+        return f"The masking noise fell silent: {_whole(event.trouble)}"
+    if not event.playing:
+        return "The masking noise was stopped."
+    band = f"{event.low_hz:g} to {event.high_hz:g} Hz"
+    return f"Masking noise on {_one_line(event.output)}: {event.level_db:g} dB, {band}, seed {event.seed}."
 
 
 def _describe_sitting(event: SessionOpened | SessionResumed | SessionInterrupted | SessionClosed) -> str:

@@ -35,6 +35,7 @@ from study.session.facts.sitting_events import (
     DeviceChecked,
     DoseElsewhere,
     FormFilled,
+    MaskingPlayed,
     NoteTaken,
     OnsetPulsed,
     PauseTaken,
@@ -54,6 +55,7 @@ __all__ = [
     "DeviceFacts",
     "Event",
     "FormFilled",
+    "MaskingPlayed",
     "NoteTaken",
     "OnsetPulsed",
     "PauseTaken",
@@ -230,6 +232,7 @@ Event = (
     | PauseTaken
     | PlaceTaken
     | NoteTaken
+    | MaskingPlayed
     | OnsetPulsed
     | SessionInterrupted
     | SessionResumed

@@ -95,6 +95,24 @@ class OnsetPulsed:
 
 
 @dataclass(frozen=True, config=FACT)
+class MaskingPlayed:
+    """From here on the program plays masking noise, or does no more."""
+
+    utc: UtcTime
+    playing: bool
+    output: str
+    level_db: float
+    """Re the file of `hapteq noise`."""
+    low_hz: FrequencyHz
+    high_hz: FrequencyHz
+    seed: Count
+    trouble: str = ""
+    """Why it fell silent, where it was not stopped."""
+    monotonic_s: Seconds | None = None
+    event: Literal["masking_played"] = "masking_played"
+
+
+@dataclass(frozen=True, config=FACT)
 class DemoFinished:
     utc: UtcTime
     monotonic_s: Seconds | None = None

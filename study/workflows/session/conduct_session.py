@@ -28,9 +28,10 @@ from study.workflows.session.open_session import (
 from study.workflows.session.resume_session import resume_session
 from study.workflows.session.run_session import run_session
 from study.workflows.trial.display import Display, Hand
+from study.workflows.trial.masking import opened_sound
 from study.workflows.trial.requests_port import ManyRequests, QueuedRequests, Requests
 from study.workflows.trial.session_supervisor import SessionSupervisor
-from study.workflows.trial.sitting import Pulse, Sitting, no_pulse, tell, tell_clock_steps
+from study.workflows.trial.sitting import Pulse, Sitting, Sound, no_pulse, tell, tell_clock_steps
 
 
 def _ignore_opened(folder: SessionFolder, device: Device) -> None:
@@ -68,11 +69,12 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
     settings = device_settings(plan.protocol)
     with (
         _pulses(participant.clock) as pulse,
+        opened_sound(plan.protocol.masking, participant.clock) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
     ):
         equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
         with open_session(plan, device.info, equalized, participant.clock) as opened:
-            return _run(opened, At(device, equalized, pulse), participant)
+            return _run(opened, At(device, equalized, pulse, sound), participant)
 
 
 def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> Conducted:
@@ -83,12 +85,13 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
     settings = device_settings(state.protocol)
     with (
         _pulses(participant.clock) as pulse,
+        opened_sound(state.protocol.masking, participant.clock) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
     ):
         equalized = reload_equalizer(folder, state, device.info)
         with resume_session(folder, device.info, participant.clock) as opened:
             known_steps = len(state.sitting.clock_steps)
-            return _run(opened, At(device, equalized, pulse), participant, known_steps)
+            return _run(opened, At(device, equalized, pulse, sound), participant, known_steps)
 
 
 @contextlib.contextmanager
@@ -109,6 +112,7 @@ class At:
     device: Device
     equalized: Equalized
     pulse: Callable[[], Pulse | None]
+    sound: Sound | None
 
 
 def _run(opened: OpenedSession, at: At, participant: Participant, known_steps: int = 0) -> Conducted:
@@ -136,6 +140,7 @@ def _run(opened: OpenedSession, at: At, participant: Participant, known_steps: i
         supervisor=supervisor,
         place_m=place_m,
         pulse=at.pulse,
+        sound=at.sound,
     )
     tell_clock_steps(opened.state.sitting.clock_steps[known_steps:], sitting)
     for name in opened.state.sitting.not_counted:

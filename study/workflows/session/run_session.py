@@ -22,6 +22,7 @@ from study.workflows.session.participant_number import take_place
 from study.workflows.session.prepare_sitting import fill_in, prepare_sitting, turn_away
 from study.workflows.trial.after_trial import AfterTrial
 from study.workflows.trial.demonstrate import demonstrate
+from study.workflows.trial.masking import check_masking, start_masking, stop_masking
 from study.workflows.trial.present_trial import present_trial
 from study.workflows.trial.sitting import Sitting, record, tell, write_notes
 from study.workflows.trial.take_pause import take_pause
@@ -76,7 +77,7 @@ def _sit(state: SessionState, sitting: Sitting) -> SessionEnd:
         return SessionEnd(turn_away(state, sitting), refused)
     if refused:
         return _end(AfterTrial(state, leave=refused), sitting)
-    state = take_place(state, sitting)
+    state = start_masking(take_place(state, sitting), sitting)
     sitting.supervisor.begin("instructions")
     sitting.display.welcome(_welcome(state, sitting))
     return _loop(state, sitting)
@@ -123,7 +124,7 @@ def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
         state = write_notes(state, sitting)
         action = next_action(state, sitting.clock.utc(), sitting.clock.now_s())
         if isinstance(action, Finish):
-            state = _say_busy(state, sitting)
+            state = stop_masking(_say_busy(state, sitting), sitting)
             closed = SessionClosed(utc=sitting.clock.utc(), outcome="completed")
             state = record(state, closed, sitting)
             seal_log(sitting.folder.log)
@@ -134,8 +135,10 @@ def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
             after = replace(after, leave=after.leave or why_too_many(voids))
         pause = _pause_wanted(after, sitting)
         if pause and not after.leave:
-            broken = take_pause(after.state, pause, sitting)
-            after = replace(after, state=broken.state, leave=broken.leave)
+            broken = take_pause(stop_masking(after.state, sitting), pause, sitting)
+            goes_on = not broken.leave and not sitting.supervisor.stop_asked
+            state = start_masking(broken.state, sitting) if goes_on else broken.state
+            after = replace(after, state=state, leave=broken.leave)
             if broken.withdrawn:
                 return replace(_end(after, sitting), withdrawn=True)
         if stopped := sitting.supervisor.stop_asked:
@@ -156,7 +159,7 @@ def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
         case Demonstrate():
             return demonstrate(state, sitting)
         case Present() as present:
-            after = present_trial(state, present, sitting)
+            after = present_trial(check_masking(state, sitting), present, sitting)
             if not after.leave:
                 _finish_trial(after, present, state, sitting)
             return after
@@ -165,7 +168,7 @@ def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
 
 
 def _end(after: AfterTrial, sitting: Sitting) -> SessionEnd:
-    state = _say_busy(write_notes(after.state, sitting), sitting)
+    state = stop_masking(_say_busy(write_notes(after.state, sitting), sitting), sitting)
     left = SessionInterrupted(utc=sitting.clock.utc(), reason=after.leave)
     return SessionEnd(record(state, left, sitting), after.leave, after.fault)
 

@@ -32,6 +32,19 @@ class Pulse(Protocol):
     def trouble(self) -> str: ...
 
 
+class Sound(Protocol):
+    """Masking noise, as `study.devices.masking_sound` plays it. `start` and `check` raise `DeviceError`."""
+
+    @property
+    def output(self) -> str: ...
+
+    def start(self) -> None: ...
+
+    def check(self) -> None: ...
+
+    def stop(self) -> bool: ...
+
+
 def no_pulse() -> None:
     """Where the lab has no line for onset pulses."""
 
@@ -50,6 +63,7 @@ class Sitting:
     """Centre of the spring, where the handle belongs."""
     pulse: Callable[[], Pulse | None] = no_pulse
     """Gives a pulse on the lab's line, right after the device has begun a trial's force. Never raises."""
+    sound: Sound | None = None
 
 
 def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:

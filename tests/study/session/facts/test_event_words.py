@@ -15,6 +15,7 @@ from study.session.facts.events import (
     DeviceFacts,
     Event,
     FormFilled,
+    MaskingPlayed,
     NoteTaken,
     OnsetPulsed,
     PauseTaken,
@@ -73,6 +74,15 @@ SENTENCES = [
     (DemoPlayed(UTC, 5.0, 2.0, 1, 135.0, 2.0), "Demonstration: direction 1 at 5 Hz, 2 N, for 2 s."),
     (DemoFinished(UTC), "The demonstration is over."),
     (PauseTaken(UTC, "participant", 185.0), "A pause of 3 min, asked for by the participant."),
+    (
+        MaskingPlayed(UTC, True, "Headphones", -20.0, 40.0, 8000.0, 3),
+        "Masking noise on Headphones: -20 dB, 40 to 8000 Hz, seed 3.",
+    ),
+    (MaskingPlayed(UTC, False, "Headphones", -20.0, 40.0, 8000.0, 3), "The masking noise was stopped."),
+    (
+        MaskingPlayed(UTC, False, "Headphones", -20.0, 40.0, 8000.0, 3, "unplugged"),
+        "The masking noise fell silent: Unplugged.",
+    ),
     (OnsetPulsed(UTC, 0, 1, 0, "DTR of COM3", 2.5), "Onset pulse, DTR of COM3: was sent."),
     (OnsetPulsed(UTC, 0, 1, 0, "DTR", None, "gone"), "Onset pulse, DTR: was lost: gone."),
     (NoteTaken(UTC, "experimenter", "door\nslammed"), "Note by the experimenter: door slammed"),

@@ -1,0 +1,98 @@
+"""Masking noise from the computer's own sound output, in a loop without a seam, while a participant sits at the device.
+
+The library (PortAudio by sounddevice) is imported only where a protocol asks for noise, and takes the samples in a
+thread of its own.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import DeviceError
+
+Samples = NDArray[np.int16]
+Fill = Callable[[Any, int, Any, Any], None]
+"""fill(out, frames, time, status): the next frames into out (frames, 1)."""
+
+DO_NOW = (
+    "Install the extra (pip install '.[audio]'; on Linux also the package libportaudio2), connect a sound output and "
+    "choose it as the system's default. To play the noise otherwise, say play = false in [masking] of the protocol."
+)
+
+
+class Stream(Protocol):
+    """An output of the library."""
+
+    @property
+    def active(self) -> bool: ...
+
+    def start(self) -> None: ...
+
+    def stop(self) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class MaskingSound:
+    """samples (n,), looped. open_stream(rate_hz, fill) gives the output and its name, and raises what the library
+    raises. Raises `DeviceError` where there is no output."""
+
+    def __init__(self, samples: Samples, rate_hz: int, open_stream: Callable[[int, Fill], tuple[Stream, str]]) -> None:
+        self._samples, self._next = samples, 0
+        self._playing = False
+        with _as_device_error("cannot be played"):
+            self._stream, self.output = open_stream(rate_hz, self._fill)
+
+    def start(self) -> None:
+        """From its beginning. Raises `DeviceError`."""
+        self._next = 0
+        with _as_device_error("cannot be played"):
+            self._stream.start()
+            self._playing = True
+        self.check()
+
+    def check(self) -> None:
+        """Raises `DeviceError` where it should be heard and is not: an output that was unplugged."""
+        with _as_device_error("has stopped"):
+            if self._playing and not self._stream.active:
+                raise OSError(f"{self.output} plays no more")
+
+    def stop(self) -> bool:
+        """Silent at once. Whether it played until now. Never raises."""
+        played, self._playing = self._playing, False
+        if played:
+            with contextlib.suppress(Exception):
+                self._stream.stop()
+        return played
+
+    def close(self) -> None:
+        """Never raises."""
+        self.stop()
+        with contextlib.suppress(Exception):
+            self._stream.close()
+
+    def _fill(self, out: Any, frames: int, time: Any, status: Any) -> None:
+        places = (self._next + np.arange(frames)) % len(self._samples)
+        out[:, 0] = self._samples[places]
+        self._next = (self._next + frames) % len(self._samples)
+
+
+def open_stream(rate_hz: int, fill: Fill) -> tuple[Stream, str]:
+    """The system's default output. Raises what the library raises."""
+    import sounddevice
+
+    stream: Stream = sounddevice.OutputStream(samplerate=rate_hz, channels=1, dtype="int16", callback=fill)
+    return stream, str(sounddevice.query_devices(kind="output")["name"])
+
+
+@contextlib.contextmanager
+def _as_device_error(happened: str) -> Iterator[None]:
+    """The library's own errors have no common kind."""
+    try:
+        yield
+    except Exception as error:
+        reason = str(error) or type(error).__name__
+        raise DeviceError(f"The masking noise {happened}", f"{reason}.", DO_NOW) from error

@@ -1,0 +1,73 @@
+"""Masking noise of a sitting: begun before the first trial, silent in pauses, logged; without it no trial begins."""
+
+import contextlib
+from collections.abc import Iterator
+
+import numpy as np
+
+from equalizer.signals.masking_noise import masking_noise
+from protocols.definition.preparation import MaskingSettings
+from study.devices.clock import Clock
+from study.devices.opening import masking_sound
+from study.errors import DeviceError
+from study.session.facts.events import MaskingPlayed
+from study.session.state.state import SessionState
+from study.workflows.trial.sitting import Sitting, Sound, record
+
+SAMPLE_RATE_HZ = 44_100
+LOOP_S = 60
+"""Longer than a person remembers noise."""
+
+
+@contextlib.contextmanager
+def opened_sound(settings: MaskingSettings, clock: Clock) -> Iterator[Sound | None]:
+    """None where the protocol wants none, or no person is there (virtual time). Raises `DeviceError`: before a session
+    is begun."""
+    if not settings.play or clock.virtual:
+        yield None
+        return
+    samples = masking_noise(LOOP_S, settings.low_hz, settings.high_hz, settings.seed, SAMPLE_RATE_HZ)
+    quieter = np.rint(samples * 10 ** (settings.level_db / 20)).astype(np.int16)
+    with contextlib.closing(masking_sound(quieter, SAMPLE_RATE_HZ)) as sound:
+        yield sound
+
+
+def start_masking(state: SessionState, sitting: Sitting) -> SessionState:
+    """Raises `DeviceError`."""
+    if sitting.sound is None:
+        return state
+    sitting.sound.start()
+    return _log(state, sitting, sitting.sound, playing=True)
+
+
+def check_masking(state: SessionState, sitting: Sitting) -> SessionState:
+    """Before a trial. Raises `DeviceError` where it is not heard any more, which is logged first."""
+    if sitting.sound is None:
+        return state
+    try:
+        sitting.sound.check()
+    except DeviceError as error:
+        _log(state, sitting, sitting.sound, playing=False, trouble=error.happened)
+        raise
+    return state
+
+
+def stop_masking(state: SessionState, sitting: Sitting) -> SessionState:
+    if sitting.sound is None or not sitting.sound.stop():
+        return state
+    return _log(state, sitting, sitting.sound, playing=False)
+
+
+def _log(state: SessionState, sitting: Sitting, sound: Sound, playing: bool, trouble: str = "") -> SessionState:
+    settings = state.protocol.masking
+    fact = MaskingPlayed(
+        utc=sitting.clock.utc(),
+        playing=playing,
+        output=sound.output,
+        level_db=settings.level_db,
+        low_hz=settings.low_hz,
+        high_hz=settings.high_hz,
+        seed=settings.seed,
+        trouble=trouble,
+    )
+    return record(state, fact, sitting)
