@@ -14,6 +14,7 @@ from study.cli.seed import check_seed
 from study.errors import WrongUseError
 
 if TYPE_CHECKING:
+    from analysis.psychophysics.power.felt_delivery import FeltDelivery
     from analysis.psychophysics.power.simulated_study import Crowd
     from protocols.definition.study_protocol import StudyProtocol
 
@@ -26,6 +27,15 @@ PeopleOption = Annotated[
     typer.Option(
         help="attentive; some-guess (one in ten guesses); repeating (all ask again when unsure, as often as the "
         "protocol allows); criterion-drift (the liking for one answer drifts)."
+    ),
+]
+
+DeliveredOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DATA",
+        help="Sessions on a device (hapteq rehearse --subjects 1 makes one on the simulated omega.3): people feel what "
+        "was delivered there, along and across, with harmonics, and get numb. [default: they feel the command]",
     ),
 ]
 
@@ -45,6 +55,7 @@ def power(
     curve: CurveOption = "weibull",
     lapse: LapseOption = 0.02,
     people: PeopleOption = "attentive",
+    delivered: DeliveredOption = None,
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of all draws.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -57,6 +68,7 @@ def power(
 
     chosen = read_study_protocol(protocol, Path()).protocol
     crowd = _with_habits(_crowd(chosen, threshold_n, effect_db), people, curve, lapse, chosen.trial.repeats_per_run)
+    crowd = replace(crowd, delivery=_delivery(delivered, crowd.frequencies_hz))
     sizes = sample_sizes(subjects)
     plan = PowerPlan(crowd, chosen.staircase, sizes, studies, seed)
     title = f"{studies} studies of each of {len(sizes)} sizes"
@@ -82,6 +94,26 @@ def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "
         )
     raised_n = threshold_n * 10.0 ** (effect_db / 20.0)
     return Crowd(frequencies_hz, (*[threshold_n] * (len(frequencies_hz) - 1), raised_n))
+
+
+def _delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":
+    """Raises StudyError where the data tell nothing of a frequency."""
+    if data is None:
+        return None
+    from analysis.psychophysics.power.felt_delivery import felt_delivery
+    from study.participants.delivered_feeler import MPS2_PER_N
+    from study.participants.psychometric_curve import threshold_at
+    from study.workflows.results.collect_sessions import collect_sessions
+
+    flawless = [threshold_at(MPS2_PER_N, frequency_hz) for frequency_hz in frequencies_hz]
+    try:
+        return felt_delivery(collect_sessions(data).trials, frequencies_hz, flawless)
+    except ValueError as problem:
+        raise WrongUseError(
+            "It is not known what the device delivers",
+            f"In {data} there are {problem}.",
+            "Give sessions of the same frequencies whose acceleration was measured, or leave --delivered out.",
+        ) from problem
 
 
 def _with_habits(crowd: "Crowd", people: str, curve: str, lapse: float, repeats: int) -> "Crowd":

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.psychophysics.hierarchy.answers import Answers, tally
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, USUAL_SLOPE, Family
+from analysis.psychophysics.power.felt_delivery import FeltDelivery
 from analysis.psychophysics.power.staircase_kernel import (
     MOST_TRIALS,
     PackedRule,
@@ -50,6 +51,8 @@ class Crowd:
     """All ask for the same trial again within so many standard errors of their criterion, see `Participant`."""
     repeats: int = 0
     """At most so often in a run."""
+    delivery: FeltDelivery | None = None
+    """What of the commands they feel; None: the commands. Thresholds are then those on a flawless device."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,6 +110,18 @@ def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[i
     )
 
 
+def _feeling(participant: Participant, delivery: FeltDelivery | None, place: int) -> Participant:
+    if delivery is None:
+        return participant
+    one, two = (np.array(table) * (1.0, 1.0, 1.0, delivery.masking) for table in delivery.tables[place])
+    return participant._replace(
+        felt_1=one,
+        felt_2=two,
+        adaptation_db=delivery.adaptation_db,
+        adaptation_trials=delivery.adaptation_trials,
+    )
+
+
 def _empty_tracks(runs: int, reversals: int) -> Track:
     """Of all runs together, each with a leading axis (runs,)."""
     levels, sides, rights = (np.empty((runs, MOST_TRIALS)) for _ in range(3))
@@ -129,7 +144,7 @@ def _play_sessions(
         before = 0
         for place in habits.permutation(k):
             run = first + int(place)
-            participant = participants[run]._replace(
+            participant = _feeling(participants[run], crowd.delivery, int(place))._replace(
                 criterion_per_trial=drift, trials_before=before, unsure=crowd.unsure, repeats=crowd.repeats
             )
             if guesses:

@@ -56,6 +56,11 @@ def pack(rule: StaircaseRule) -> PackedRule:
     )
 
 
+AS_COMMANDED = np.empty((0, 4))
+NO_DIRECTION_DB = -400.0
+"""Felt of a motion that is a circle."""
+
+
 class Participant(NamedTuple):
     """One simulated participant at one frequency."""
 
@@ -73,6 +78,12 @@ class Participant(NamedTuple):
     """Asks for the same trial again where the average of all looks lies within so many standard errors."""
     repeats: int = 0
     """Of this run at the most."""
+    felt_1: FloatArray = AS_COMMANDED
+    """(n, 4): what is felt of direction 1, a `felt_delivery.Table` whose harmonics are weighted by how they mask."""
+    felt_2: FloatArray = AS_COMMANDED
+    adaptation_db: float = 0.0
+    """Rise of the threshold in a long run."""
+    adaptation_trials: float = 1.0
 
 
 class Track(NamedTuple):
@@ -106,6 +117,25 @@ def evidence(t: float, family: int) -> float:
     return q
 
 
+@njit(cache=True)
+def felt_db(person: Participant, level_db: float, first: bool, trial: int) -> float:
+    """The commanded level (dB) that is felt as much without a flaw and before any adaptation. trial: of the run."""
+    table = person.felt_1 if first else person.felt_2
+    felt = level_db
+    if len(table) > 0:
+        place = min(max(int(np.searchsorted(table[:, 0], level_db)), 1), len(table) - 1)
+        low, high = table[max(place - 1, 0)], table[place]
+        share = (level_db - low[0]) / (high[0] - low[0]) if high[0] > low[0] else 0.0
+        share = min(max(share, 0.0), 1.0)
+        along, across, harmonics = low[1:] + share * (high[1:] - low[1:])
+        directed = along**2 - across**2
+        felt += 10.0 * math.log10(directed) if directed > 0.0 else NO_DIRECTION_DB
+        felt -= 10.0 * math.log10(1.0 + harmonics**2 * 10.0 ** ((level_db - person.threshold_db) / 10.0))
+    if person.adaptation_db > 0.0:
+        felt += person.adaptation_db * math.expm1(-trial / person.adaptation_trials)
+    return felt
+
+
 MOST_LOOKS = 5
 """At one trial, as `study.participants.unsure`."""
 
@@ -130,7 +160,8 @@ def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> 
     limit = min(rule.trial_limit, MOST_TRIALS) if rule.trial_limit > 0 else MOST_TRIALS
     while reversals < rule.reversals and trials < limit:
         s = 1.0 if np.random.random() < 0.5 else -1.0
-        a = evidence(person.t0 + person.pace_per_db * (level - person.threshold_db), person.family) - s * (
+        felt = felt_db(person, level, s > 0.0, trials)
+        a = evidence(person.t0 + person.pace_per_db * (felt - person.threshold_db), person.family) - s * (
             person.criterion + person.criterion_per_trial * (person.trials_before + trials)
         )
         if person.unsure > 0.0:

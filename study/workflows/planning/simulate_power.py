@@ -27,7 +27,7 @@ from study.workflows.pieces import finished_pieces
 
 CHUNK = 10
 """Studies per piece of work: some seconds, so that little is lost when a worker dies."""
-HABITS_SINCE = ("guessers", "criterion_drift_sd", "unsure", "repeats")
+HABITS_SINCE = ("guessers", "criterion_drift_sd", "unsure", "repeats", "delivery")
 """Of a crowd; without them a folder that was begun earlier goes on."""
 FINISHED_NAME, RESULT_NAME = "studies.jsonl", "power.json"
 

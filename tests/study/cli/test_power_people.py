@@ -36,3 +36,20 @@ def test_unknown_people_are_refused_with_those_there_are(tmp_path, capsys, optio
     assert f"{option} is {name}." in said
     assert ("attentive, some-guess" in said) or ("weibull, logistic, gauss" in said)
     assert not (tmp_path / "no").exists()
+
+
+def test_people_feel_what_a_device_delivered_in_sessions(tmp_path, small_text, capsys):
+    (tmp_path / "small.toml").write_text(small_text)
+    small = ("--protocol", str(tmp_path / "small.toml"))
+    data = str(tmp_path / "data")
+    assert main(["study", *small, "--observer", "ideal", "--seed", "1", "--subject", "P01", "--data", data]) == 0
+    crowd = plan_of(tmp_path / "felt", *small, "--delivered", data)
+    tables = crowd["delivery"]["tables"]
+    assert len(tables) == len(crowd["frequencies_hz"])
+    rows = [row for pair in tables for table in pair for row in table]
+    assert max(along for _, along, _, _ in rows) > 0.5  # of the simulated omega.3, over its usual strength
+    assert all(0.0 < along < 2.5 and across < along for level_db, along, across, _ in rows if level_db > -6.0)
+    assert plan_of(tmp_path / "felt", *small, "--delivered", data) == crowd
+    assert main([*ASKED, *small, "--out", str(tmp_path / "felt")]) == 1  # another plan
+    assert main([*ASKED, "--out", str(tmp_path / "no"), "--delivered", data]) == 2
+    assert "no measured trials of both directions at" in capsys.readouterr().err

@@ -1,0 +1,66 @@
+"""What simulated people feel of a device: strength, coupling and harmonics by frequency, direction and level.
+
+As `study.participants.delivered_feeler`: the felt amplitude is sqrt(along^2 - across^2), harmonics add to the threshold
+in squares, a run numbs. The level matters, because friction eats weak forces.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.psychophysics.cues.delivered_cues import Cue, DeliveredTrials, delivered_trials
+from equalizer.signals.signal import FloatArray
+from protocols.trial import Trial
+
+Row = tuple[float, float, float, float]
+"""Level in dB re 1 N; amplitudes along, across, and of harmonics, over that of a flawless device at this level."""
+Table = tuple[Row, ...]
+"""By rising level. In between straight lines over dB, beyond the ends constant."""
+
+
+@dataclass(frozen=True, slots=True)
+class FeltDelivery:
+    tables: tuple[tuple[Table, Table], ...]
+    """Per frequency of the crowd: of direction 1 and 2."""
+    masking: float = 1.0
+    """By how much harmonics add to the threshold, in squares."""
+    adaptation_db: float = 1.0
+    """Rise of the threshold in a long run."""
+    adaptation_trials: float = 20.0
+    """After so many trials, 63 % of it has come."""
+
+
+def felt_delivery(
+    trials: Iterable[Trial], frequencies_hz: Sequence[float], flawless_mps2_per_n: Sequence[float]
+) -> FeltDelivery:
+    """Medians over the measured test trials, by levels rounded to 1 dB. flawless_mps2_per_n: along the direction, at
+    each frequency. What no trial was measured for counts as absent. Raises ValueError where a frequency lacks a
+    measured direction."""
+    groups = {group.frequency_hz: group for group in delivered_trials(trials)}
+    if missing := [f"{f:g} Hz" for f in frequencies_hz if f not in groups or len(set(groups[f].side.tolist())) < 2]:
+        raise ValueError(f"no measured trials of both directions at {', '.join(missing)}")
+    return FeltDelivery(
+        tuple(
+            (_table(groups[frequency_hz], 1.0, flawless), _table(groups[frequency_hz], -1.0, flawless))
+            for frequency_hz, flawless in zip(frequencies_hz, flawless_mps2_per_n, strict=True)
+        )
+    )
+
+
+def _table(group: DeliveredTrials, side: float, flawless: float) -> Table:
+    strength = 10.0 ** (group.values_db[Cue.INTENSITY] / 20.0) / flawless
+    columns = (strength, strength * _share(group, Cue.COUPLING), strength * _share(group, Cue.SPECTRUM))
+    rounded = np.round(group.nominal_db)
+    rows: list[Row] = []
+    for level_db in np.unique(rounded[group.side == side]):
+        mine = (group.side == side) & (rounded == level_db)
+        along, across, harmonics = (float(np.median(column[mine])) for column in columns)
+        rows.append((float(level_db), along, across, harmonics))
+    return tuple(rows)
+
+
+def _share(group: DeliveredTrials, cue: Cue) -> FloatArray:
+    """Amplitude over that along the direction (n,), of which the cue holds the sum; 0 where it was not measured."""
+    values_db = group.values_db.get(cue)
+    return np.zeros(len(group.side)) if values_db is None else np.nan_to_num(10.0 ** (values_db / 20.0) - 1.0)
