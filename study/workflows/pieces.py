@@ -20,8 +20,8 @@ def finished_pieces(
 ) -> Iterator[tuple[Key, Result]]:
     """Call `function(*arguments)` for each (key, arguments), and yield (key, result) in the order of finishing.
 
-    function, arguments and results are sent between processes. Exceptions of the function are raised here; whatever
-    ends this early cancels what was not begun. pieces: taken as they are needed.
+    function, arguments and results are sent between processes. Exceptions of the function are raised here. An early
+    end cancels what was not begun. pieces: taken as they are needed.
     """
     waiting, running = iter(pieces), dict[Future[Result], Key]()
     try:

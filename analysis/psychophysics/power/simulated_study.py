@@ -113,10 +113,10 @@ def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[i
 def _feeling(participant: Participant, delivery: FeltDelivery | None, place: int) -> Participant:
     if delivery is None:
         return participant
-    one, two = (np.array(table) * (1.0, 1.0, 1.0, delivery.masking) for table in delivery.tables[place])
+    first, second = (np.array(table) * (1.0, 1.0, 1.0, delivery.masking) for table in delivery.tables[place])
     return participant._replace(
-        felt_1=one,
-        felt_2=two,
+        felt_1=first,
+        felt_2=second,
         adaptation_db=delivery.adaptation_db,
         adaptation_trials=delivery.adaptation_trials,
     )
