@@ -23,6 +23,7 @@ from study.session.stimulus.timing_verdict import (
     lateness_of,
 )
 from study.session.views.views import DeviceFinding
+from study.workflows.checks.bare_loop import BareLoop
 
 LOOP_S = 0.1
 FADE_S = 0.05
@@ -40,6 +41,8 @@ class Timing:
     """Of the device's own loop."""
     lateness: Lateness
     findings: tuple[DeviceFinding, ...]
+    bare: BareLoop | None = None
+    """A bare C loop at the same time; None where none was compared with."""
 
 
 def check_timing(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:

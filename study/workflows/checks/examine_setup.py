@@ -13,6 +13,7 @@ from study.session.stimulus.timing_verdict import judge_load
 from study.session.views.handle_notice import proof_notice
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.store.formats.protocol_files import read_study_protocol
+from study.workflows.checks.bare_loop import judge_beside, timed_beside
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_installation import Terminal, check_installation
 from study.workflows.checks.check_timing import Timing, check_timing
@@ -82,9 +83,16 @@ def _examine_device(
 
 
 def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
-    load = judge_load(load_per_processor())
-    timing = check_timing(device, clock, seconds, on_progress)
-    return replace(timing, findings=(*timing.findings, load))
+    load, simulated = judge_load(load_per_processor()), device.info.simulated
+    with timed_beside(seconds, device.info.sample_rate_hz, before_others=not simulated) as run:
+        timing = check_timing(device, clock, seconds, on_progress)
+    # A simulated device's own loop is never late: there, the wake-ups of this program are compared.
+    late, ticks = timing.health.late_ticks + timing.health.missed_ticks, timing.health.ticks
+    if simulated:
+        ticks = round(seconds * device.info.sample_rate_hz)
+        late = round(timing.lateness.missing_a_tick * ticks)
+    beside = judge_beside(late, ticks, run)
+    return replace(timing, findings=(*timing.findings, beside, load), bare=run.result)
 
 
 def _settings(name: str, timing_s: float) -> DeviceSettings:
