@@ -21,11 +21,13 @@ from study.errors import DeviceError
 LOOK_EVERY = 10
 """Readings: how often status and buttons are asked for. 100 times a second: a person cannot press faster."""
 
-STALE_FOR = 50
-"""Readings in a row that only repeat an earlier one: at 1 kHz half of what counts as a lost loop."""
+STALE_FOR, STALE_SHARE = 50, 0.5
+"""Readings that only repeat an earlier one: so many in a row, or as many beyond this share of all readings, end the
+force. At 1 kHz half of what counts as a lost loop."""
 
-SCALED_FOR = 5
-"""Forces in a row that the device cannot give in full. What a participant feels is then not what is written down."""
+SCALED_FOR, SCALED_SHARE = 5, 0.02
+"""The same of forces that the device cannot give in full: what a participant feels is then not what is written down.
+A force whose peaks alone are scaled is so only for some milliseconds in a row, again and again."""
 
 ROUNDING = 1 + 1e-9
 LOCK_S = 0.002
@@ -65,7 +67,8 @@ class ForceDimensionRig:
         self._handle = handle
         self._cap_n = min(cap_n, info.max_force_n)
         self._accelerometer = accelerometer
-        self._reads = self._stale = self._scaled = 0
+        self._reads = 0
+        self._stale = self._scaled = 0.0
         self._pressed: frozenset[int] = frozenset()
         self._sending = threading.Lock()
         self._sent_s, self._sent_zero = time.monotonic(), True
@@ -86,9 +89,9 @@ class ForceDimensionRig:
         except LibraryError as error:
             raise self._fail(f"The library says: {error}") from error
         self._reads += 1
-        self._stale = self._stale + 1 if repeated else 0
-        if self._stale >= STALE_FOR:
-            raise self._fail(f"It repeated its last position {self._stale} times")
+        self._stale = _beyond(self._stale, repeated, STALE_SHARE)
+        if self._stale >= STALE_FOR * (1.0 - STALE_SHARE):
+            raise self._fail("It repeats its last position again and again")
         reading[SENSOR_CLIPPED] = 0.0
         if self._accelerometer is not None:
             reading[ACCELERATION], clipped = self._accelerometer.latest()
@@ -154,8 +157,8 @@ class ForceDimensionRig:
         except LibraryError as error:
             raise self._fail(f"The library says: {error}") from error
         self._sent_s, self._sent_zero = time.monotonic(), x == y == z == 0.0
-        self._scaled = self._scaled + 1 if scaled else 0
-        if self._scaled >= SCALED_FOR:
+        self._scaled = _beyond(self._scaled, scaled, SCALED_SHARE)
+        if self._scaled >= SCALED_FOR * (1.0 - SCALED_SHARE):
             raise self._fail("Its motors cannot give the force that is asked for, and give less")
 
     def _write_zero(self) -> None:
@@ -168,7 +171,7 @@ class ForceDimensionRig:
             if not self._sent_zero and self._silent_for_too_long() and not (status := self._handle.status()).force_on:
                 # A force was cut off: its call may hang still, and must find a device that takes none.
                 self._fail(f"It let its force go: {status.why_off}")
-            self._sent_zero, self._scaled = True, 0
+            self._sent_zero, self._scaled = True, 0.0
             if not self._silent_for_too_long():
                 self._sent_s = time.monotonic()
         except LibraryError as error:
@@ -217,3 +220,8 @@ class ForceDimensionRig:
                 "Check its power and its cable, then open it again; a session goes on with `hapteq resume`.",
             )
         return self._failure
+
+
+def _beyond(count: float, happened: bool, share: float) -> float:
+    """How often something happened beyond this share of all times. A hair below the sum of its steps."""
+    return max(0.0, count + (1.0 if happened else 0.0) - share + 1e-12)

@@ -69,7 +69,7 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
     settings = device_settings(plan.protocol)
     with (
         _pulses(participant.clock) as pulse,
-        opened_sound(plan.protocol.masking, participant.clock) as sound,
+        opened_sound(plan.protocol.masking, participant.clock, plan.observer) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
     ):
         equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
@@ -85,7 +85,7 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
     settings = device_settings(state.protocol)
     with (
         _pulses(participant.clock) as pulse,
-        opened_sound(state.protocol.masking, participant.clock) as sound,
+        opened_sound(state.protocol.masking, participant.clock, state.opened.observer) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
     ):
         equalized = reload_equalizer(folder, state, device.info)

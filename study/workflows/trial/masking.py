@@ -20,10 +20,10 @@ LOOP_S = 60
 
 
 @contextlib.contextmanager
-def opened_sound(settings: MaskingSettings, clock: Clock) -> Iterator[Sound | None]:
-    """None where the protocol wants none, or no person is there (virtual time). Raises `DeviceError`: before a session
-    is begun."""
-    if not settings.play or clock.virtual:
+def opened_sound(settings: MaskingSettings, clock: Clock, observer: str | None) -> Iterator[Sound | None]:
+    """None where the protocol wants none, or no person is there (a simulated participant, virtual time). Raises
+    `DeviceError`: before a session is begun."""
+    if not settings.play or clock.virtual or observer is not None:
         yield None
         return
     samples = masking_noise(LOOP_S, settings.low_hz, settings.high_hz, settings.seed, SAMPLE_RATE_HZ)

@@ -30,6 +30,8 @@
   X(unplugged, 0) X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
   X(late_every, 0) X(late_s, 0) X(write_fails, 0) X(read_fails, 0) X(stop_fails, 0) X(buttons, 0)                      \
   X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
+  /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
+  X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0)                                                                \
   /* What wears: Coulomb friction in N, amplifiers, a mass that swings on the handle. */                               \
   X(friction, 0) X(gain, 1) X(mode_hz, 0) X(mode_kg, 0.02)                                                             \
   /* What a test may ask for. */                                                                                       \
@@ -172,9 +174,10 @@ static void catch_up(void) {
   if (p[wall_time]) run_to(wall_s() - started_s);
 }
 
-static void come_late(double count) {
-  if (p[late_every] > 0 && fmod(count, p[late_every]) == 0) {
-    double until_s = wall_s() + p[late_s];
+static int is_due(double count, double every) { return every <= 0 || fmod(count, every) == 0; }
+static void come_late(double count, double every, double late) {
+  if (every > 0 && is_due(count, every)) {
+    double until_s = wall_s() + late;
     while (wall_s() < until_s) {}
   }
 }
@@ -243,7 +246,7 @@ EXPORT int dhdGetStatus(int *status, char id) {
   PLAIN(memset(status, 0, 17 * sizeof(int)); status[0] = p[powered] != 0; status[1] = status[2] = 1;
         status[3] = p[calibrated] != 0; status[4] = !p[force_on] && !p[brake]; status[5] = p[force_on] != 0;
         status[6] = p[brake] != 0; status[10] = p[gravity] != 0; status[11] = p[guard] != 0;
-        status[14] = (int)p[cause]);
+        status[14] = (int)p[cause]; come_late(1, p[status_late_s] > 0, p[status_late_s]));
 }
 EXPORT int dhdEnableForce(unsigned char value, char id) {
   (void)id;
@@ -261,12 +264,13 @@ EXPORT int dhdGetPosition(double *px, double *py, double *pz, char id) {
   if (!code && p[read_fails]) code = fail((int)p[read_fails]);
   if (!code) {
     int stale = p[stale_every] > 0 && fmod(count, p[stale_every]) == 0;
-    if (!stale && !p[frozen]) memcpy(shown, x, sizeof x);
-    *px = p[no_number] ? NAN : shown[0] + p[jump_m], *py = shown[1], *pz = shown[2];
+    for (int i = 0; i < 3; i++)
+      if (!stale && !p[frozen] && p[frozen_axis] != i + 1) shown[i] = x[i];
+    *px = p[no_number] ? NAN : shown[0] + (is_due(count, p[jump_every]) ? p[jump_m] : 0), *py = shown[1], *pz = shown[2];
     code = stale ? 1 : 0;
   }
   end(code);
-  come_late(count);
+  come_late(count, p[late_every], p[late_s]);
   return code;
 }
 EXPORT int dhdGetLinearVelocity(double *vx, double *vy, double *vz, char id) {
@@ -278,7 +282,8 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
   int code = begin();
   if (!code && p[write_fails]) code = fail((int)p[write_fails]);
   if (!code) {
-    double asked = sqrt(x_n * x_n + y_n * y_n + z_n * z_n), most = fmin(p[max_n], p[scaled_from_n]);
+    double asked = sqrt(x_n * x_n + y_n * y_n + z_n * z_n), most = p[max_n];
+    if (is_due(p[writes], p[scaled_every])) most = fmin(most, p[scaled_from_n]);
     if (p[cap_n] >= 0) most = fmin(most, p[cap_n]);
     double share = asked > most * (1 + 1e-9) ? most / asked : 1;
     command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
@@ -288,7 +293,10 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
     code = share < 1 ? 2 : 0;
     if (!p[wall_time]) run_to(integrated_s + 0.001);
   }
-  return end(code);
+  double count = p[writes];
+  end(code);
+  come_late(count, p[write_late_every], p[write_late_s]);
+  return code;
 }
 EXPORT int dhdGetForce(double *x_n, double *y_n, double *z_n, char id) {
   (void)id;

@@ -50,7 +50,9 @@ def sound(monkeypatch, sitter):
     """In the place of the system's output; the protocol asks for noise."""
     sound = Sound()
     asks_for_noise(sitter)
-    monkeypatch.setattr(conduct_session, "opened_sound", lambda settings, clock: contextlib.nullcontext(sound))
+    monkeypatch.setattr(
+        conduct_session, "opened_sound", lambda settings, clock, observer: contextlib.nullcontext(sound)
+    )
     return sound
 
 
@@ -114,7 +116,7 @@ def test_the_level_is_below_that_of_the_file(monkeypatch):
     monkeypatch.setattr(masking, "masking_sound", open_sound)
     monkeypatch.setattr(masking, "LOOP_S", 1)
     for level_db in (0.0, -20.0):
-        with masking.opened_sound(replace(SETTINGS, level_db=level_db), RealClock()) as sound:
+        with masking.opened_sound(replace(SETTINGS, level_db=level_db), RealClock(), None) as sound:
             assert sound is not None
         assert sound.closed
     loud, quiet = (np.std(samples.astype(float)) for samples in given)
@@ -123,8 +125,9 @@ def test_the_level_is_below_that_of_the_file(monkeypatch):
 
 def test_nothing_is_opened_where_the_protocol_wants_none_or_no_person_is_there(monkeypatch):
     monkeypatch.setattr(masking, "masking_sound", lambda *arguments: 1 / 0)
-    for settings, clock in ((MaskingSettings(), RealClock()), (SETTINGS, VirtualClock())):
-        with masking.opened_sound(settings, clock) as sound:
+    none = ((MaskingSettings(), RealClock(), None), (SETTINGS, VirtualClock(), None), (SETTINGS, RealClock(), "ideal"))
+    for settings, clock, observer in none:
+        with masking.opened_sound(settings, clock, observer) as sound:
             assert sound is None
 
 
