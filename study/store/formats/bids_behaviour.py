@@ -5,6 +5,7 @@ Brain Imaging Data Structure 1.10, "Behavioral experiments (with no neural recor
 
 import json
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,20 @@ VERSION = "1.10.0"
 FIXED = ("subject", "session")
 """Part of the file name, and therefore no columns."""
 
+TASK = (
+    "Each trial plays a sinusoidal force at the hand, in one of two orthogonal directions; the participant answers "
+    "which. A staircase over the amplitude seeks the level at which 79.37 % of the answers are right."
+)
+QUESTION = "In which of the two directions did the force act? Answer 1 or 2."
+README = """# {name}
+
+{title}
+
+Trials of a study of force directions, exported by hapteq: per participant and session one table below `sub-*/ses-*/beh`, a row
+for each presentation. `task-*_beh.json` says what each column means and its unit; `code/protocol.toml` is the protocol with every
+number of the study, in the form that `hapteq study --protocol` takes.
+"""
+
 
 def write_bids(
     folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
@@ -29,16 +44,22 @@ def write_bids(
             "Name": name, "BIDSVersion": VERSION, "DatasetType": "raw",
             "GeneratedBy": [{"Name": "hapteq", "Version": str(facts.get("versions", {}).get("hapteq", ""))}],
         }),
-        _text(folder / "README.md", f"# {name}\n\nTrials of a study of force directions, exported by hapteq.\n"),
+        _text(folder / "README.md", README.format(name=name, title=_title(protocol_text))),
+        _text(folder / "CHANGES", "1.0.0\n  - As exported by hapteq.\n"),
         _text(folder / "code" / "protocol.toml", protocol_text),
         _json(folder / f"task-{task}_beh.json", {
             "TaskName": task,
+            "TaskDescription": f"{TASK} {_title(protocol_text)}".strip(),
+            "Instructions": QUESTION,
             **{column: _describe_column(column) for column in columns(Trial) if column not in FIXED},
         }),
     ]  # fmt: skip
     subjects = list(dict.fromkeys(trial.subject for trial in trials))
     rows = "".join(f"sub-{_label(subject)}\t{subject}\n" for subject in subjects)
     written.append(_text(folder / "participants.tsv", f"participant_id\tcode\n{rows}"))
+    written.append(
+        _json(folder / "participants.json", {"code": {"Description": "Code of the participant as recorded"}})
+    )
     for session in dict.fromkeys(trial.session for trial in trials):
         of = [trial for trial in trials if trial.session == session]
         sub, ses = f"sub-{_label(of[0].subject)}", f"ses-{_label(session)}"
@@ -51,6 +72,11 @@ def _tsv(trials: Sequence[Trial]) -> str:
     lines = [line.split(",") for line in rows_to_csv(trials, Trial).splitlines()]
     kept = [number for number, column in enumerate(columns(Trial)) if column not in FIXED]
     return "".join("\t".join(line[number] or "n/a" for number in kept) + "\n" for line in lines)
+
+
+def _title(protocol_text: str) -> str:
+    """Empty where the protocol has none."""
+    return str(tomllib.loads(protocol_text).get("title", ""))
 
 
 def _describe_column(column: str) -> dict[str, str]:

@@ -25,6 +25,13 @@ KIND = "Psych-DS dataset"
 OURS = "hapteq"
 """Key of the description with what only this program needs: protocol, seeds, devices."""
 
+README = """# {name}
+
+Trials of a study of force directions, exported by hapteq: one table per session below `data/`, a row for each presentation.
+`dataset_description.json` says what each column means and its unit. A row is identified by the columns session, run, trial and
+attempt. `materials/protocol.toml` is the protocol; `hapteq analyze` takes this folder.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class ExportedTrials:
@@ -64,7 +71,10 @@ def write_psych_ds(
         OURS: dict(facts),
     }
     write_text(folder / DESCRIPTION_NAME, json.dumps(description, indent=2, ensure_ascii=False) + "\n", overwrite=False)
-    return (*written, folder / PROTOCOL_NAME, folder / DESCRIPTION_NAME)
+    texts = {"README.md": README.format(name=name), "CHANGES.md": "# 1.0.0\n\nAs exported by hapteq.\n"}
+    for file_name, text in texts.items():
+        write_text(folder / file_name, text, overwrite=False)
+    return (*written, folder / PROTOCOL_NAME, folder / DESCRIPTION_NAME, *(folder / each for each in texts))
 
 
 def read_psych_ds(folder: Path) -> ExportedTrials:
