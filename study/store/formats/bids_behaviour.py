@@ -28,9 +28,9 @@ README = """# {name}
 
 {title}
 
-Trials of a study of force directions, exported by hapteq: per participant and session one table below `sub-*/ses-*/beh`, a row
-for each presentation. `task-*_beh.json` says what each column means and its unit; `code/protocol.toml` is the protocol with every
-number of the study, in the form that `hapteq study --protocol` takes.
+Trials of a study of force directions, exported by hapteq: per participant and session one table below
+`sub-*/ses-*/beh`, a row for each presentation. `task-*_beh.json` says what each column means and its unit;
+`code/protocol.toml` is the protocol with every number of the study, in the form that `hapteq study --protocol` takes.
 """
 
 
@@ -57,9 +57,7 @@ def write_bids(
     subjects = list(dict.fromkeys(trial.subject for trial in trials))
     rows = "".join(f"sub-{_label(subject)}\t{subject}\n" for subject in subjects)
     written.append(_text(folder / "participants.tsv", f"participant_id\tcode\n{rows}"))
-    written.append(
-        _json(folder / "participants.json", {"code": {"Description": "Code of the participant as recorded"}})
-    )
+    written.append(_json(folder / "participants.json", {"code": {"Description": "Code as recorded"}}))
     for session in dict.fromkeys(trial.session for trial in trials):
         of = [trial for trial in trials if trial.session == session]
         sub, ses = f"sub-{_label(of[0].subject)}", f"ses-{_label(session)}"

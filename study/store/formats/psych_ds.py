@@ -27,9 +27,9 @@ OURS = "hapteq"
 
 README = """# {name}
 
-Trials of a study of force directions, exported by hapteq: one table per session below `data/`, a row for each presentation.
-`dataset_description.json` says what each column means and its unit. A row is identified by the columns session, run, trial and
-attempt. `materials/protocol.toml` is the protocol; `hapteq analyze` takes this folder.
+Trials of a study of force directions, exported by hapteq: one table per session below `data/`, a row for each
+presentation. `dataset_description.json` says what each column means and its unit. A row is identified by the columns
+session, run, trial and attempt. `materials/protocol.toml` is the protocol; `hapteq analyze` takes this folder.
 """
 
 
