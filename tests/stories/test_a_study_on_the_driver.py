@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -11,7 +12,9 @@ import numpy as np
 import pytest
 
 from study.cli.main import main
+from study.session.facts.events import AnswerGiven, TrialSpoiled
 from study.store.formats.trials_file import read_trials
+from study.store.sessions.event_log import read_log
 
 pytestmark = pytest.mark.real_time
 
@@ -167,3 +170,73 @@ def test_a_loop_that_ends_leaves_no_force_and_the_study_ends_with_words_and_goes
         stub.set("stretch_in_use", 20)
         assert main(["resume", "ideal1_001", *data]) in (0, 3, 130)
         assert stub.safe
+
+
+NEVER = 1e9
+
+
+class Trouble:
+    """Twice, in the middle of a force: the fault for a moment, then it is mended."""
+
+    def __init__(self, stub, switches: dict[str, float], healthy: dict[str, float]) -> None:
+        self._stub, self._switches, self._healthy = stub, switches, healthy
+        self.made = 0
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._make)
+        self._thread.start()
+
+    def end(self) -> None:
+        self._over.set()
+        self._thread.join(20)
+
+    def _make(self) -> None:
+        while self.made < 2 and not self._over.wait(0.01):
+            if self._stub.peek("last_write") > 0.3 and self._stub.peek("force_on"):
+                self._set(self._switches)
+                time.sleep(0.3)
+                self._set(self._healthy)
+                self.made += 1
+                self._over.wait(0.5)
+
+    def _set(self, switches: dict[str, float]) -> None:
+        for name, value in switches.items():
+            self._stub.set(name, value)
+
+
+@pytest.mark.parametrize(
+    ("switches", "healthy"),
+    [
+        ({"jump_m": 0.06, "jump_every": 7}, {"jump_m": 0, "jump_every": 0}),
+        pytest.param(
+            {"scaled_from_n": 0.1, "scaled_every": 3},
+            {"scaled_from_n": NEVER, "scaled_every": 0},
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_faults_that_come_and_go_void_trials_and_lose_no_answer(stub, short_file, tmp_path, switches, healthy, capsys):
+    stub.set("stiffness", 150)  # a hand that holds the handle
+    stub.set("stretch_in_use", 20)  # the computer of the tests is busier than that of a lab
+    data = ("--data", str(tmp_path / "data"), "--device", "omega3", "--json")
+    trouble, answers, code = Trouble(stub, switches, healthy), 0, -1
+    log = tmp_path / "data" / "ideal1_001" / "events.jsonl"
+    try:
+        for _ in range(1 + RESUMED):
+            begin = ["resume", "ideal1_001"] if log.exists() else ["study", "--protocol", str(short_file)]
+            begin += [] if log.exists() else ["--observer", "ideal", "--seed", "5"]
+            code = main([*begin, *data])
+            said = capsys.readouterr().err
+            assert stub.safe
+            kept = sum(isinstance(event, AnswerGiven) for event in read_log(log).events)
+            assert kept >= answers
+            answers = kept
+            if code == 0:
+                break
+            assert code in (3, 130), said
+    finally:
+        trouble.end()
+    assert code == 0, said
+    assert trouble.made == 2
+    assert stub.get("peak_n") <= 4.5
+    assert any(isinstance(event, TrialSpoiled) for event in read_log(log).events)
+    assert len([trial for trial in read_trials(log.parent / "trials.csv") if trial.counts]) > 7
