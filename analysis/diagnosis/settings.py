@@ -34,6 +34,8 @@ LEVELS_TO_STRATIFY = 2  # principle: with more than one, the end of the time wou
 LEVELS_TO_HOLD_ONE_BACK = 3  # principle: a level to choose by lies between two that are fitted to
 CHOOSE_SHARE = 0.25  # of the fitting time, from its end, where no level can be kept back to choose by
 TEST_SHARE = 0.25  # of the whole time, from its end, where no segment has a role
+AT_REST = 0.02  # of the range of a response, within which it rests where a part of the recording ends
+LONGEST_TAIL = 0.05  # of a part, which may rest at its end without another split; where it rests is told from it
 STILL_SHARE = 0.01  # of the mean square of the motion that is fitted, below which what is held out tests nothing
 
 # Which error measure suits (`measure_rule`, `closed_loop`). By hand.

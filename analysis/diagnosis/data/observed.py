@@ -1,13 +1,16 @@
 """A recording ready for comparison: its signals, and which samples serve to fit, to choose and to test by."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.diagnosis.settings import (
+    AT_REST,
     CHOOSE_SHARE,
     LEVELS_TO_HOLD_ONE_BACK,
     LEVELS_TO_STRATIFY,
+    LONGEST_TAIL,
     MODEL_FLOOR,
     TEST_SHARE,
 )
@@ -60,7 +63,8 @@ def observe(recording: Recording, responses: int) -> Observed:
     """A recording with its samples' roles. responses: number of the model's outputs; a position with another number of
     channels is left out."""
     measured, known = measured_signals(recording, responses)
-    fit, choose, test = (mask & known for mask in roles(recording.segments, len(recording)))
+    spans = moving_spans(recording.response.samples, [(0, len(recording))])
+    fit, choose, test = (mask & known for mask in roles(recording.segments, len(recording), spans=spans))
     return Observed(recording, recording.command.samples, measured, fit, choose, test)
 
 
@@ -74,14 +78,39 @@ def measured_signals(recording: Recording, responses: int) -> tuple[FloatArray, 
     return measured, known
 
 
-def roles(segments: tuple[Segment, ...], length: int, tested: bool = False) -> tuple[Mask, Mask, Mask]:
-    """Samples to fit, to choose and to test by: (length,) each. tested: another recording is there to test by.
+def moving_spans(response: FloatArray, parts: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Of each part, its first sample and the one after the last that is away from where the part comes to rest.
+    response: (n, p)."""
+    return [(start, start + _end_of_motion(response[start:stop])) for start, stop in parts]
+
+
+def _end_of_motion(samples: FloatArray) -> int:
+    last = int((1 - LONGEST_TAIL) * len(samples))
+    known: Mask = np.asarray(np.isfinite(samples).all(axis=1), dtype=np.bool_)
+    if not known[:last].any() or not known[last:].any():
+        return len(samples)
+    away = np.abs(samples - np.median(samples[last:][known[last:]], axis=0)) > AT_REST * np.ptp(samples[known], axis=0)
+    moves = np.flatnonzero(away.any(axis=1))
+    if not len(moves) or moves[-1] >= last:
+        return len(samples)
+    # A part that moves for less than half of its time is split as if it moved for half of it.
+    return max(int(moves[-1]) + 1, len(samples) // 2)
+
+
+def roles(
+    segments: tuple[Segment, ...], length: int, tested: bool = False, spans: Sequence[tuple[int, int]] = ()
+) -> tuple[Mask, Mask, Mask]:
+    """Samples to fit, to choose and to test by: (length,) each. spans: of each part, where it moves, see
+    `moving_spans`; none = the whole. tested: another recording is there to test by.
 
     What is marked as test stays sealed. Where nothing is, the end of each segment is, whole periods of it, so that
     every level is tested by; of a single level, the end of the time. Of the rest, the middle level of three or more is
     kept back to choose by, for laws differ in how they grow with the level, and further periods of a level that was
-    fitted to show only noise; else the last quarter of the time is.
+    fitted to show only noise; else the last quarter of the time is. Without segments, the end of each part is held
+    out, the last quarter of its motion: the rest behind it tests nothing, and is fitted to.
     """
+    if not segments:
+        return _roles_without_segments(spans or [(0, length)], length, tested)
     inside = [s for s in segments if s.kind != "rest"]
     test = _segment_mask([s for s in inside if s.role == "test"], length)
     fitted = [s for s in inside if s.role == "fit"] or [s for s in inside if s.role != "test"]
@@ -96,6 +125,18 @@ def roles(segments: tuple[Segment, ...], length: int, tested: bool = False) -> t
         places = np.flatnonzero(fit)
         choose[places[int((1 - CHOOSE_SHARE) * len(places)) :]] = True
     return fit & ~choose, choose, test
+
+
+def _roles_without_segments(spans: Sequence[tuple[int, int]], length: int, tested: bool) -> tuple[Mask, Mask, Mask]:
+    choose, test = np.zeros(length, dtype=np.bool_), np.zeros(length, dtype=np.bool_)
+    stops = [*(start for start, _ in spans[1:]), length]
+    for (start, end), stop in zip(spans, stops, strict=True):
+        held_out = stop if tested else start + int((1 - TEST_SHARE) * (end - start))
+        chosen = start + int((1 - CHOOSE_SHARE) * (held_out - start))
+        choose[chosen:held_out], test[held_out:end] = True, True
+    fit = ~(choose | test)
+    fit[: spans[0][0]] = False
+    return fit, choose, test
 
 
 def error_units(measured: FloatArray, noise: FloatArray) -> FloatArray:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import error_units, measured_signals, observe, roles
+from analysis.diagnosis.data.observed import error_units, measured_signals, moving_spans, observe, roles
 from analysis.diagnosis.settings import MODEL_FLOOR
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -41,6 +41,25 @@ def test_without_segments_the_end_is_sealed_and_what_is_before_it_is_split():
     assert np.flatnonzero(test)[[0, -1]].tolist() == [750, 999]
     assert np.flatnonzero(choose)[[0, -1]].tolist() == [562, 749]
     assert fit.sum() == 562
+
+
+def test_the_end_of_each_part_is_sealed_from_the_last_quarter_of_its_motion_on():
+    time_s = np.arange(1000) / 100
+    response = np.where(time_s < 4, np.sin(9 * time_s), 0.0)[:, None]
+    response[600:] = np.sin(time_s[600:])[:, None]
+    response[600:603] = np.nan
+    spans = moving_spans(response, [(0, 600), (600, 1000)])
+    assert spans == [(0, pytest.approx(400, abs=2)), (600, 1000)]
+    fit, choose, test = roles((), 1000, spans=spans)
+    assert np.flatnonzero(test)[0] == pytest.approx(300, abs=2)
+    assert test[302:398].all() and not test[402:900].any() and test[900:].all()
+    assert fit[402:600].all()
+    assert choose[230:298].all() and choose[830:900].all() and fit[:220].all() and fit[600:820].all()
+
+
+def test_what_hardly_moves_is_split_as_if_it_moved_for_half_of_the_time():
+    assert moving_spans(np.ones((100, 1)), [(0, 100)]) == [(0, 100)]
+    assert moving_spans(np.minimum(np.arange(100.0), 10)[:, None], [(0, 100)]) == [(0, 50)]
 
 
 def test_segments_without_roles_are_treated_alike_and_the_pauses_count_for_nothing():
