@@ -31,6 +31,7 @@ from analysis.diagnosis.search.search_context import FittedCandidate, SearchCont
 from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
 from analysis.diagnosis.search.without_effect import without_effect
 from analysis.diagnosis.settings import HELD_OUT_ERROR, INTERVAL_FACTOR
+from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.signal import FloatArray
 
 CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
@@ -101,6 +102,9 @@ def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
     or late sensor."""
     found, demoted = seen.found, []
     doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
+    if len(doubtful) < len(found.steps) and not predicts_something(seen.context.whole, found.plain):
+        # Beside a model that runs away, whatever bounds the prediction gains.
+        doubtful = list(range(len(found.steps)))
     for place in reversed(doubtful):
         gain = held_out_gain(seen.context.whole, found.plain, seen.context.with_test_score(found.steps[place]))
         if gain is not None and gain.gain > 0:
@@ -157,22 +161,30 @@ def _steps(
 
 
 def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) -> int | None:
-    """Place of a named law that may be absent: the intervals of all parameters that mean so hold it, or any parameter's
-    is open where the law only refines another of its family or has no name; None = there is none."""
+    """Place of a named law that may be absent: the intervals of all parameters that mean so hold it, or of all signed
+    ones that its special case lacks, or any parameter's is open where the law only refines another of its family or has
+    no name; None = there is none."""
     begin, hypothesis = 0, explained.steps[-1].fitted.hypothesis
     families = [family_of(claim.effect.name) for claim in hypothesis.claims]
     for place, claim in enumerate(hypothesis.claims):
         free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
         every = (place > constants and families[place] in families[constants:place]) or claim.effect.law is not None
-        vague = []
+        special = {parameter.name for name in claim.effect.simpler for parameter in EFFECTS[name].parameters}
+        vague, beyond = [], []
         for number, parameter in enumerate(free, begin):
             size = {"log": 1.0, "signed": abs(float(hypothesis.point[number])), "linear": np.inf}[parameter.scale]
             if every or parameter.none is not None:
                 vague.append(VAGUE * errors[number] >= size)
-        if place >= constants and (any(vague) if every else bool(vague) and all(vague)):
+            if special and parameter.scale == "signed" and parameter.name not in special:
+                beyond.append(VAGUE * errors[number] >= size)
+        if place >= constants and (any(vague) if every else _all_of_some(vague) or _all_of_some(beyond)):
             return place - constants
         begin += len(free)
     return None
+
+
+def _all_of_some(said: Sequence[bool]) -> bool:
+    return bool(said) and all(said)
 
 
 def leaves_open(result: SearchResult) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.data.measured_motion import time_unit
+from analysis.diagnosis.data.measured_motion import is_quasi_static
 from analysis.diagnosis.data.operating_point import about_operating_point
 from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
 from analysis.diagnosis.errors.fit_score import fit_score
@@ -77,7 +77,7 @@ def list_fitting_measures(
     if not any(balance.named for balance in balances):
         return
     chosen = measure_of(recordings, model)
-    if time_unit(recordings[0]) != "s":
+    if is_quasi_static(recordings[0]):
         yield FittingMeasure(model, chosen)
         return
     if (chosen.measure.name == "free simulation" or chosen.measure.name.startswith("windows")) and compared != "force":

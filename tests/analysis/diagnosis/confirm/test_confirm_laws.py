@@ -26,6 +26,7 @@ OPEN, SURE = 1.01 / VAGUE, 0.1 / VAGUE
 DRY = ("coulomb_friction", {"level": 2.0})
 BENDING = ("presliding_hysteresis", {"level": 0.5, "stiffness": 100.0})
 STOP = ("end_stop", {"position": 0.01, "stiffness": 1e4, "opposite": 0.0})
+BENT = ("position_dependent_friction", {"level": 0.5, "slope_per_m": 9.0, "bend_per_m2": 4.0})
 RIPPLE = ("cogging", {"amplitude": 0.5, "pitch": 0.01, "phase": 0.0})
 
 
@@ -47,10 +48,12 @@ def explained(*laws):
         ((DRY, RIPPLE), (OPEN, SURE, SURE, SURE), 0),
         ((STOP,), (SURE, OPEN), 0),
         ((STOP,), (OPEN, SURE), None),
+        ((BENT,), (SURE, 9.0 * OPEN, 4.0 * SURE), None),
+        ((BENT,), (SURE, 9.0 * OPEN, 4.0 * OPEN), 0),
     ],
     ids=[
         "all known", "refinement open", "secondary open alone", "main open", "another family", "first open",
-        "no stiffness", "place open",
+        "no stiffness", "place open", "bent", "not shown to be bent",
     ],
 )  # fmt: skip
 def test_a_law_goes_by_its_main_number_and_a_refinement_by_any(laws, errors, dropped):
@@ -150,9 +153,11 @@ def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
 
 
 @pytest.mark.usefixtures("gains_half")
-def test_what_the_signal_itself_shows_keeps_its_name():
+@pytest.mark.parametrize("predicts", [True, False])
+def test_what_the_signal_itself_shows_keeps_its_name_unless_the_model_runs_away(monkeypatch, predicts):
+    monkeypatch.setattr(by_balance, "predicts_something", lambda *_: predicts)
     seen = searched_to("sensor_clipping")
-    assert unname_doubtful_effects(seen) is seen
+    assert (unname_doubtful_effects(seen) is seen) == predicts
 
 
 def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
