@@ -13,7 +13,7 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from analysis.diagnosis.balance.band import band_begin_hz, band_end_hz
-from analysis.diagnosis.data.measured_motion import fill_gaps
+from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -111,7 +111,7 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
     order = DERIVATIVE_OF_QUANTITY[moved[0].quantities[0]]
     rate_hz = records[0].recording.sample_rate_hz
     filled = [fill_gaps(signal.samples) for signal in moved]
-    untimed = any(record.recording.meta.get("time") == "unknown" for record in records)
+    untimed = any(is_quasi_static(record.recording) for record in records)
     if band_hz is None:
         band_hz = np.inf if untimed else band_end_hz(filled, rate_hz, order)
     lowest_hz = band_begin_hz(filled, rate_hz) if order == 2 and not untimed else 0.0

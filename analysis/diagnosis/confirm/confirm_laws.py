@@ -103,7 +103,7 @@ def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
     found, demoted = seen.found, []
     doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
     if len(doubtful) < len(found.steps) and not predicts_something(seen.context.whole, found.plain):
-        # Beside a model that runs away, whatever bounds the prediction gains.
+        # Beside a model that runs away, any bound of the prediction gains.
         doubtful = list(range(len(found.steps)))
     for place in reversed(doubtful):
         gain = held_out_gain(seen.context.whole, found.plain, seen.context.with_test_score(found.steps[place]))

@@ -59,6 +59,17 @@ def fill_gaps(samples: FloatArray) -> FloatArray:
     return whole
 
 
+def is_quasi_static(recording: Recording) -> bool:
+    """Whether positions alone were measured, and no time is known: then forces are compared as they stand beside the
+    positions. A measured speed or acceleration moves in a time of its own; where that is not known, it is counted in
+    samples."""
+    quantities = [
+        quantity for signal in (recording.position, recording.response) if signal for quantity in signal.quantities
+    ]
+    orders = [order for quantity in quantities if (order := DERIVATIVE_OF_QUANTITY.get(quantity)) is not None]
+    return not recording.is_timed and min(orders, default=0) == 0
+
+
 def time_unit(recording: Recording) -> str:
     """ "sample" where no time is known: what hangs on time then hangs on the samples' numbers."""
     return "s" if recording.is_timed else "sample"

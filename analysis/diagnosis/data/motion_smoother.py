@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, types
+from scipy.linalg import solve_discrete_are
 
 from analysis.diagnosis.data.observed import Observed
 from equalizer.effects.simulation.sensor_path import undo_low_pass
@@ -145,7 +146,10 @@ def _smoother_gains(
     eye = np.eye(len(look))
     scaled, observed = advance * large[None, :] / large[:, None], look * large[None, :]
     process_noise = np.diag(walk / large**2) + _PROCESS_NOISE * np.eye(len(advance))
-    predicted = _steady_covariance(scaled, observed, process_noise)
+    try:
+        predicted = _steady_covariance(scaled, observed, process_noise)
+    except np.linalg.LinAlgError:  # states of very different sizes: slower, by an ordered Schur form
+        predicted = solve_discrete_are(scaled.T, observed.T, process_noise, eye)
     gain = np.linalg.solve(observed @ predicted @ observed.T + eye, observed @ predicted).T
     if np.abs(np.linalg.eigvals(scaled - scaled @ gain @ observed)).max() >= 1:
         raise np.linalg.LinAlgError("a filter for the motion is not stable in floating point")

@@ -22,7 +22,7 @@ import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.growth import is_unstable_within
-from analysis.diagnosis.data.measured_motion import has_motion, time_unit
+from analysis.diagnosis.data.measured_motion import has_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.windows import WINDOW_S
 from analysis.diagnosis.settings import DIES_OUT_SHARE, MOST_LEFT_OUT, REST_S, REST_SHARE, SETTLED_CONSTANTS
@@ -32,6 +32,9 @@ Measure = Literal["free simulation", "windows", "predicted force"]
 UNTIMED = (
     "No time is known: forces are compared as they stand beside the positions, sample by sample; nothing that hangs on "
     "speed, acceleration or frequency is known."
+)
+IN_SAMPLES = (
+    "No time is known: samples are counted in its place, so that every time, speed and frequency is per sample."
 )
 IMPOSED = (
     "The motion was imposed and the force measured, so the force that the model needs along the motion is compared "
@@ -70,7 +73,7 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
     """The rule of this module's first lines."""
     longest_s = max(len(record.command) / record.recording.sample_rate_hz for record in records)
     holds, motion = is_self_stable(model, longest_s), all(has_motion(record.recording, model) for record in records)
-    if motion and any(time_unit(record.recording) != "s" for record in records):
+    if motion and any(is_quasi_static(record.recording) for record in records):
         return Choice("predicted force", UNTIMED)
     if any(record.recording.meta.get("imposed") for record in records):
         return Choice("predicted force", IMPOSED)

@@ -8,11 +8,12 @@ from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.balance.motion import NoMotionError
 from analysis.diagnosis.data.carried_weight import has_carried_weight
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
-from analysis.diagnosis.data.measured_motion import time_unit
+from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static
 from analysis.diagnosis.first_model.model_of_balance import FirstModel, plain_model
 from analysis.diagnosis.first_model.model_structures import StructureRefused, balance_recordings, fit_structure
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
+from equalizer.effects.simulation.simulator import simulate_response
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
 from equalizer.identification.mechanical.open_tolerance import widen_tolerance
@@ -27,8 +28,8 @@ BALANCE_SAID = (
     "No model was given. One body per axis, with damping and a spring, was fitted first to the forces along the "
     "measured motion; its numbers are left open by a tenth, and by half of what the named laws change in them."
 )
-
-
+LEAST_ANSWER = 1e-3
+"""Share of the measured response that a fitted model must show; principle: a thousandth is no answer."""
 UNTIMED_SAID = (
     "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "
     "The mass in the file is a floor that no force shows; damping and mass are not known."
@@ -47,7 +48,7 @@ def first_model_of(
     _require_no_weight(recordings)
     on_progress("weighing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(without), time_left, map_)
-    if any(time_unit(each) != "s" for each in recordings) and (still := _massless_model(recordings)) is not None:
+    if any(map(is_quasi_static, recordings)) and (still := _massless_model(recordings)) is not None:
         return FirstModel(still, (UNTIMED_SAID,), balances)
     model = plain_model(balances, recordings[0], "fitted to these recordings")
     if model is not None:
@@ -76,6 +77,8 @@ def fit_first_linear_model(
         return rigid, (RIGID_SAID,)
     try:
         fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {whose}")
+        if not _answers(fit.model, recordings[0]):
+            raise MechanicalFitRefused("the model that fits best hardly answers to the commands")
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         if (rigid := _rigid_model(recordings, whose)) is not None:
             return rigid, (RIGID_SAID,)
@@ -91,6 +94,16 @@ def fit_first_linear_model(
         said,
         *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks),
     )
+
+
+def _answers(model: MechanicalModel, recording: Recording) -> bool:
+    """Whether the commands move the model at all. Where the response hangs on them less than on the start of the
+    recording, as of an axis that friction holds, the fit's masses and springs grow beyond all bounds."""
+    played = simulate_response(
+        model, fill_gaps(recording.command.samples), recording.sample_rate_hz, (), recording.hold
+    )
+    measured = np.nanstd(recording.response.samples, axis=0)
+    return bool((np.std(played.response, axis=0) >= LEAST_ANSWER * measured).any())
 
 
 def _require_no_weight(recordings: Sequence[Recording]) -> None:

@@ -26,6 +26,9 @@ DRIVES = FORCES | {"voltage", "current"} | set(DERIVATIVE_OF_QUANTITY)
 """Quantities of commands that drive a motion; all others are conditions."""
 STILL = 1e-9
 """Range of a signal over its size, below which changes are rounding errors."""
+LAST_DIGITS = 1e-3
+"""Singular values of standardised commands and motions, over the largest, below which they are rounding: a thousandth,
+by hand."""
 MOTIONS = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
 
 Recordings = tuple[Recording, ...]
@@ -189,12 +192,13 @@ def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
         else:
             aim = motion.acceleration
         kept = motion.valid_samples(motion.fit)
-        rows.append(np.hstack([motion.decimate(np.hstack(courses)), np.ones((len(aim[:: motion.step]), 1))])[kept])
+        rows.append(motion.decimate(np.hstack(courses))[kept])
         aims.append(motion.decimate(aim)[kept])
-    x, y = np.vstack(rows), np.vstack(aims)[:, 0]
+    # About their means, and without what they do only in their last digits: of two commands with a constant sum, the
+    # sum would else be taken for the drive.
+    x, y = (found - found.mean(axis=0) for found in (np.vstack(rows), np.vstack(aims)[:, 0]))
     size = np.maximum(x.std(axis=0), 1e-300)
-    size[-1] = 1.0
-    pushed = np.linalg.lstsq(x / size, y, rcond=None)[0][: motions[0].force.shape[1]]
+    pushed = np.linalg.lstsq(x / size, y, rcond=LAST_DIGITS)[0][: motions[0].force.shape[1]]
     main = int(np.argmax(np.abs(pushed)))
     own = pushed / size[: len(pushed)]
     return np.asarray(own / own[main]), main

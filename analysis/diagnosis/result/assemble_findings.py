@@ -6,8 +6,10 @@ from functools import partial
 
 import numpy as np
 
+from analysis.diagnosis.data.measured_motion import is_quasi_static
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.first_model.reversed_commands import as_recorded
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, learned_sentence
@@ -48,6 +50,7 @@ def assemble_findings(
     maps = mismatch_maps(measure, found.stages, floors, learned, context.map_)
     courses = _time_series(measure, found, names)
     looked = looks_of(result, floors[0], maps)
+    in_samples = "" if recording.is_timed or is_quasi_static(recording) else IN_SAMPLES
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
     return Findings(
         diagnosis=_document(result, errors, (maps, looked.local), proposal),
@@ -64,7 +67,9 @@ def assemble_findings(
         is_timed=recording.is_timed,
         signatures=looked.signatures,
         black_box=looked.black_box,
-        remarks=_remarks((_still_sentence(measure), learned_sentence(learned, channels)), courses, tuning, floors),
+        remarks=_remarks(
+            (_still_sentence(measure), learned_sentence(learned, channels), in_samples), courses, tuning, floors
+        ),
         maps=maps.cells,
         local=looked.local,
         floor=floors[0],

@@ -72,6 +72,19 @@ def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(leve
     assert summed.startswith("u2 drives the same motion as u1")
 
 
+def test_of_two_commands_with_a_constant_sum_the_difference_drives():
+    push = smooth(4000, 1)
+    recording = of(
+        [("left", "force", "N", np.round(50 + push, 4)), ("right", "force", "N", np.round(50 - push, 4))],
+        [("v", "velocity", "m/s", speed_of(push + 40 * push.std()))],
+    )
+
+    (found,), _ = plain_form((recording,))
+
+    drive = found.command.samples[:, 0] - found.command.samples[:, 0].mean()
+    assert np.abs(drive) == pytest.approx(np.abs(2 * (push - push.mean())), abs=0.02 * push.std())
+
+
 def test_a_command_that_never_changes_is_left_out_with_the_motion_of_its_axis():
     """A device of two axes of which only the first was driven."""
     push = smooth(2000, 1)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.confirm.fitting_measures import list_fitting_measures
+from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.choose_measure import measure_of
-from analysis.diagnosis.errors.measure_rule import UNTIMED
+from analysis.diagnosis.errors.measure_rule import IN_SAMPLES, UNTIMED
 from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.wording import place_of
 from analysis.diagnosis.search.guard import Guard
@@ -69,3 +70,26 @@ def test_no_place_is_reported_in_hertz(first):
     row = Mismatch("x", "fx", (0.0, 0.5), None, None, 0.02, 0.0)
     assert "Hz" not in place_of(row, Device(True, first.model.system))
     assert "Hz" in place_of(row)
+
+
+def test_a_speed_without_a_clock_is_diagnosed_with_samples_as_its_time():
+    """A motor with dry friction, in random steps of its command."""
+    random = np.random.default_rng(3)
+    command = np.repeat(random.uniform(-5.0, 5.0, 150), 40)
+    speed, v = np.empty(len(command)), 0.0
+    for k, push in enumerate(command.tolist()):
+        speed[k] = v
+        for _ in range(20):
+            free = v + (push - 0.2 * v) / 8.0 / 20
+            v = np.sign(free) * max(abs(free) - 1.0 / 8.0 / 20, 0.0)
+    speed += 0.01 * random.standard_normal(len(speed))
+    motor = Recording(
+        "motor", Signal(command[:, None], 1.0, "torque", "N m", ("u",)),
+        Signal(speed[:, None], 1.0, "angular velocity", "rad/s", ("w",)), meta={"time": "unknown"},
+    )  # fmt: skip
+    found = diagnose_values([motor])
+    assert [effect.effect for effect in found.diagnosis.effects] == ["coulomb_friction"]
+    assert found.improved.mass[0, 0] == pytest.approx(8.0, rel=0.05)
+    assert matrix_unit("mass", found.improved.system) == "N m sample^2/rad"
+    assert IN_SAMPLES in found.remarks and UNTIMED not in found.remarks
+    assert found.diagnosis.fit.test.after < 0.02
