@@ -36,7 +36,7 @@ SEED ?= 95000
 BANK ?= bank-$(SEED)
 
 .DEFAULT_GOAL := help
-.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank prove-formats docs site clean \
+.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank prove-browser prove-formats docs site clean \
 	types imports compiled $(TESTED)
 
 help: ## Show what can be made
@@ -90,6 +90,9 @@ prove-diagnosis: $(VENV)/.installed-test ## The slow tests of the diagnosis, eff
 
 prove-bank: $(VENV)/.installed-prove ## The blind proof of the diagnosis (CASES=600 SEED=95000 BANK=DIR); repeated, it goes on
 	$(BIN)/hapteq prove --controls --cases $(CASES) --seed $(SEED) --out $(BANK) --table docs/proof/bank-$(SEED).csv
+
+prove-browser: $(VENV)/.installed-test ## A whole session in headless Chromium (the system's package chromium), by keys
+	$(BIN)/python -m pytest -m slow tests/stories/test_a_study_in_a_browser.py
 
 prove-formats: $(VENV)/.installed-test ## Exported datasets before the validator of BIDS, which is installed first (120 MB)
 	$(PIP) install --quiet -c constraints.txt -e '.[validators]'

@@ -66,6 +66,7 @@ class ScreenServer(Server):
         """Page, connection, downloads and page resources, all below the token."""
         app = web.Application(middlewares=[self._require_token])
         app.on_response_prepare.append(self._add_headers)
+        app.router.add_get("/download/{key}", self.handle_download)
         app.add_subapp(f"/{self._token}", await super()._make_app())
         return app
 
@@ -75,11 +76,22 @@ class ScreenServer(Server):
     ) -> web.StreamResponse:
         """Also for unknown addresses, so that nothing can be distinguished without the token."""
         given = request.path.split("/")[1]
+        if given == "download" and await self._is_offered(request.path.rpartition("/")[2]):
+            return await handler(request)
         if not hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode()):
             raise web.HTTPNotFound(text="The study is at the address that hapteq serve said, to its last letter.")
         if request.path == f"/{self._token}":
             raise web.HTTPFound(f"/{self._token}/")
         return await handler(request)
+
+    async def _is_offered(self, key: str) -> bool:
+        """Whether a report was opened under this key, which is random, is told to our page alone, and is used once. The
+        page's script asks for it beside the token, not below it."""
+        try:
+            await self.download_manager.get_download_metadata(key)
+        except KeyError:
+            return False
+        return True
 
     async def _add_headers(self, request: web.Request, response: web.StreamResponse) -> None:
         response.headers.update(self._headers)

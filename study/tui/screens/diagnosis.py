@@ -1,6 +1,5 @@
 """View of one diagnosis: the verdict, named effects, rivals, and the numbers behind them."""
 
-from pathlib import Path
 from typing import ClassVar
 
 from rich.table import Table
@@ -13,6 +12,7 @@ from textual.widgets import Footer, Static
 
 from study.session.views.archive_views import DiagnosisView
 from study.tui.home_messages import HomeWanted
+from study.tui.screens.session import open_report
 from study.tui.widgets.text_table import TextTable
 
 HELP = """\
@@ -87,7 +87,7 @@ class DiagnosisScreen(Screen[None]):
         self.post_message(HomeWanted())
 
     def action_open_report(self) -> None:
-        self.app.open_url(Path(self._view.report).absolute().as_uri())
+        open_report(self.app, self._view.report)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         return action != "open_report" or bool(self._view.report)

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from rich.table import Table
 from rich.text import Text
-from textual.app import ComposeResult
+from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import ItemGrid, VerticalScroll
 from textual.content import Content
@@ -136,7 +136,7 @@ class SessionScreen(Screen[None]):
         self.app.push_screen(DiagnoseForm(self._view.line.path))
 
     def action_open_report(self) -> None:
-        self.app.open_url(file_url(self._view.report))
+        open_report(self.app, self._view.report)
 
     def action_withdraw(self) -> None:
         def decided(erase: bool | None) -> None:
@@ -165,6 +165,15 @@ class SessionScreen(Screen[None]):
 def file_url(path: str) -> str:
     """For a browser on this machine."""
     return Path(path).absolute().as_uri()
+
+
+def open_report(app: App[object], path: str) -> None:
+    """In a browser of this machine; where the screen itself is in a browser, in a tab beside it, to which the page is
+    sent: no browser goes from a page of a server to a file."""
+    if app.is_web:
+        app.deliver_binary(path, open_method="browser", mime_type="text/html")
+    else:
+        app.open_url(file_url(path))
 
 
 def _head(view: SessionView) -> Content:
