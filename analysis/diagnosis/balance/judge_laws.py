@@ -36,13 +36,16 @@ SECOND = 2 / 3
 """Share of what is left that a second law of one family must take."""
 MENDS_SHAPE = "it acts like a named law, and may only mend its shape"
 MOST_ALIKE = 4
-"""Effects of a class at most; a larger class says nothing."""
+"""Effects of a class at most; a larger class says nothing, unless all of it is dry friction."""
 LEAST_BLOCKS = 4
 CANCELLED = 2.0
 """Standard deviation of a law's own force at most, over the recorded one's: more is cancelled by other columns."""
+DRY_FRICTIONS = {
+    "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
+    "position_dependent_friction", "drifting_friction",
+}  # fmt: skip
 FAMILIES = (
-    {"coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
-     "position_dependent_friction", "drifting_friction", "quadratic_damping"},
+    DRY_FRICTIONS | {"quadratic_damping"},
     {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
 )  # fmt: skip
 """Effects that may stand in one class: they act alike. Of different families, none is named."""
@@ -249,7 +252,7 @@ def _why_not(
     family = family_of(law.effect)
     strange = [effect for effect in alike if effect not in family]
     others = [effect for effect in alike if law.effect not in _special_cases(effect)]
-    if strange or len(others) >= MOST_ALIKE:
+    if strange or (len(others) >= MOST_ALIKE and not {law.effect, *others} <= DRY_FRICTIONS):
         return f"these data cannot tell it from {', '.join(strange or alike)}"
     return (
         "" if {law.effect, PLAYED_AS.get(law.effect)} & set(EFFECTS_BY_NAME) else "no simulation of ours plays it yet"

@@ -1,9 +1,13 @@
-"""A law whose share of the force is below the uncertainty of laboratory recordings is only a candidate."""
+"""A law whose share of the force is below the uncertainty of laboratory recordings is only a candidate, and so is a law
+of many that are not all dry friction."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+from analysis.diagnosis.balance.judge_laws import _why_not
 
 SEED, RATE_HZ = 5, 250.0
 
@@ -28,3 +32,21 @@ def test_friction_of_a_hundredth_of_the_force_is_a_candidate(balance):
 def test_friction_of_a_tenth_of_the_force_is_named(balance):
     found = balance(0.1)
     assert any("coulomb_friction" in (law.law.effect, *law.alike) for law in found.named)
+
+
+@pytest.mark.parametrize(
+    ("effect", "alike", "named"),
+    [
+        ("presliding_hysteresis", ("stribeck_friction", "asymmetric_friction", "drifting_friction",
+                                   "position_dependent_friction"), True),
+        ("presliding_hysteresis", ("stribeck_friction", "asymmetric_friction", "drifting_friction",
+                                   "quadratic_damping"), False),
+        ("hardening_stiffness", ("asymmetric_stiffness", "end_stop"), True),
+        ("hardening_stiffness", ("asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"), False),
+        ("coulomb_friction", ("cogging",), False),
+    ],
+)  # fmt: skip
+def test_a_class_of_many_is_named_where_all_of_it_is_dry_friction(effect, alike, named):
+    law = SimpleNamespace(linear=False, effect=effect)
+    why_not = _why_not(law, {"level": 1.0}, (0.5, 0.4, 0.9, 0.95), alike)
+    assert (why_not == "") == named
