@@ -14,6 +14,7 @@ from tests.diagnosed import TRIED, device, recorded
 ASKED = DiagnosisSettings(without=tuple(effect.name for effect in CATALOGUE if effect.name not in TRIED))
 N, MOVING = 4000, 2400
 NOISE = np.array([0.05])
+LAST_QUARTER = (Segment(0, 3000, "noise", role="fit"), Segment(3000, N, "noise", role="test"))
 
 
 def turning(speed):
@@ -31,7 +32,12 @@ def stops_at(sample, seed=3):
 
 @pytest.mark.parametrize(("stop", "still"), [(MOVING, True), (N, False)])
 def test_held_out_samples_at_rest_hold_no_motion(stop, still):
-    assert held_out_stands_still(observed_parts([turning(stops_at(stop))], 1), NOISE) == still
+    marked = replace(turning(stops_at(stop)), segments=LAST_QUARTER)
+    assert held_out_stands_still(observed_parts([marked], 1), NOISE) == still
+
+
+def test_without_segments_what_is_held_out_moves():
+    assert not held_out_stands_still(observed_parts([turning(stops_at(MOVING))], 1), NOISE)
 
 
 def test_a_steady_speed_is_a_motion_though_its_reading_does_not_change():
