@@ -63,8 +63,7 @@ def observe(recording: Recording, responses: int) -> Observed:
     """A recording with its samples' roles. responses: number of the model's outputs; a position with another number of
     channels is left out."""
     measured, known = measured_signals(recording, responses)
-    spans = moving_spans(recording.response.samples, [(0, len(recording))])
-    fit, choose, test = (mask & known for mask in roles(recording.segments, len(recording), spans=spans))
+    fit, choose, test = (mask & known for mask in roles(recording.segments, len(recording)))
     return Observed(recording, recording.command.samples, measured, fit, choose, test)
 
 
@@ -78,13 +77,23 @@ def measured_signals(recording: Recording, responses: int) -> tuple[FloatArray, 
     return measured, known
 
 
-def moving_spans(response: FloatArray, parts: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Of each part, its first sample and the one after the last that is away from where the part comes to rest.
-    response: (n, p)."""
-    return [(start, start + _end_of_motion(response[start:stop])) for start, stop in parts]
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A part of a recording: its first sample, and the ones after the last that moves and after its last."""
+
+    start: int
+    end_of_motion: int
+    stop: int
+
+
+def moving_spans(response: FloatArray, parts: Sequence[tuple[int, int]]) -> tuple[Span, ...]:
+    """Where each part moves: until the last sample at which any channel is away from where it rests at the part's end.
+    Noise above `AT_REST` of a channel's range counts as motion. response: (n, p)."""
+    return tuple(Span(start, start + _end_of_motion(response[start:stop]), stop) for start, stop in parts)
 
 
 def _end_of_motion(samples: FloatArray) -> int:
+    samples = samples[:, np.isfinite(samples).any(axis=0)]
     last = int((1 - LONGEST_TAIL) * len(samples))
     known: Mask = np.asarray(np.isfinite(samples).all(axis=1), dtype=np.bool_)
     if not known[:last].any() or not known[last:].any():
@@ -93,24 +102,24 @@ def _end_of_motion(samples: FloatArray) -> int:
     moves = np.flatnonzero(away.any(axis=1))
     if not len(moves) or moves[-1] >= last:
         return len(samples)
-    # A part that moves for less than half of its time is split as if it moved for half of it.
+    # A step that settles at once would leave next to nothing to fit to.
     return max(int(moves[-1]) + 1, len(samples) // 2)
 
 
 def roles(
-    segments: tuple[Segment, ...], length: int, tested: bool = False, spans: Sequence[tuple[int, int]] = ()
+    segments: tuple[Segment, ...], length: int, tested: bool = False, spans: Sequence[Span] = ()
 ) -> tuple[Mask, Mask, Mask]:
-    """Samples to fit, to choose and to test by: (length,) each. spans: of each part, where it moves, see
-    `moving_spans`; none = the whole. tested: another recording is there to test by.
+    """Samples to fit, to choose and to test by: (length,) each. tested: another recording is there to test by. spans:
+    of its parts; none = the whole.
 
     What is marked as test stays sealed. Where nothing is, the end of each segment is, whole periods of it, so that
     every level is tested by; of a single level, the end of the time. Of the rest, the middle level of three or more is
     kept back to choose by, for laws differ in how they grow with the level, and further periods of a level that was
-    fitted to show only noise; else the last quarter of the time is. Without segments, the end of each part is held
-    out, the last quarter of its motion: the rest behind it tests nothing, and is fitted to.
+    fitted to show only noise; else the last quarter of the time is. Without segments, the last quarter of each
+    part's motion is held out; the rest behind it, which may hold a force but no motion, is fitted to.
     """
     if not segments:
-        return _roles_without_segments(spans or [(0, length)], length, tested)
+        return _roles_without_segments(spans or (Span(0, length, length),), length, tested)
     inside = [s for s in segments if s.kind != "rest"]
     test = _segment_mask([s for s in inside if s.role == "test"], length)
     fitted = [s for s in inside if s.role == "fit"] or [s for s in inside if s.role != "test"]
@@ -127,16 +136,14 @@ def roles(
     return fit & ~choose, choose, test
 
 
-def _roles_without_segments(spans: Sequence[tuple[int, int]], length: int, tested: bool) -> tuple[Mask, Mask, Mask]:
-    choose, test = np.zeros(length, dtype=np.bool_), np.zeros(length, dtype=np.bool_)
-    stops = [*(start for start, _ in spans[1:]), length]
-    for (start, end), stop in zip(spans, stops, strict=True):
-        held_out = stop if tested else start + int((1 - TEST_SHARE) * (end - start))
-        chosen = start + int((1 - CHOOSE_SHARE) * (held_out - start))
-        choose[chosen:held_out], test[held_out:end] = True, True
-    fit = ~(choose | test)
-    fit[: spans[0][0]] = False
-    return fit, choose, test
+def _roles_without_segments(spans: Sequence[Span], length: int, tested: bool) -> tuple[Mask, Mask, Mask]:
+    fit, choose, test = (np.zeros(length, dtype=np.bool_) for _ in range(3))
+    for span in spans:
+        held_out = span.stop if tested else span.start + int((1 - TEST_SHARE) * (span.end_of_motion - span.start))
+        chosen = span.start + int((1 - CHOOSE_SHARE) * (held_out - span.start))
+        fit[span.start : span.stop], choose[chosen:held_out] = True, True
+        test[held_out : span.end_of_motion] = True
+    return fit & ~choose & ~test, choose, test
 
 
 def error_units(measured: FloatArray, noise: FloatArray) -> FloatArray:

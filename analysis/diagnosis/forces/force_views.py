@@ -52,8 +52,8 @@ def force_views(
         views.append(view)
         seen.append(_floor(model, motion, floor, band_hz))
     forces = np.vstack([view.measured for view in views])
-    # A force is not all noise, however little an unsuitable model makes of the motion.
-    noise = np.minimum(np.fmin.reduce([view.response_rms for view in seen]), np.std(forces, axis=0))
+    # The forces are not all noise, however little an unsuitable model makes of the motion; those of an idle axis are.
+    noise = np.minimum(np.fmin.reduce([view.response_rms for view in seen]), np.std(forces, axis=0).max())
     noise = np.asarray(np.hypot(noise, KNOWN * np.sqrt(np.mean(forces**2, axis=0))))
     rate_hz = records[0].recording.sample_rate_hz
     courses = tuple(band_motion(motion.position, rate_hz, band_hz) for motion in motions)

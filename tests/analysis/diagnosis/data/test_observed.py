@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import error_units, measured_signals, moving_spans, observe, roles
+from analysis.diagnosis.data.observed import Span, error_units, measured_signals, moving_spans, observe, roles
 from analysis.diagnosis.settings import MODEL_FLOOR
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -43,13 +43,13 @@ def test_without_segments_the_end_is_sealed_and_what_is_before_it_is_split():
     assert fit.sum() == 562
 
 
-def test_the_end_of_each_part_is_sealed_from_the_last_quarter_of_its_motion_on():
+def test_the_last_quarter_of_each_part_s_motion_is_sealed():
     time_s = np.arange(1000) / 100
     response = np.where(time_s < 4, np.sin(9 * time_s), 0.0)[:, None]
     response[600:] = np.sin(time_s[600:])[:, None]
     response[600:603] = np.nan
     spans = moving_spans(response, [(0, 600), (600, 1000)])
-    assert spans == [(0, pytest.approx(400, abs=2)), (600, 1000)]
+    assert spans == (Span(0, pytest.approx(400, abs=2), 600), Span(600, 1000, 1000))
     fit, choose, test = roles((), 1000, spans=spans)
     assert np.flatnonzero(test)[0] == pytest.approx(300, abs=2)
     assert test[302:398].all() and not test[402:900].any() and test[900:].all()
@@ -57,9 +57,20 @@ def test_the_end_of_each_part_is_sealed_from_the_last_quarter_of_its_motion_on()
     assert choose[230:298].all() and choose[830:900].all() and fit[:220].all() and fit[600:820].all()
 
 
+@pytest.mark.parametrize("tested", [True, False])
+def test_gaps_between_parts_and_their_order_are_nothing_to_the_roles(tested):
+    fit, choose, test = roles((), 1000, tested, (Span(600, 700, 800), Span(0, 200, 200)))
+    counted = [[int(mask[part].sum()) for mask in (fit, choose, test)] for part in (slice(0, 200), slice(600, 800))]
+    assert counted == ([[150, 50, 0], [150, 50, 0]] if tested else [[112, 38, 50], [156, 19, 25]])
+    assert not (fit | choose | test)[200:600].any() and not (fit | choose | test)[800:].any()
+
+
 def test_what_hardly_moves_is_split_as_if_it_moved_for_half_of_the_time():
-    assert moving_spans(np.ones((100, 1)), [(0, 100)]) == [(0, 100)]
-    assert moving_spans(np.minimum(np.arange(100.0), 10)[:, None], [(0, 100)]) == [(0, 50)]
+    assert moving_spans(np.ones((100, 1)), [(0, 100)]) == (Span(0, 100, 100),)
+    settles = np.minimum(np.arange(100.0), 10)[:, None]
+    assert moving_spans(settles, [(0, 100)]) == (Span(0, 50, 100),)
+    unread = np.hstack([settles, np.full((100, 1), np.nan)])
+    assert moving_spans(unread, [(0, 100)]) == (Span(0, 50, 100),)
 
 
 def test_segments_without_roles_are_treated_alike_and_the_pauses_count_for_nothing():
