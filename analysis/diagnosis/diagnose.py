@@ -178,7 +178,7 @@ def _assemble(
     drawn = partial(state_maps, diagnosis, balances, whole.evidence, recordings[0])
     maps: tuple[StateMaps, ...] = settings.guard.part("the map of states", "its making", drawn, ())
     early = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
-    linear = linear_remarks(balances, channels) if settings.fitted else ()
+    linear = linear_remarks(balances, channels, not recordings[0].is_timed) if settings.fitted else ()
     remarks = tuple(dict.fromkeys((*early, *look.chosen.remarks, *result.remarks, *linear, *whole.remarks)))
     reached = balance_errors(diagnosis, balances, channels)
     named = {effect.effect for effect in diagnosis.effects}

@@ -115,20 +115,27 @@ class _Reader:
                 if wanted is not None:
                     self.found.setdefault(place, wanted)
             case Apply("+" | "-" | "minimum" | "maximum" | "neg" | "abs", parts):
-                # A signal tells more than what is wanted: the number by which a sum is multiplied may have a unit.
-                common = self.dimension_of(node, None) or wanted or self.dimension_of(node)
                 for part in parts:
-                    self.assign(part, common)
+                    self.assign(part, self.dimension_of(node) if wanted is None else wanted)
             case Apply("*" | "/" as name, (left, right)):
                 sign = 1.0 if name == "*" else -1.0
-                self.assign(left, _add_dimensions(wanted, self.dimension_of(right), -sign))
-                self.assign(right, _scale_dimension(_add_dimensions(wanted, self.dimension_of(left), -1.0), sign))
+                of_left = _add_dimensions(wanted, self.dimension_of(right), -sign)
+                of_right = _scale_dimension(_add_dimensions(wanted, self.dimension_of(left), -1.0), sign)
+                self.assign(left, None if self._tells_more(left, right) else of_left)
+                self.assign(right, None if self._tells_more(right, left) else of_right)
             case Apply("**", (base, exponent)):
                 power = self._value(exponent)
                 self.assign(exponent, NONE)
                 self.assign(base, _scale_dimension(wanted, 1 / power if power else None))
             case Apply(name, parts):
                 self._assign_arguments(name, parts, wanted)
+
+    def _tells_more(self, part: Node, factor: Node) -> bool:
+        """Whether the signals in a sum tell its dimension better than what is wanted of the product: the number by
+        which the sum is multiplied is part of the form, and may have a unit."""
+        is_sum = isinstance(part, Apply) and part.name in ("+", "-", "minimum", "maximum", "**")
+        stated = self.dimension_of(factor, None) is None and self.dimension_of(factor) is not None
+        return is_sum and stated and self.dimension_of(part, None) is not None
 
     def _assign_arguments(self, name: str, parts: tuple[Node, ...], wanted: Dimension | None) -> None:
         first = parts[0]

@@ -17,6 +17,7 @@ from analysis.diagnosis.confirm.laws_to_play import (
     CONSTANT,
     can_be_played,
     constants_of,
+    find_special_case,
     hypothesis_of_judged,
     numbers_beside_laws,
     refit_laws,
@@ -42,6 +43,7 @@ ONLY_BESIDE_CALIBRATION = (
     "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may look like it; a "
     "calibrated model, or recordings of the device in order, would tell"
 )
+BESIDE_RUNAWAY = "the model without it leaves more than the mean of the signal, and all that bounds it gains"
 VAGUE = 1.96 * INTERVAL_FACTOR
 """Half width of an interval in standard errors: a logarithm with a larger relative error leaves its number open."""
 HELD_BY_SIMULATION = 0.9
@@ -79,7 +81,9 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
             whole = repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
             judged = Judgement("explained" if whole else "partly_explained", True)
             return SearchResult(whole_context, explained, judged, errors=errors)
-        named = refit_laws(balances, [law for number, law in enumerate(named) if number != vague])
+        kept = [*named[:vague], *named[vague + 1 :]]
+        simpler = None if errors is None else find_special_case(balances, kept, named[vague])
+        named = refit_laws(balances, kept if simpler is None else [*named[:vague], simpler, *named[vague + 1 :]])
     return None
 
 
@@ -99,16 +103,16 @@ def require_enough_gain(seen: SearchResult, repeats: bool) -> SearchResult:
 def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
     """The result with named effects of actuator and sensor made candidates, unless the signal itself shows them: the
     model was fitted to these recordings, so that a law of the motion that the catalogue lacks may look like a nonlinear
-    or late sensor."""
+    or late sensor. What the signal shows is a candidate, too, where the model without it predicts nothing."""
     found, demoted = seen.found, []
     doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
     if len(doubtful) < len(found.steps) and not predicts_something(seen.context.whole, found.plain):
-        # Beside a model that runs away, any bound of the prediction gains.
         doubtful = list(range(len(found.steps)))
     for place in reversed(doubtful):
         gain = held_out_gain(seen.context.whole, found.plain, seen.context.with_test_score(found.steps[place]))
         if gain is not None and gain.gain > 0:
-            demoted.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, ONLY_BESIDE_CALIBRATION))
+            why_not = BESIDE_RUNAWAY if found.steps[place].newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
+            demoted.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, why_not))
         found = without_effect(seen.context, found, place)
     if not doubtful:
         return seen

@@ -45,6 +45,21 @@ def refit_laws(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw
     return found
 
 
+def find_special_case(
+    balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]], refining: tuple[int, JudgedLaw]
+) -> tuple[int, JudgedLaw] | None:
+    """The law of the same axis that another one refines, still with that one's numbers; None where the balance does not
+    hold it, or it is named."""
+    axis, judged = refining
+    effect = EFFECTS.get(judged.law.effect)
+    taken = {law.law.effect for of, law in named if of == axis}
+    for place, law in enumerate(balances[axis].search.regression.laws):
+        alike = law.channel == judged.law.channel and law.effect not in taken
+        if effect is not None and alike and law.effect in effect.simpler:
+            return axis, replace(judged, place=place, law=law)
+    return None
+
+
 def constants_of(balances: Sequence[Balance]) -> Hypothesis:
     """Constant forces along the axes: a weight, or the offset of an amplifier or sensor, which mass, damping and
     stiffness do not describe."""

@@ -60,9 +60,8 @@ def fill_gaps(samples: FloatArray) -> FloatArray:
 
 
 def is_quasi_static(recording: Recording) -> bool:
-    """Whether positions alone were measured, and no time is known: then forces are compared as they stand beside the
-    positions. A measured speed or acceleration moves in a time of its own; where that is not known, it is counted in
-    samples."""
+    """Whether no time is known, and a position was measured (or no motion): then forces are compared as they stand
+    beside the positions. Where speeds or accelerations alone were measured, samples are counted as their time."""
     quantities = [
         quantity for signal in (recording.position, recording.response) if signal for quantity in signal.quantities
     ]

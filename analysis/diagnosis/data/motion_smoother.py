@@ -149,13 +149,21 @@ def _smoother_gains(
     try:
         predicted = _steady_covariance(scaled, observed, process_noise)
     except np.linalg.LinAlgError:  # states of very different sizes: slower, by an ordered Schur form
-        predicted = solve_discrete_are(scaled.T, observed.T, process_noise, eye)
+        predicted = _covariance_by_schur_form(scaled, observed, process_noise)
     gain = np.linalg.solve(observed @ predicted @ observed.T + eye, observed @ predicted).T
     if np.abs(np.linalg.eigvals(scaled - scaled @ gain @ observed)).max() >= 1:
         raise np.linalg.LinAlgError("a filter for the motion is not stable in floating point")
     found = predicted - gain @ observed @ predicted
     back = np.linalg.lstsq(predicted, scaled @ found, rcond=1e-13)[0].T
     return gain * large[:, None], np.ascontiguousarray(back * large[:, None] / large[None, :])
+
+
+def _covariance_by_schur_form(advance: FloatArray, observed: FloatArray, process_noise: FloatArray) -> FloatArray:
+    """As `_steady_covariance`. Raises numpy.linalg.LinAlgError."""
+    try:
+        return np.asarray(solve_discrete_are(advance.T, observed.T, process_noise, np.eye(len(observed))))
+    except ValueError as problem:  # what is not finite
+        raise np.linalg.LinAlgError(str(problem)) from problem
 
 
 def _steady_covariance(advance: FloatArray, observed: FloatArray, process_noise: FloatArray) -> FloatArray:

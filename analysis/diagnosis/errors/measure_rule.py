@@ -34,7 +34,7 @@ UNTIMED = (
     "speed, acceleration or frequency is known."
 )
 IN_SAMPLES = (
-    "No time is known: samples are counted in its place, so that every time, speed and frequency is per sample."
+    "No time is known: each sample is counted as one second, so that every time, speed and frequency is per sample."
 )
 IMPOSED = (
     "The motion was imposed and the force measured, so the force that the model needs along the motion is compared "

@@ -29,7 +29,8 @@ BALANCE_SAID = (
     "measured motion; its numbers are left open by a tenth, and by half of what the named laws change in them."
 )
 LEAST_ANSWER = 1e-3
-"""Share of the measured response that a fitted model must show; principle: a thousandth is no answer."""
+"""Share of the measured response's spread that a fitted model must show. By hand: models with masses without bound
+show 1e-30 of it, poor ones a tenth."""
 UNTIMED_SAID = (
     "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "
     "The mass in the file is a floor that no force shows; damping and mass are not known."
@@ -77,7 +78,7 @@ def fit_first_linear_model(
         return rigid, (RIGID_SAID,)
     try:
         fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {whose}")
-        if not _answers(fit.model, recordings[0]):
+        if not any(_answers(fit.model, recording) for recording in recordings):
             raise MechanicalFitRefused("the model that fits best hardly answers to the commands")
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         if (rigid := _rigid_model(recordings, whose)) is not None:

@@ -129,13 +129,15 @@ def _rank(weighed: JudgedLaw) -> int:
     return 0 if weighed.possible and weighed.gain_low > 0 else 1
 
 
-def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...]) -> tuple[str, ...]:
-    """What the first model holds beside mass, damping and stiffness; channels: of the commands."""
+def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...], in_samples: bool = False) -> tuple[str, ...]:
+    """What the first model holds beside mass, damping and stiffness; channels: of the commands. in_samples: samples are
+    counted as time."""
     said = []
     for channel, balance in zip(channels, balances, strict=False):
         beside, motion = balance.search.regression.beside, balance.search.regression.motions[0]
         laws = [law.effect for law in linear_laws(balance)]
-        parts = [f"a command that is {1e3 * beside.delay_s:.3g} ms late (a lag or a delay)"] if beside.delay_s else []
+        late = f"{beside.delay_s:.3g} samples" if in_samples else f"{1e3 * beside.delay_s:.3g} ms"
+        parts = [f"a command that is {late} late (a lag or a delay)"] if beside.delay_s else []
         parts += [noun_of(name) for name in dict.fromkeys(laws)]
         if len(motion.channels) > len(balances):
             others = [name for k, name in enumerate(motion.channels) if k != beside.own]

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.confirm import confirm_laws as by_balance
 from analysis.diagnosis.confirm.confirm_laws import (
     ONLY_BESIDE_CALIBRATION,
@@ -14,6 +15,7 @@ from analysis.diagnosis.confirm.confirm_laws import (
     unname_doubtful_effects,
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
+from analysis.diagnosis.confirm.laws_to_play import find_special_case
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search import SearchResult
@@ -150,6 +152,26 @@ def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
     assert not seen.found.steps
     (told,) = seen.unconfirmed
     assert (told.hypothesis.claims, told.gain, told.why_not) == ((name,), 0.5, ONLY_BESIDE_CALIBRATION)
+
+
+@pytest.mark.parametrize(
+    ("held", "named", "place"),
+    [(("cogging", "coulomb_friction"), (), 1), (("cogging",), (), None), (("coulomb_friction",), ("coulomb_friction",), None)],
+    ids=["in the balance", "not in it", "already named"],
+)  # fmt: skip
+def test_a_refinement_gives_way_to_its_special_case(held, named, place):
+    laws = tuple(SimpleNamespace(effect=name, channel=0) for name in held)
+    balance = SimpleNamespace(search=SimpleNamespace(regression=SimpleNamespace(laws=laws)))
+    bent = law_of_effect("position_dependent_friction", 5)
+    found = find_special_case([balance], [(0, law_of_effect(name, 7)) for name in named], (0, bent))
+    assert (found and (found[1].place, found[1].law.effect)) == (
+        place if place is None else (place, "coulomb_friction")
+    )
+
+
+def law_of_effect(name, place):
+    law = SimpleNamespace(effect=name, channel=0)
+    return JudgedLaw(place, law, {"level": 1.0}, 0.5, 0.4, 0.9, (), 1.0, "")
 
 
 @pytest.mark.usefixtures("gains_half")

@@ -72,10 +72,13 @@ def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(leve
     assert summed.startswith("u2 drives the same motion as u1")
 
 
-def test_of_two_commands_with_a_constant_sum_the_difference_drives():
+@pytest.mark.parametrize("share", [0.0, 1e-4])
+def test_of_two_commands_with_a_constant_sum_the_difference_drives(share):
+    """share: of the drive, that both have in common by chance, as by rounding."""
     push = smooth(4000, 1)
+    hum = share * push.std() * np.random.default_rng(4).standard_normal(4000)
     recording = of(
-        [("left", "force", "N", np.round(50 + push, 4)), ("right", "force", "N", np.round(50 - push, 4))],
+        [("left", "force", "N", 50 + push + hum), ("right", "force", "N", 50 - push + hum)],
         [("v", "velocity", "m/s", speed_of(push + 40 * push.std()))],
     )
 

@@ -1,14 +1,19 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from analysis.diagnosis.data import motion_smoother
 from analysis.diagnosis.data.motion_smoother import smooth_motion
 from analysis.diagnosis.data.observed import observe
+from analysis.diagnosis.errors.choose_measure import measure_by_force
 from analysis.diagnosis.forces.needed_force import band_motion, needed_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.along_motion import force_along
 from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.effects.simulation.simulator import simulate_mechanism
+from equalizer.plant.linear_simulation import LinearSteps, linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import filter_low_pass
 from equalizer.signals.recording import Recording
@@ -20,6 +25,10 @@ TIME_S = np.arange(4000) / RATE_HZ
 
 def body(mass: float = 2.0, damping: float = 5.0, stiffness: float = 300.0, quantity: str = "position"):
     return MechanicalModel("body", quantity, [[mass]], [[damping]], [[stiffness]], [[1.0]], [[1.0]])
+
+
+def _breaks_down(*_of: object) -> None:
+    raise np.linalg.LinAlgError("singular")
 
 
 def test_a_sine_needs_the_force_of_the_books() -> None:
@@ -101,8 +110,14 @@ def test_without_a_mass_friction_follows_the_motion_and_not_what_is_missing(name
     assert np.std((along[:, 0] + 20.0 * bent)[inside]) < 0.5
 
 
+@pytest.mark.parametrize("by_doubling", [True, False])
 @pytest.mark.parametrize("quantity", ["position", "velocity", "acceleration"])
-def test_the_smoother_finds_motion_and_missing_force_of_a_drifting_plant(quantity: str) -> None:
+def test_the_smoother_finds_motion_and_missing_force_of_a_drifting_plant(
+    monkeypatch: pytest.MonkeyPatch, quantity: str, by_doubling: bool
+) -> None:
+    """by_doubling: where that breaks down, an ordered Schur form finds the same."""
+    if not by_doubling:
+        monkeypatch.setattr(motion_smoother, "_steady_covariance", _breaks_down)
     plant = body(stiffness=0.0 if quantity != "acceleration" else 300.0, quantity=quantity)
     rng = np.random.default_rng(4)
     force = 3.0 * np.sin(2 * np.pi * 1.1 * TIME_S)[:, None]
@@ -115,3 +130,31 @@ def test_the_smoother_finds_motion_and_missing_force_of_a_drifting_plant(quantit
     inside = slice(500, -100)
     assert np.std((found.missing_force - missing)[inside]) < 0.2 * np.std(missing)
     assert np.std((found.axis_velocity - played.axis_velocity)[inside]) < 0.02 * np.std(played.axis_velocity)
+
+
+def test_a_smoother_of_what_is_not_finite_says_that_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion_smoother, "linear_steps", _without_numbers)
+    recording = Recording(
+        "body", *(Signal(np.ones((50, 1)), RATE_HZ, what, "1", ("x",)) for what in ("force", "position"))
+    )
+    with pytest.raises(np.linalg.LinAlgError):
+        smooth_motion(body(), observe(recording, 1), np.ones((50, 1)), np.array([1.0]))
+
+
+def _without_numbers(model: MechanicalModel, step_s: float) -> LinearSteps:
+    steps = linear_steps(model, step_s)
+    return replace(steps, advance=np.full_like(steps.advance, np.nan))
+
+
+def test_the_noise_of_an_idle_axis_is_not_capped_by_its_own_force() -> None:
+    """Force needed along an axis that nothing drives is all noise; of no axis more than the largest force is."""
+    both = MechanicalModel("two", "position", 2 * np.eye(2), 5 * np.eye(2), 300 * np.eye(2), np.eye(2), np.eye(2))
+    noise = 1e-4 * np.random.default_rng(6).standard_normal((4000, 2))
+    command = np.stack([3 * np.sin(2 * np.pi * 1.1 * TIME_S), np.zeros(4000)], axis=1)
+    moved = simulate_mechanism(both, command, RATE_HZ).response + noise
+    signals = (Signal(each, RATE_HZ, what, "1", ("x", "y")) for each, what in ((command, "force"), (moved, "position")))
+    measure = measure_by_force([Recording("two", *signals)], both, None).measure
+    (left,) = measure.residuals(both, ())
+    inside = slice(500, -500)
+    assert np.std(left[inside, 1]) < 3
+    assert measure.noise.max() <= np.std(command, axis=0).max()

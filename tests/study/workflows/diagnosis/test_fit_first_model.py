@@ -8,6 +8,7 @@ import pytest
 
 from analysis.diagnosis.errors.prediction_error import prediction_error
 from analysis.diagnosis.first_model.choose_structure import choose_structure
+from analysis.diagnosis.first_model.fitted_first import _answers
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
@@ -170,6 +171,11 @@ def test_the_file_is_accepted_for_a_diagnosis(tmp_path):
     found = read_given_model(done.plan.out, read_input([tmp_path / "rec.h5"], 1))
     assert found.tolerance is not None and found.tolerance.mass_kg > 0
     assert found.provenance["structure"] == "mass-spring"
+
+
+@pytest.mark.parametrize(("mass", "answers"), [(0.5, True), (1e31, False)])
+def test_a_model_of_masses_without_bound_does_not_answer(mass, answers):
+    assert _answers(device(mass, 2.0, 300.0), recorded(device(0.5, 2.0, 300.0))) == answers
 
 
 def test_segments_to_test_are_held_out(tmp_path):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.confirm.fitting_measures import list_fitting_measures
+from analysis.diagnosis.data.measured_motion import is_quasi_static
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.choose_measure import measure_of
@@ -93,3 +94,17 @@ def test_a_speed_without_a_clock_is_diagnosed_with_samples_as_its_time():
     assert matrix_unit("mass", found.improved.system) == "N m sample^2/rad"
     assert IN_SAMPLES in found.remarks and UNTIMED not in found.remarks
     assert found.diagnosis.fit.test.after < 0.02
+
+
+@pytest.mark.parametrize(
+    ("quantities", "time", "still"),
+    [
+        (("position",), "unknown", True), (("position", "velocity"), "unknown", True), (("force",), "unknown", True),
+        (("velocity",), "unknown", False), (("velocity", "acceleration"), "unknown", False), (("position",), "", False),
+    ],
+)  # fmt: skip
+def test_only_positions_without_a_clock_stand_still_in_time(quantities, time, still):
+    names = tuple("xyz"[: len(quantities)])
+    response = Signal(np.zeros((9, len(names))), 1.0, quantities, "1", names)
+    push = Signal(np.zeros((9, 1)), 1.0, "force", "N", ("fx",))
+    assert is_quasi_static(Recording("r", push, response, meta={"time": time})) == still
