@@ -156,7 +156,11 @@ def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
 
 @pytest.mark.parametrize(
     ("held", "named", "place"),
-    [(("cogging", "coulomb_friction"), (), 1), (("cogging",), (), None), (("coulomb_friction",), ("coulomb_friction",), None)],
+    [
+        (("cogging", "coulomb_friction"), (), 1),
+        (("cogging",), (), None),
+        (("coulomb_friction",), ("coulomb_friction",), None),
+    ],
     ids=["in the balance", "not in it", "already named"],
 )  # fmt: skip
 def test_a_refinement_gives_way_to_its_special_case(held, named, place):
