@@ -67,12 +67,16 @@ class PulseSettings:
 
 
 class OnsetLine:
-    """`pulse` gives a pulse and never raises; a thread of its own talks to the line. open_line raises OSError."""
+    """`pulse` gives a pulse and never raises; a thread of its own talks to the line.
 
-    def __init__(self, settings: PulseSettings, open_line: Callable[[PulseSettings], Line]) -> None:
+    open_line raises OSError. line: one that is open already, else the first pulse opens it."""
+
+    def __init__(
+        self, settings: PulseSettings, open_line: Callable[[PulseSettings], Line], line: Line | None = None
+    ) -> None:
         self._settings = settings
         self._open_line = open_line
-        self._line: Line | None = None
+        self._line = line
         self._asked: SimpleQueue[SimpleQueue[Pulse] | None] = SimpleQueue()
         self._busy = threading.Lock()
         self._thread = threading.Thread(target=self._work, name="onset line", daemon=True)
@@ -125,16 +129,17 @@ class OnsetLine:
 
 
 def open_onset_line(settings: PulseSettings) -> OnsetLine:
-    """Raises `DeviceError` for a line that cannot be opened now: before a session, not in the middle of one."""
+    """Opened once, before a session: opening it resets some boards, which then take no byte for a second or two.
+    Raises `DeviceError` for a line that cannot be opened."""
     try:
-        open_port(settings).close()
+        line = open_port(settings)
     except (OSError, ValueError) as problem:
         raise DeviceError(
             "The line for onset pulses cannot be opened",
             f"{settings.words}: {problem}.",
             "Plug it in, or take [pulse] out of the device's file (docs/hardware.md).",
         ) from problem
-    return OnsetLine(settings, open_port)
+    return OnsetLine(settings, open_port, line)
 
 
 def open_port(settings: PulseSettings) -> Line:

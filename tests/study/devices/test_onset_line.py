@@ -84,6 +84,14 @@ def test_a_line_that_hangs_holds_up_nothing_and_serves_again(line, pulses):
     assert pulse.trouble == ""
 
 
+def test_the_line_that_was_opened_before_a_session_serves_its_first_pulse(line, monkeypatch, patient):
+    monkeypatch.setattr(module, "open_port", line.open)
+    with contextlib.closing(open_onset_line(BYTE)) as pulses:
+        assert line.told == ["open"]
+        assert pulses.pulse().at_s is not None
+    assert line.told == ["open", "high", "low", "low", "close"]
+
+
 def test_an_error_without_words_is_named_by_its_kind(line, pulses, patient):
     line.broken = ValueError()
     assert pulses.pulse().trouble == "ValueError"
