@@ -193,7 +193,16 @@ def answer_sent_recording(folder: str, name: str, files: Files) -> Files:
     with TemporaryDirectory() as place, unforked():
         plan = RealPlan(Path(place) / "recordings", Path(place) / "out")
         write_files(plan.folder / folder, files)
-        (wanted,) = (each for each in read_real_folder(plan.folder).recordings if each.name == name)
+        found = read_real_folder(plan.folder)
+        wanted = next((each for each in found.recordings if each.name == name), None)
+        if wanted is None:
+            why = " ".join(trouble.why for trouble in found.troubles)
+            raise StudyError(
+                "A recording did not come to its worker",
+                f"{folder}, {name}: it is not among the files that were sent. {why}".strip(),
+                "Look whether it is still in the folder, and run the same command again.",
+                saved="All answers so far.",
+            )
         _answer(plan, wanted, 0.0, lambda what, share: None, RealClock())
         return read_files(answer_place(plan.out, wanted))
 

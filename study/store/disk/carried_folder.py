@@ -11,9 +11,9 @@ Files = dict[str, bytes]
 
 
 def read_files(folder: Path) -> Files:
-    """All regular files below the folder; links are left out. Raises CannotReadError."""
+    """All regular files below the folder, and what links to such files lead to. Raises CannotReadError."""
     try:
-        paths = sorted(path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
+        paths = sorted(path for path in folder.rglob("*") if path.is_file())
         return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
     except OSError as problem:
         raise CannotReadError(folder, problem) from problem

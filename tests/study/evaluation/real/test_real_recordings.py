@@ -8,9 +8,10 @@ from scipy.signal import cont2discrete, lfilter
 
 from study.errors import LeftError, StudyError
 from study.evaluation.real.real_folder import read_real_folder
-from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
+from study.evaluation.real.real_recordings import RealPlan, answer_sent_recording, diagnose_folder
 from study.evaluation.real.real_summary import real_lines
 from study.importing.model_library import list_shipped_models, model_for
+from study.store.disk.carried_folder import read_files, write_files
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.real_answer_file import read_real_answer
 from study.workflows.files.validate import validate_file
@@ -57,6 +58,24 @@ def test_one_recording_is_answered_and_the_others_are_reported(folder: Path, tmp
     before = kept.stat().st_mtime_ns
     assert diagnose_folder(RealPlan(folder, tmp_path / "out"), silent).results.answers[0] == axis
     assert kept.stat().st_mtime_ns == before
+
+
+def test_recordings_that_are_links_are_sent_to_workers_too(folder: Path, tmp_path: Path) -> None:
+    linked, there = tmp_path / "linked" / "axis", tmp_path / "there"
+    linked.mkdir(parents=True)
+    for path in (folder / "axis").iterdir():
+        (linked / path.name).symlink_to(path)
+    (linked / "gone.npz").symlink_to(folder / "no_such_file")
+    write_files(there / "axis", read_files(linked))
+    (sent,) = read_real_folder(there).recordings
+    assert (sent.name, [path.name for path in sent.found.files]) == ("run", ["run.npz"])
+    assert sent.model() is not None
+
+
+def test_a_recording_that_did_not_come_to_its_worker_is_named() -> None:
+    with pytest.raises(StudyError, match="did not come") as told:
+        answer_sent_recording("axis", "run", {"notes.txt": b"nothing"})
+    assert told.value.happened.startswith("axis, run: it is not among the files")
 
 
 PULLED = """
