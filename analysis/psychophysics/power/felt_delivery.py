@@ -35,8 +35,8 @@ def felt_delivery(
     trials: Iterable[Trial], frequencies_hz: Sequence[float], flawless_mps2_per_n: Sequence[float]
 ) -> FeltDelivery:
     """Medians over the measured test trials, by levels rounded to 1 dB. flawless_mps2_per_n: along the direction, at
-    each frequency. What no trial was measured for counts as absent. Raises ValueError where a frequency lacks a
-    measured direction."""
+    each frequency. What no trial of a level was measured for counts as absent. Raises ValueError where a frequency
+    lacks a measured direction."""
     groups = {group.frequency_hz: group for group in delivered_trials(trials)}
     if missing := [f"{f:g} Hz" for f in frequencies_hz if f not in groups or len(set(groups[f].side.tolist())) < 2]:
         raise ValueError(f"no measured trials of both directions at {', '.join(missing)}")
@@ -55,12 +55,19 @@ def _table(group: DeliveredTrials, side: float, flawless: float) -> Table:
     rows: list[Row] = []
     for level_db in np.unique(rounded[group.side == side]):
         mine = (group.side == side) & (rounded == level_db)
-        along, across, harmonics = (float(np.median(column[mine])) for column in columns)
-        rows.append((float(level_db), along, across, harmonics))
+        along, across, harmonics = (_median(column[mine]) for column in columns)
+        if along is not None:
+            rows.append((float(level_db), along, across or 0.0, harmonics or 0.0))
     return tuple(rows)
 
 
+def _median(values: FloatArray) -> float | None:
+    """Of the trials that were measured; None where none was."""
+    measured = values[np.isfinite(values)]
+    return float(np.median(measured)) if len(measured) else None
+
+
 def _share(group: DeliveredTrials, cue: Cue) -> FloatArray:
-    """Amplitude over that along the direction (n,), of which the cue holds the sum; 0 where it was not measured."""
+    """Amplitude over that along the direction (n,), of which the cue holds the sum; NaN where it was not measured."""
     values_db = group.values_db.get(cue)
-    return np.zeros(len(group.side)) if values_db is None else np.nan_to_num(10.0 ** (values_db / 20.0) - 1.0)
+    return np.full(len(group.side), np.nan) if values_db is None else 10.0 ** (values_db / 20.0) - 1.0

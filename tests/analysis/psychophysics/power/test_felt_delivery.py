@@ -99,3 +99,15 @@ def test_the_table_is_that_of_the_measured_trials_by_the_angle_of_the_direction(
                 assert (across, harmonics) == (pytest.approx(along / 2), pytest.approx(share * along))
     with pytest.raises(ValueError, match=r"directions at 15 Hz"):
         felt_delivery([trial for trial in trials if trial.frequency_hz != 15.0], (5.0, 15.0), (2.0, 4.0))
+
+
+def test_trials_that_were_not_measured_for_a_cue_do_not_count_as_flawless(simulate_study):
+    measured = [
+        replace(trial, delivered_mps2=trial.level_n, off_axis_mps2=0.5 * trial.level_n,
+                harmonics_mps2=0.1 * trial.level_n)
+        for trial in simulate_study(2, (0.4, 0.4, 0.4, 0.4, 0.4), 3)
+    ]  # fmt: skip
+    unmeasured = [replace(trial, harmonics_mps2=None, off_axis_mps2=None) for trial in measured]
+    alone = felt_delivery(measured, (5.0, 45.0), (2.0, 4.0))
+    assert alone.tables[0][0][0][3] > 0.0
+    assert felt_delivery([*measured, *unmeasured], (5.0, 45.0), (2.0, 4.0)) == alone
