@@ -31,7 +31,7 @@ class Stream(Protocol):
 
     def start(self) -> None: ...
 
-    def stop(self) -> None: ...
+    def abort(self) -> None: ...
 
     def close(self) -> None: ...
 
@@ -55,17 +55,17 @@ class MaskingSound:
         self.check()
 
     def check(self) -> None:
-        """Raises `DeviceError` where it should be heard and is not: an output that was unplugged."""
+        """Raises `DeviceError` where it is not heard: never begun, stopped, or on an output that was unplugged."""
         with _as_device_error("has stopped"):
-            if self._playing and not self._stream.active:
-                raise OSError(f"{self.output} plays no more")
+            if not self._playing or not self._stream.active:
+                raise OSError(f"{self.output} plays no more" if self._playing else f"{self.output} plays nothing")
 
     def stop(self) -> bool:
-        """Silent at once. Whether it played until now. Never raises."""
+        """Without what the output still holds in its buffers. Whether it played until now. Never raises."""
         played, self._playing = self._playing, False
         if played:
             with contextlib.suppress(Exception):
-                self._stream.stop()
+                self._stream.abort()
         return played
 
     def close(self) -> None:

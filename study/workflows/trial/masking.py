@@ -1,4 +1,4 @@
-"""Masking noise of a sitting: begun before the first trial, silent in pauses, logged; without it no trial begins."""
+"""Masking noise of a sitting: begun before the first trial, silent in pauses, logged; no trial counts without it."""
 
 import contextlib
 from collections.abc import Iterator
@@ -50,6 +50,18 @@ def check_masking(state: SessionState, sitting: Sitting) -> SessionState:
         _log(state, sitting, sitting.sound, playing=False, trouble=error.happened)
         raise
     return state
+
+
+def was_masked(sitting: Sitting) -> bool:
+    """Whether the noise was still heard at the answer, where it is wanted. What is wrong is logged before the next
+    trial."""
+    if sitting.sound is None:
+        return True
+    try:
+        sitting.sound.check()
+    except DeviceError:
+        return False
+    return True
 
 
 def stop_masking(state: SessionState, sitting: Sitting) -> SessionState:

@@ -18,8 +18,11 @@ from study.session.views.views import HandleView, Question, Task, Unanswered, pi
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
 from study.workflows.trial.ask_participant import Asked, ask_participant
 from study.workflows.trial.judge_trial import cause_of, judge
+from study.workflows.trial.masking import was_masked
 from study.workflows.trial.sitting import Pulse, Sitting, record, release_device
 from study.workflows.trial.trial_facts import Outcome, answer_health, trial_measured, trial_presented, trial_spoiled
+
+NOT_MASKED = Unanswered("the masking noise stopped during the trial", leave=False)
 
 
 def question_of(state: SessionState, present: Present) -> Question:
@@ -98,10 +101,13 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
     question = question_of(state, present)
     state = record(state, trial_presented(present, sitting), sitting)
     asked = ask_participant(state, present, question, sitting)
+    masked = was_masked(sitting)
     if asked.pulse is not None:
         state = _log_pulse(state, present, asked.pulse, sitting)
     if isinstance(asked.reply, Unanswered):
         return _void(state, present, asked, asked.reply, sitting)
+    if not masked:
+        return _void(state, present, asked, NOT_MASKED, sitting)
     answer = AnswerGiven(
         utc=sitting.clock.utc(),
         run=present.run,

@@ -29,7 +29,7 @@ class Output:
             raise self.refuses
         self.active = True
 
-    def stop(self) -> None:
+    def abort(self) -> None:
         self.active = False
 
     def close(self) -> None:
@@ -63,7 +63,6 @@ def test_it_is_silent_until_it_begins_and_after_it_was_stopped(sound, output):
     assert output.active and sound.output == "Headphones"
     assert sound.stop() is True and not output.active
     assert sound.stop() is False
-    sound.check()  # silent on purpose
     sound.start()
     assert output.taken(3) == [1, 2, 3]
     sound.close()
@@ -76,6 +75,15 @@ def test_an_output_that_stopped_by_itself_is_missed(sound, output):
     with pytest.raises(DeviceError, match="has stopped") as told:
         sound.check()
     assert "Headphones plays no more" in told.value.happened
+
+
+def test_noise_that_was_never_begun_or_was_stopped_is_missed(sound):
+    with pytest.raises(DeviceError, match="plays nothing"):
+        sound.check()
+    sound.start()
+    sound.stop()
+    with pytest.raises(DeviceError, match="plays nothing"):
+        sound.check()
 
 
 def test_an_output_that_refuses_is_an_error_with_what_to_do(sound, output):

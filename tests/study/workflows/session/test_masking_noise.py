@@ -9,20 +9,28 @@ import pytest
 from protocols.definition.preparation import MaskingSettings
 from study.devices.clock import RealClock, VirtualClock
 from study.errors import DeviceError
-from study.session.facts.events import MaskingPlayed, PauseTaken, SessionClosed, SessionInterrupted, TrialPresented
+from study.session.facts.events import (
+    MaskingPlayed,
+    PauseTaken,
+    SessionClosed,
+    SessionInterrupted,
+    TrialPresented,
+    TrialSpoiled,
+)
 from study.session.views.views import Unanswered
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_log
 from study.workflows.session import conduct_session
 from study.workflows.trial import masking
 
+NEVER = 10**6
 SETTINGS = MaskingSettings(play=True, level_db=-20.0, seed=5)
 
 
 class Sound:
     output = "Headphones"
 
-    def __init__(self, fails_at: int = 10**6) -> None:
+    def __init__(self, fails_at: int = NEVER) -> None:
         self.playing = False
         self.checks, self.fails_at = 0, fails_at
 
@@ -31,7 +39,7 @@ class Sound:
 
     def check(self) -> None:
         self.checks += 1
-        if self.checks == self.fails_at:
+        if self.checks >= self.fails_at:
             raise DeviceError("The masking noise has stopped", "Headphones plays no more.", "Plug them in.")
         assert self.playing
 
@@ -72,7 +80,7 @@ def test_it_plays_from_before_the_first_trial_to_the_end(sitter, sound):
     conducted = sitter.whole()
     told = log_of(conducted.folder)
     assert (told[0], told[-2:]) == ("on", ["off", "closed"])
-    assert set(told[1:-2]) == {"trial"} and sound.checks == len(told[1:-2])
+    assert set(told[1:-2]) == {"trial"} and sound.checks == 2 * len(told[1:-2])
     assert not sound.playing
 
 
@@ -92,14 +100,32 @@ def test_a_session_that_is_left_and_resumed_begins_it_anew(sitter, sound):
 
 
 def test_noise_that_falls_silent_ends_the_sitting_before_the_next_trial_and_nothing_is_lost(sitter, sound):
-    sound.fails_at = 4
+    sound.fails_at = 7  # before the 4th trial; each is checked before it and at its answer
     with pytest.raises(DeviceError, match="masking noise has stopped") as told:
         sitter.whole()
     assert "3 answers" in told.value.saved and "hapteq resume" in told.value.do_now
     (folder,) = (path for path in sitter.data.iterdir() if (path / "events.jsonl").exists())
     session = SessionFolder(folder)
     assert log_of(session)[-1] == "off Headphones plays no more."
+    sound.fails_at = NEVER
     assert sitter.resumed(session).left == ""
+
+
+def test_the_trial_in_which_the_noise_falls_silent_is_void_and_comes_again(sitter, sound):
+    sound.fails_at = 8
+    with pytest.raises(DeviceError, match="masking noise has stopped") as told:
+        sitter.whole()
+    assert "3 answers" in told.value.saved
+    (folder,) = (path for path in sitter.data.iterdir() if (path / "events.jsonl").exists())
+    session = SessionFolder(folder)
+    (void,) = (event for event in read_log(session.log).events if isinstance(event, TrialSpoiled))
+    assert "masking noise stopped" in void.reason
+    sound.fails_at = NEVER
+    assert sitter.resumed(session).left == ""
+    shown = [event for event in read_log(session.log).events if isinstance(event, TrialPresented)]
+    assert [(event.run, event.trial, event.attempt) for event in shown[3:5]] == [
+        (void.run, void.trial, 0), (void.run, void.trial, 1),
+    ]  # fmt: skip
 
 
 def test_the_level_is_below_that_of_the_file(monkeypatch):
