@@ -21,7 +21,7 @@ FIXED = ("subject", "session")
 
 TASK = (
     "Each trial plays a sinusoidal force at the hand, in one of two orthogonal directions; the participant answers "
-    "which. A staircase over the amplitude seeks the level at which 79.37 % of the answers are right."
+    "which."
 )
 QUESTION = "In which of the two directions did the force act? Answer 1 or 2."
 README = """# {name}
@@ -49,7 +49,7 @@ def write_bids(
         _text(folder / "code" / "protocol.toml", protocol_text),
         _json(folder / f"task-{task}_beh.json", {
             "TaskName": task,
-            "TaskDescription": f"{TASK} {_title(protocol_text)}".strip(),
+            "TaskDescription": " ".join(part for part in (TASK, _target(protocol_text), _title(protocol_text)) if part),
             "Instructions": QUESTION,
             **{column: _describe_column(column) for column in columns(Trial) if column not in FIXED},
         }),
@@ -75,6 +75,15 @@ def _tsv(trials: Sequence[Trial]) -> str:
 def _title(protocol_text: str) -> str:
     """Empty where the protocol has none."""
     return str(tomllib.loads(protocol_text).get("title", ""))
+
+
+def _target(protocol_text: str) -> str:
+    """Where the staircase converges (Levitt 1971); empty for rules of several wrong answers, and without a rule."""
+    rule = tomllib.loads(protocol_text).get("staircase", {})
+    if rule.get("up_after_wrong") != 1 or "down_after_right" not in rule:
+        return ""
+    share = 0.5 ** (1 / rule["down_after_right"])
+    return f"A staircase over the amplitude seeks the level at which {100 * share:.2f} % of the answers are right."
 
 
 def _describe_column(column: str) -> dict[str, str]:
