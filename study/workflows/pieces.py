@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 Key = TypeVar("Key")
 Result = TypeVar("Result")
 AHEAD = 100
-"""Pieces handed over at once, more than a cluster has workers: results and inputs of no more of them are in memory."""
+"""A bound, chosen by hand, on the pieces in flight: inputs and results of no more of them are in memory at once."""
 
 
 def finished_pieces(
@@ -20,8 +20,8 @@ def finished_pieces(
 ) -> Iterator[tuple[Key, Result]]:
     """Call `function(*arguments)` for each (key, arguments), and yield (key, result) in the order of finishing.
 
-    function, arguments and results are sent between processes. Exceptions of the function are raised here. An early
-    end cancels what was not begun. pieces: taken as they are needed.
+    function, arguments and results are sent between processes. Exceptions of the function are raised here, after the
+    results that are there by then. An early end cancels what was not begun. pieces: taken as they are needed.
     """
     waiting, running = iter(pieces), dict[Future[Result], Key]()
     try:
@@ -30,7 +30,9 @@ def finished_pieces(
                 running[executor.submit(_work, tuple(sys.argv), function, arguments)] = key
             if not running:
                 return
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
+            done = wait(running, return_when=FIRST_COMPLETED).done
+            # Results first: an error ends this, and must not lose what finished beside it.
+            for future in sorted(done, key=lambda each: each.cancelled() or each.exception() is not None):
                 key = running.pop(future)
                 yield key, future.result()
     finally:
