@@ -39,6 +39,7 @@ class ScreenServer(Server):
         self._token = secrets.token_urlsafe(TOKEN_BYTES)
         self._headers = self._safe_headers()
         self._seat = asyncio.Lock()
+        self._being_taken: set[str] = set()
 
     def initialize_logging(self) -> None:
         """No log of requests: it would hide important lines and show the token."""
@@ -62,11 +63,22 @@ class ScreenServer(Server):
         finally:
             self._seat.release()
 
+    async def handle_download(self, request: web.Request) -> web.StreamResponse:
+        """To the first who asks: two would share its pieces between them, and neither would have the whole."""
+        key = request.match_info["key"]
+        if request.method != "GET" or key in self._being_taken:
+            raise web.HTTPConflict(text="This report is sent once, and to one window.")
+        self._being_taken.add(key)
+        try:
+            return await super().handle_download(request)
+        finally:
+            self._being_taken.discard(key)
+
     async def _make_app(self) -> web.Application:
         """Page, connection, downloads and page resources, all below the token."""
         app = web.Application(middlewares=[self._require_token])
         app.on_response_prepare.append(self._add_headers)
-        app.router.add_get("/download/{key}", self.handle_download)
+        app.router.add_get("/download/{key}", self.handle_download, allow_head=False)
         app.add_subapp(f"/{self._token}", await super()._make_app())
         return app
 

@@ -171,7 +171,11 @@ def open_report(app: App[object], path: str) -> None:
     """In a browser of this machine; where the screen itself is in a browser, in a tab beside it, to which the page is
     sent: no browser goes from a page of a server to a file."""
     if app.is_web:
-        app.deliver_binary(path, open_method="browser", mime_type="text/html")
+        try:
+            app.deliver_binary(path, open_method="browser", mime_type="text/html")
+        except OSError as problem:
+            why = f"{problem.strerror or problem}: {path}. Make it anew, or open it where it is now."
+            app.notify(why, title="The report cannot be opened", severity="error", markup=False)
     else:
         app.open_url(file_url(path))
 

@@ -82,6 +82,19 @@ def test_the_report_opens_in_the_browser_where_there_is_one(on_screen, session):
     assert on_screen(SessionScreen(replace(session, report="")), story).opened == []
 
 
+def test_a_report_that_was_removed_is_reported_where_the_screen_is_in_a_browser(on_screen, session, monkeypatch):
+    told = []
+
+    async def story(sight):
+        monkeypatch.setattr(type(sight.app), "is_web", True)
+        monkeypatch.setattr(type(sight.app), "notify", lambda app, text, **how: told.append(f"{how['title']}: {text}"))
+        await sight.press("o")
+
+    assert on_screen(SessionScreen(session), story).opened == []
+    (sentence,) = told
+    assert sentence.startswith("The report cannot be opened: No such file or directory: /data/P01_001/")
+
+
 def test_a_path_with_blanks_is_a_url_that_a_browser_understands():
     assert file_url("/data/my study/report.html") == "file:///data/my%20study/report.html"
 
