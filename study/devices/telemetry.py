@@ -20,6 +20,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.governor import cells
 from study.errors import StudyError
+from study.store.disk.regular_file import open_regular
 
 ROWS = 16384
 """16 s at 1 kHz: a reader may stand still for so long and loses nothing."""
@@ -168,7 +169,8 @@ def _telemetry(rows: FloatArray) -> Telemetry:
 
 def _mapped(path: Path, access: int) -> FloatArray:
     """(1 + rows, RING_WIDTH). Raises OSError, ValueError."""
-    with path.open("rb" if access == mmap.ACCESS_READ else "r+b") as file:
+    # To open a pipe for reading would wait for its writer.
+    with open_regular(path) if access == mmap.ACCESS_READ else path.open("r+b") as file:
         memory = mmap.mmap(file.fileno(), 0, access=access)
     if len(memory) < 2 * ROW_BYTES or len(memory) % ROW_BYTES:
         raise ValueError("it is no telemetry ring")

@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import os
 import subprocess
 import sys
 import threading
@@ -210,6 +211,14 @@ def test_what_is_no_ring_is_reported(tmp_path, content):
     for each in (path, tmp_path / "none.ring"):
         with pytest.raises(StudyError, match="cannot be followed"):
             telemetry_of(str(each))
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+def test_a_pipe_in_the_place_of_a_ring_holds_up_nothing(tmp_path):
+    os.mkfifo(tmp_path / "a.ring")
+    with pytest.raises(StudyError, match="cannot be followed"):
+        telemetry_of(str(tmp_path / "a.ring"))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
