@@ -39,9 +39,9 @@ def ask_participant(state: SessionState, present: Present, question: Question, s
     if present.phase is Phase.DETECTION:
         return _in_one_of_two_intervals(state, present, question, sitting)
     sitting.device.hold(_stimulus(state, present, sitting))
+    started_s = sitting.clock.now_s()  # before the pulse: a lost one takes its time and shortens no response
     pulse = sitting.pulse()
     sitting.hand.feel(present, state.answers)
-    started_s = sitting.clock.now_s()
     reply = _reply_to(question, sitting)
     sitting.device.keep_alive()
     health = sitting.device.health()

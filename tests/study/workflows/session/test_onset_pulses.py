@@ -2,6 +2,7 @@
 
 import contextlib
 
+import numpy as np
 import pytest
 
 from study.devices.onset_line import Pulse
@@ -50,6 +51,19 @@ def test_the_session_is_the_same_without_a_line(sitter, pulses, tmp_path, monkey
     monkeypatch.setattr(conduct_session, "_pulses", lambda clock: contextlib.nullcontext(lambda: None))
     without = sitter.whole("P01").state
     assert [trial.answer for trial in with_line.trials] == [trial.answer for trial in without.trials]
+
+
+def test_the_time_of_a_lost_pulse_is_part_of_the_response_time(sitter, tmp_path, monkeypatch):
+    def response_times_s(lost_for_s: float) -> list[float]:
+        def pulses(clock):
+            return contextlib.nullcontext(lambda: clock.sleep(lost_for_s) or Pulse(LINE, None, "it is gone"))
+
+        monkeypatch.setattr(conduct_session, "_pulses", pulses)
+        sitter.data = tmp_path / f"{lost_for_s}"
+        return [trial.response_time_s for trial in sitter.whole("P01").state.trials]
+
+    late_s = np.subtract(response_times_s(0.05), response_times_s(0.0))
+    np.testing.assert_allclose(late_s, 0.05, atol=1e-6)
 
 
 def test_a_trial_that_was_left_has_its_pulse_too(sitter, pulses):
