@@ -63,7 +63,7 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
     Raises StudyError where the folder holds a rehearsal of another protocol, seed or model.
     """
     _check_same(rehearsal)
-    with _resumable(rehearsal):
+    with _resumable(rehearsal, "begun so far" if isinstance(workers, int) else "finished so far"):
         if isinstance(workers, Executor):
             _rehearse_elsewhere(rehearsal, workers, on_finished)
             return
@@ -92,7 +92,8 @@ def _rehearse_elsewhere(rehearsal: Rehearsal, executor: Executor, on_finished: C
 
 
 @contextmanager
-def _resumable(rehearsal: Rehearsal) -> Iterator[None]:
+def _resumable(rehearsal: Rehearsal, kept: str) -> Iterator[None]:
+    """kept: which sessions are in the folder after an interruption."""
     try:
         yield
     except KeyboardInterrupt as interruption:
@@ -100,7 +101,7 @@ def _resumable(rehearsal: Rehearsal) -> Iterator[None]:
             "Interrupted",
             "The rehearsal is not finished.",
             "Run the same command again: it goes on where it stopped.",
-            saved=f"All sessions begun so far are in {rehearsal.data}.",
+            saved=f"All sessions {kept} are in {rehearsal.data}.",
         ) from interruption
 
 

@@ -1,5 +1,6 @@
 """A small rehearsal: several at once, interrupted, gone on with."""
 
+from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
 from protocols.document.loading import load_protocol
-from study.errors import StudyError
+from study.errors import LeftError, StudyError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.sessions.archive import session_folders
 from study.store.sessions.event_log import read_log
@@ -48,6 +49,19 @@ def test_a_rehearsal_that_was_cut_off_continues_and_ends_the_same(rehearsal, sit
     other = Rehearsal(sitter.protocol, sitter.text, subjects=3, seed=6, data=sitter.data)
     with pytest.raises(StudyError, match="holds another rehearsal"):
         rehearse_study(other, workers=1, on_finished=done.append)
+
+
+class Interrupted(Executor):
+    """Ctrl-C, as the first session is handed to a worker."""
+
+    def submit(self, function, /, *arguments, **named):
+        raise KeyboardInterrupt
+
+
+def test_an_interruption_promises_only_what_workers_elsewhere_have_finished(rehearsal):
+    with pytest.raises(LeftError) as left:
+        rehearse_study(rehearsal, Interrupted(), lambda done: None)
+    assert left.value.saved == f"All sessions finished so far are in {rehearsal.data}."
 
 
 def test_neighbouring_rehearsals_share_no_participant():
