@@ -49,6 +49,10 @@ def test_the_wheel_carries_the_sources_of_an_exported_controller(wheel):
     assert names <= set(zipfile.ZipFile(wheel).namelist())
 
 
+def test_the_wheel_carries_the_bare_loop_that_the_doctor_times(wheel):
+    assert "study/workflows/checks/bare_loop.c" in zipfile.ZipFile(wheel).namelist()
+
+
 @needs_command
 def test_the_command_works_beside_a_strangers_analysis(tmp_path):
     (tmp_path / "analysis.py").write_text("raise SystemExit('the stranger ran')\n")
