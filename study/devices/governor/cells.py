@@ -1,5 +1,7 @@
 """Where each number stands in the arrays that the governed tick reads and changes, and what its codes mean."""
 
+import numpy as np
+
 (
     TICK_S, STIFFNESS, DAMPING, VELOCITY_SHARE, CENTRE_X, CENTRE_Y, CENTRE_Z,
     STIMULUS_CAP, FEEDBACK_CAP, TOTAL_CAP, SLEW_STEP, WATCHDOG_TICKS, LET_GO_TICKS,
@@ -50,7 +52,15 @@ ROW_SIZE = 15
     RING_INDEX, RING_TIME_S, RING_TICK, RING_POSITION, _PY, _PZ, RING_VELOCITY, _RV, _RW, RING_ACCELERATION, _RY, _RZ,
     RING_COMMANDED, _KY, _KZ, RING_APPLIED, _QY, _QZ, RING_PHASE, RING_FAULT, RING_MISSED, RING_CHECK, RING_WIDTH,
 ) = range(23)  # fmt: skip
-"""A row of the telemetry ring: one tick. RING_CHECK is the exclusive or of the bits of all other cells."""
+"""A row of the telemetry ring: one tick. RING_CHECK is the sum over all other cells, modulo 2^64, of their bits times
+the factor of their place."""
+
+RING_FACTORS = np.array(
+    [pow(0x9E3779B97F4A7C15, 1 + place, 2**64) for place in range(RING_CHECK)], dtype=np.uint64
+).view(np.int64)
+"""Odd, and another one for each place: equal changes in several cells, as a hand makes them, do not cancel. Bits enter
+as `bits ^ (bits >> RING_FOLD)`, because the lower bits of a round number are all zero."""
+RING_FOLD = 29
 
 RING_COUNT, RING_RATE_HZ, RING_FORMAT = range(3)
 """Cells of the ring's first row, its header: rows written so far, ticks per second, what the rows are."""

@@ -23,7 +23,9 @@ from study.devices.governor.cells import (
     RING_CHECK,
     RING_COMMANDED,
     RING_COUNT,
+    RING_FACTORS,
     RING_FAULT,
+    RING_FOLD,
     RING_INDEX,
     RING_MISSED,
     RING_PHASE,
@@ -61,6 +63,6 @@ def write_row(state: FloatArray, settings: FloatArray, ring: FloatArray, reading
     bits = row.view(np.int64)
     check = np.int64(0)
     for i in range(RING_CHECK):
-        check ^= bits[i]
+        check += (bits[i] ^ (bits[i] >> RING_FOLD)) * RING_FACTORS[i]
     bits[RING_CHECK] = check
     ring[0, RING_COUNT] = count + 1.0

@@ -6,7 +6,7 @@ import pytest
 
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings
-from protocols.definition.preparation import PracticeSettings
+from protocols.definition.preparation import MaskingSettings, PracticeSettings
 from protocols.document.hashing import TABLES_SINCE, protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
 from protocols.procedure.practice import PracticeState, add_answer, practice_over, practice_passed, right_of_last
@@ -100,6 +100,8 @@ def _other(table, threshold):
         return DetectionSettings(frequencies_hz=(25.0,))
     if table == "catch":
         return CatchSettings(one_in=20)
+    if table == "masking":
+        return MaskingSettings(play=True)
     if table == "limits":
         return replace(threshold.limits, longest_min=60.0)
     return getattr(threshold, table)

@@ -91,6 +91,14 @@ def test_a_row_that_is_still_being_written_waits_and_comes_whole(ring, cell):
     assert list(reader.read().time_s) == [3] and reader.lost == 0
 
 
+def test_a_row_with_two_cells_in_each_others_place_is_not_whole(ring):
+    writer, reader = Writer(ring), TelemetryReader(Path(ring.path))
+    writer.write(1)
+    pair = [cells.RING_POSITION, cells.RING_APPLIED]
+    writer.rows[1, pair] = writer.rows[1, pair[::-1]]
+    assert len(reader.read()) == 0
+
+
 def test_a_row_that_never_becomes_whole_is_lost_when_it_is_overwritten(ring):
     writer, reader = Writer(ring), TelemetryReader(Path(ring.path))
     writer.write(3)
