@@ -1,7 +1,7 @@
 """Doing it: the only package with side effects. Sessions, devices, files, people, screens.
 
 Layers, each knowing only those after it: `cli`, `tui`, `workflows`, `devices`, then `store` and `participants`
-beside each other, then `session`, which is pure, then `errors`.
+beside each other, then `session`, which is pure, then `regular_file` and `errors`.
 
 Read in this order: `session.facts.events` (the facts), `session.state.fold` (what they come to),
 `session.state.machine` (what is next), `workflows.session.run_session` and `workflows.trial.present_trial` (doing it),

@@ -39,7 +39,7 @@ def resume(
 
 def _is_simulated(session: str, data: Path) -> bool:
     """Whether its first line says that a simulated participant takes it: that one needs no screen."""
-    from study.store.disk.regular_file import DOCUMENT_BYTES, open_regular
+    from study.regular_file import DOCUMENT_BYTES, open_regular
 
     for folder in (Path(session), data / session):
         try:

@@ -20,7 +20,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.governor import cells
 from study.errors import StudyError
-from study.store.disk.regular_file import open_regular
+from study.regular_file import open_regular
 
 ROWS = 16384
 """16 s at 1 kHz: a reader may stand still for so long and loses nothing."""

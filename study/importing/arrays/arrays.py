@@ -13,9 +13,9 @@ from study.importing.arrays.mat_arrays import read_mat5_arrays
 from study.importing.arrays.stored_arrays import read_hdf5_arrays, read_npz_arrays
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
+from study.regular_file import open_regular
 from study.store.disk.file_errors import DAMAGED, CannotReadError, UnusableFileError
 from study.store.disk.hdf5_file import is_hdf5
-from study.store.disk.regular_file import open_regular
 
 Array = npt.NDArray[Any]
 KINDS = ".csv, .txt, .tsv, .dat (tables), .npz, .npy, .mat, .h5 and .hdf5"

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from study.importing.arrays.table_layout import EMPTY, Line, TableLayout, find_layout, is_comment, split_row
 from study.importing.map_format.import_map import CsvMap
+from study.regular_file import TABLE_BYTES, read_regular
 from study.store.disk.file_errors import CannotReadError
-from study.store.disk.regular_file import TABLE_BYTES, read_regular
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from study.regular_file import read_regular
 from study.store.disk.declared_size import SizeLimit
-from study.store.disk.regular_file import read_regular
 
 Array = npt.NDArray[Any]
 MOST_MAT_BYTES = 2**32

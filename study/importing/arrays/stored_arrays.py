@@ -12,10 +12,10 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
+from study.regular_file import open_regular
 from study.store.disk.declared_size import SizeLimit
 from study.store.disk.hdf5_contents import datasets_in
 from study.store.disk.hdf5_file import open_any_hdf5
-from study.store.disk.regular_file import open_regular
 
 Array = npt.NDArray[Any]
 _PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)

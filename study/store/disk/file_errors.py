@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 from study.errors import StudyError
-from study.store.disk.regular_file import RefusedFileError
+from study.regular_file import RefusedFileError
 
 CHECKED = "Correct it, or make it again; `hapteq validate` checks it."
 

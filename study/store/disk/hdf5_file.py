@@ -10,11 +10,11 @@ import h5py
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from study.regular_file import open_regular
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import DAMAGED, CannotReadError, UnusableFileError
 from study.store.disk.hdf5_attributes import AttributeProblemError, numbers_attribute, text_attribute
 from study.store.disk.hdf5_contents import check_contents
-from study.store.disk.regular_file import open_regular
 
 Value = TypeVar("Value")
 

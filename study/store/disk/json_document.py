@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from study.regular_file import DOCUMENT_BYTES
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.provenance import Provenance
-from study.store.disk.regular_file import DOCUMENT_BYTES
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 

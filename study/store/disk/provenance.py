@@ -11,8 +11,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path, PurePath
 from typing import Any
 
+from study.regular_file import open_regular
 from study.store.disk.file_errors import CannotReadError
-from study.store.disk.regular_file import open_regular
 
 PACKAGES = ("hapteq", "numpy", "scipy", "numba", "h5py", "pandas", "statsmodels")
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from study.regular_file import TABLE_BYTES, read_regular
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import CannotReadError
-from study.store.disk.regular_file import TABLE_BYTES, read_regular
 
 
 def read_text(path: Path, most_bytes: int = TABLE_BYTES) -> str:

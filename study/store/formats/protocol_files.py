@@ -15,9 +15,9 @@ from protocols.document.loading import Protocol, ProtocolError, load_protocol
 from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_of, lock_to_json
 from study.errors import StudyError, WrongUseError
 from study.local_clock import machine_zone
+from study.regular_file import DOCUMENT_BYTES
 from study.session.views.local_time import local_time
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.regular_file import DOCUMENT_BYTES
 from study.store.disk.text_file import read_text, write_text
 from study.store.disk.toml_text import read_toml_text
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from study.errors import StudyError
+from study.regular_file import DOCUMENT_BYTES, open_regular, read_regular
 from study.session.facts.events import SESSION_FORMAT, SESSION_VERSION, Event, event_line, parse_event
 from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained, write_chained
 from study.store.disk.atomic_write import sync_folder
 from study.store.disk.privacy import PRIVATE_FILE
-from study.store.disk.regular_file import DOCUMENT_BYTES, open_regular, read_regular
 
 LOG_NAME = "events.jsonl"
 NO_LINES = Chain()

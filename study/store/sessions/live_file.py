@@ -7,10 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, get_args
 
+from study.regular_file import read_regular
 from study.session.facts.fact_types import utc_time
 from study.session.watching.live import Activity, Live
 from study.store.disk.privacy import write_private
-from study.store.disk.regular_file import read_regular
 from study.store.disk.strict_json import load_json
 
 LIVE_NAME = "live.json"

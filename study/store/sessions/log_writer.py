@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from study.store.disk.regular_file import open_regular
+from study.regular_file import open_regular
 
 
 def is_log_locked(log: Path) -> bool | None:

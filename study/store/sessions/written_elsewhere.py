@@ -4,10 +4,10 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from study.regular_file import DOCUMENT_BYTES, read_regular
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.real_folder import is_real_file
-from study.store.disk.regular_file import DOCUMENT_BYTES, read_regular
 from study.store.sessions.archive import FOLDER
 
 WRITTEN_ELSEWHERE = "written_elsewhere.txt"

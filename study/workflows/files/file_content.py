@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from study.regular_file import DOCUMENT_BYTES
 from study.store.disk.file_errors import CannotReadError, UnusableFileError
 from study.store.disk.hdf5_file import format_of, is_hdf5
-from study.store.disk.regular_file import DOCUMENT_BYTES
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text
 from study.store.disk.toml_text import TOML_BYTES, too_long_key

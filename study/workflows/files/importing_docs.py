@@ -10,8 +10,8 @@ from study.importing.expressions.budget import DEEPEST, LARGEST, NUMBERS, WORK
 from study.importing.expressions.functions import FUNCTIONS
 from study.importing.map_format.map_toml import MAP_SCHEMA, describe_allowed_in_map
 from study.importing.map_library import list_shipped_maps, read_map
+from study.regular_file import TABLE_BYTES
 from study.store.disk.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES
-from study.store.disk.regular_file import TABLE_BYTES
 
 EXAMPLE = """\
 device = "one axis of our rig"

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from study.errors import StudyError
+from study.regular_file import DOCUMENT_BYTES
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.privacy import privacy_warning
-from study.store.disk.regular_file import DOCUMENT_BYTES
 from study.store.disk.strict_json import load_json
 from study.store.disk.toml_text import TOML_BYTES, too_long_key
 from study.store.formats.recording_file import read_recording

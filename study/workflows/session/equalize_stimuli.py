@@ -14,13 +14,13 @@ from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.device import DeviceInfo
 from study.errors import StudyError
+from study.regular_file import read_regular
 from study.session.facts.level_scale import EqualizedFacts, LevelScale
 from study.session.state.state import SessionState
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, highest_level_n, limits_of_study
 from study.session.stimulus.stimulus import direction_vector, held_stimulus
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.provenance import sha256_of
-from study.store.disk.regular_file import read_regular
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.sessions.archive import SessionFolder
 from study.workflows.equalizer.spring_beside_model import spring_outside_model

@@ -5,11 +5,11 @@ import tomllib
 from pathlib import Path
 
 from study.errors import StudyError
+from study.regular_file import read_regular
 from study.session.facts.events import PlaceTaken, SessionOpened, parse_event
 from study.session.facts.log_chain import Chain, read_chained
 from study.session.state.rules import place_comes_later
 from study.session.state.state import SessionState
-from study.store.disk.regular_file import read_regular
 from study.store.sessions.archive import SessionFolder, session_folders
 from study.store.sessions.event_log import read_opening
 from study.store.sessions.session_lock import hold_places_lock

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from study.regular_file import open_regular, read_regular
 from study.store.disk.real_folder import is_real_file, is_real_folder
-from study.store.disk.regular_file import open_regular, read_regular
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 from study.store.sessions.archive import FOLDER, TOMBSTONE_NAME, SessionFolder
 from study.store.sessions.session_lock import LOCK_NAME

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from equalizer.signals.signal import FloatArray
 from study.errors import StudyError
-from study.store.disk.regular_file import open_regular
+from study.regular_file import open_regular
 
 LONGEST_FIRST_BYTES = 2**20
 """Of a log's first line, which says what session it is of."""

@@ -12,10 +12,10 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.loading import ProtocolError, load_protocol
 from protocols.procedure.schedule import runs
 from study.errors import StudyError
+from study.regular_file import read_regular
 from study.session.facts.events import SessionOpened
 from study.session.state.state import SessionState
 from study.session.views.archive_views import SessionLine
-from study.store.disk.regular_file import read_regular
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_opening
 from study.store.sessions.log_seal import is_sealed, seal_paths

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from study.store.disk.regular_file import TABLE_BYTES, open_regular
+from study.regular_file import TABLE_BYTES, open_regular
 from study.workflows.views.lsl_outlets import not_followed_error
 
 EVERY_S = 0.02

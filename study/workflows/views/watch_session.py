@@ -4,6 +4,7 @@ import io
 from pathlib import Path
 
 from study.errors import StudyError
+from study.regular_file import TABLE_BYTES, open_regular
 from study.session.facts.events import SessionOpened, parse_event
 from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained
 from study.session.facts.log_time import seconds_between
@@ -15,7 +16,6 @@ from study.session.watching.watch_view import WatchView
 from study.session.watching.watched import Watched, begin_watching
 from study.session.watching.watched import follow as after
 from study.session.watching.watching import LiveInfo, watch_view
-from study.store.disk.regular_file import TABLE_BYTES, open_regular
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import read_live
 from study.store.sessions.log_seal import read_seal, seal_paths

@@ -12,7 +12,7 @@ import pytest
 
 from study.cli.main import main
 from study.errors import StudyError
-from study.store.disk.regular_file import open_regular
+from study.regular_file import open_regular
 from study.workflows.views import stream_session as module
 from study.workflows.views.lsl_outlets import MarkerOutlet, source_id
 from study.workflows.views.stream_session import FRESH_S, Beside, measured_offset_s, stream_session

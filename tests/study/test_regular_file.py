@@ -12,9 +12,9 @@ from study.errors import StudyError
 from study.importing.arrays.arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_library import find_map, read_map
+from study.regular_file import RefusedFileError, open_regular, read_regular
 from study.store.disk.file_errors import CannotReadError
 from study.store.disk.provenance import sha256_of
-from study.store.disk.regular_file import RefusedFileError, open_regular, read_regular
 from study.store.disk.text_file import read_text
 from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.identified_model_file import read_identified_model
