@@ -38,7 +38,7 @@ from study.workflows.views.watch_session import follow
 
 pytestmark = pytest.mark.timeout(60)
 
-FROZEN = Path(__file__).parents[3] / "frozen" / "v0_1"
+FROZEN = Path(__file__).parents[1] / "frozen" / "v0_1"
 READERS = {
     "recording": (read_recording, ".h5"),
     "identified model": (read_identified_model, ".h5"),
