@@ -128,7 +128,11 @@ LAW_WORDS: Mapping[str, LawWords] = {
         EffectWords("a force that drifts during the recording", {"change": _CHANGE}), {"change": _FORCE}
     ),
     "condition_dependent_friction": LawWords(
-        EffectWords("dry friction that depends on the recorded condition", {"change": _PER_CONDITION}),
+        EffectWords("dry friction that depends on the recorded condition", {"level": _BARE, "change": _PER_CONDITION}),
+        {"level": _FORCE, "change": _FORCE},
+    ),
+    "condition_dependent_force": LawWords(
+        EffectWords("a force that depends on the recorded condition", {"change": _PER_CONDITION}),
         {"change": _FORCE},
     ),
     "condition_dependent_damping": LawWords(
@@ -168,7 +172,13 @@ LAW_WORDS: Mapping[str, LawWords] = {
     "sensor_play": LawWords(EffectWords("play before the sensor", {"gap": "a gap of {}"}), {}, place="sensor"),
     "sensor_asymmetry": LawWords(EffectWords("a sensor that reads more to one side (square)"), place="sensor"),
 }
-"""Laws of the force balance, and faults beside clean recordings, that no simulation plays."""
+"""Laws of the force balance, and faults beside clean recordings, that the catalogue has no effect for."""
+
+PLAYED_AS_FORMULA = (
+    "actuator_curve", "condition_dependent_friction", "condition_dependent_damping", "condition_dependent_stiffness",
+    "condition_dependent_force",
+)  # fmt: skip
+"""Those of them that simulations play as a discovered law."""
 
 OF_THE_WHOLE = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", "logger_offset", "lost_samples")
 """Faults of the whole sensor or logger, which need no place where all channels share them."""

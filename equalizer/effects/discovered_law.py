@@ -1,7 +1,10 @@
 """A discovered law as an effect: a formula that is added to the force, or replaces a command or a response."""
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
+from keyword import iskeyword
 
 import numpy as np
 
@@ -9,17 +12,27 @@ from equalizer.effects.effect import Acts, AxisForce, Effect, OnCommand, OnRespo
 from equalizer.effects.simulation.law_kernel import PER_AXIS, law_force
 from equalizer.laws.evaluate import evaluate, evaluate_held
 from equalizer.laws.law import Law
-from equalizer.laws.parse import MEMORY
+from equalizer.laws.parse import FUNCTIONS, MEMORY
 from equalizer.laws.program import DEEPEST, program_of
 from equalizer.laws.roles import Role, roles
 from equalizer.laws.tree import Apply, Node, Variable, nodes
-from equalizer.laws.units import FORCE, SECOND, motion_dimension, units_of
+from equalizer.laws.units import FORCE, NONE, SECOND, motion_dimension, units_of
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
+from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
 LETTERS, DERIVATIVES, COMMAND = "xyz", ("", "v", "a"), "f"
+_TAKEN = {
+    "t",
+    "pi",
+    "q",
+    "v",
+    "f",
+    *FUNCTIONS,
+    *(prefix + letter for letter in LETTERS for prefix in (*DERIVATIVES, COMMAND)),
+}
 LARGEST, STEEPEST = 1e15, 20.0
 """Of a free number; of an exponent."""
 
@@ -32,6 +45,14 @@ class Channels:
     outputs: tuple[str, ...] = ("ax", "ay", "az")
     quantity: str = "acceleration"
     """Of the response."""
+    conditions: tuple[str, ...] = ()
+
+
+def law_channels(recording: Recording) -> Channels:
+    response, condition = recording.response, recording.condition
+    return Channels(
+        recording.command.channels, response.channels, response.quantities[0], condition.channels if condition else ()
+    )
 
 
 def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
@@ -43,6 +64,8 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
     make: dict[str, Callable[[Law, Channels], Acts]] = {
         "force": _force_action, "command": _command_action, "response": _response_action
     }  # fmt: skip
+    known = set(condition_names(channels.conditions))
+    needs = law.acts_on == "force" and not known.isdisjoint(law.variables)
     return Effect(
         name=DISCOVERED_LAW,
         equation=f"{_left_hand_side(law)} {law.text}",
@@ -52,8 +75,20 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
         acts=make[law.acts_on](law, channels),
         starts=lambda evidence, axis: (),
         law=law,
-        of_time="t" in law.variables,
+        of_time="t" in law.variables or needs,
+        with_conditions=partial(_force_action, law, channels) if needs else None,
     )
+
+
+def condition_names(channels: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of recorded conditions in a formula: their channels' names where the language of laws has them as names of
+    nothing else, else c1, c2, … in their order."""
+    return tuple(name if _is_free(name) else f"c{place}" for place, name in enumerate(channels, 1))
+
+
+def _is_free(name: str) -> bool:
+    known = iskeyword(name) or name in _TAKEN or re.fullmatch(r"[pc]\d+", name)
+    return name.isidentifier() and not known
 
 
 def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ...]:
@@ -66,6 +101,8 @@ def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ..
     for letter in LETTERS:
         signals |= {prefix + letter: orders[number] for number, prefix in enumerate(DERIVATIVES)}
         signals[COMMAND + letter] = FORCE
+    # Conditions are counted in their own unit, which a formula divides by.
+    signals = dict.fromkeys(law.variables, NONE) | signals
     return units_of(law.tree, law.numbers, signals, orders[order] if law.acts_on == "response" else FORCE, system)
 
 
@@ -133,7 +170,10 @@ def reading_names(channels: Channels) -> tuple[str, ...]:
 
 def force_signals(channels: Channels) -> dict[str, int]:
     """Column of each signal among those of the compiled law."""
-    return {"t": 0, **{name: 1 + place for name, place in _motion_signals(channels)}}
+    names = condition_names(channels.conditions)
+    first = 1 + PER_AXIS * len(channels.inputs)
+    conditions = {name: place for place, name in enumerate(names, first)}
+    return conditions | {"t": 0, **{name: 1 + place for name, place in _motion_signals(channels)}}
 
 
 def _motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
@@ -148,17 +188,25 @@ def _motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
         yield name, PER_AXIS * axis + len(DERIVATIVES)
 
 
-def _force_action(law: Law, channels: Channels) -> AxisForce:
+def _force_action(law: Law, channels: Channels, samples: FloatArray | None = None, rate_hz: float = 0.0) -> AxisForce:
+    """samples: (n, q), the recorded conditions, at `rate_hz`, each held until the next one; None = not known."""
     signals = force_signals(channels)
-    program, axes = program_of(law.tree, signals), len(channels.inputs)
-    heavy = any((signals[name] - 1) % PER_AXIS == 2 for name in law.variables if name != "t")
+    program, axes, conditions = program_of(law.tree, signals), len(channels.inputs), len(channels.conditions)
+    places = {signals[name] for name in law.variables if name not in ("t", "pi")}
+    heavy = any((place - 1) % PER_AXIS == 2 for place in places if place <= PER_AXIS * axes)
+    needed = any(place > PER_AXIS * axes for place in places)
+    table = np.empty((0, conditions)) if samples is None else samples
 
     def pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
         if model.inputs != axes:
             raise ValueError(f"the law {law.text} is for {axes} axes; the model has {model.inputs}")
-        return np.concatenate([[axes, heavy], program.with_numbers(law_with_values(law, values).numbers)])
+        if needed and not len(table):
+            raise ValueError(f"the law {law.text} needs conditions that were not recorded")
+        head = [axes, heavy, conditions if len(table) else 0, len(table), rate_hz]
+        numbers = program.with_numbers(law_with_values(law, values).numbers)
+        return np.concatenate([head, table.ravel(), numbers])
 
-    memory = DEEPEST + 1 + PER_AXIS * axes + program.memory
+    memory = DEEPEST + 1 + PER_AXIS * axes + conditions + program.memory
     return AxisForce(law_force, pack, memory=memory, acceleration=heavy, sees=True)
 
 

@@ -152,6 +152,9 @@ class Effect:
     """Of an effect that has no name of its own: its formula."""
     of_time: bool = False
     """It depends on time within a recording, or on rare events: no excerpt represents the whole recording."""
+    with_conditions: Callable[[FloatArray, float], Acts] | None = None
+    """Of an effect that depends on recorded conditions: how it acts under these, (n, q) at a rate in Hz, from a
+    simulation's first sample on."""
 
     def __post_init__(self) -> None:
         _living[id(self)] = self

@@ -5,7 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, LETTERS, Channels, axis_names, law_effect, law_values
+from equalizer.effects.discovered_law import (
+    COMMAND,
+    DERIVATIVES,
+    LETTERS,
+    Channels,
+    axis_names,
+    law_channels,
+    law_effect,
+    law_values,
+)
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
@@ -29,8 +38,7 @@ class LawEntry:
 
 def kept_effects(entries: Sequence[LawEntry], recording: Recording) -> tuple[Effect, ...]:
     """Effects of all entries, written in this recording's channels. Raises LawError for a signal that it lacks."""
-    response = recording.response
-    channels = Channels(recording.command.channels, response.channels, response.quantities[0])
+    channels = law_channels(recording)
     return tuple(effect for entry in entries for effect in effects_of(entry, channels))
 
 

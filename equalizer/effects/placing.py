@@ -4,12 +4,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.discovered_law import Channels, law_effect, law_values, law_with_values
+from equalizer.effects.discovered_law import Channels, law_channels, law_effect, law_values, law_with_values
 from equalizer.effects.effect import Effect, PlacedEffect
 from equalizer.laws.law import Law
 from equalizer.laws.parse import LawError
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME, LAW_PLACES, Place
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, suggest_word
+from equalizer.signals.recording import Recording
 
 SHORT = 2
 """Longest channel name that is quantity and axis alone, such as `fx`."""
@@ -17,6 +18,11 @@ SHORT = 2
 
 class PlacingError(ValueError):
     """An effect that cannot be placed in this model. Says which and why."""
+
+
+def place_recorded_effects(model: MechanicalModel, recording: Recording) -> tuple[PlacedEffect, ...]:
+    """`place_effects` at a recording's channels, with the conditions that it holds. Raises PlacingError."""
+    return _place_effects(model, replace(law_channels(recording), quantity=model.quantity))
 
 
 def place_effects(
@@ -27,7 +33,10 @@ def place_effects(
     An axis is named by its channel ('fx', 'ax') or by its letter ('x'). A parameter that a file leaves out takes its
     default. Raises PlacingError for an unknown effect or axis, or a value that must not be negative.
     """
-    channels = Channels(input_channels, output_channels, model.quantity)
+    return _place_effects(model, Channels(input_channels, output_channels, model.quantity))
+
+
+def _place_effects(model: MechanicalModel, channels: Channels) -> tuple[PlacedEffect, ...]:
     return tuple(_place_effect(effect, channels) for effect in model.effects)
 
 
@@ -85,9 +94,7 @@ def _place_effect(effect: ModelEffect, channels: Channels) -> PlacedEffect:
         value = effect.parameters.get(parameter.name, 0.0)
         if parameter.scale == "log" and value < 0:
             raise PlacingError(f"{effect.kind}.{parameter.name} is {value:g}; it must not be negative")
-    return PlacedEffect(
-        entry, _find_sites(effect, _channels_of_place(place_of_effect(entry), channels)), effect.parameters
-    )
+    return PlacedEffect(entry, find_sites(effect, channels.inputs, channels.outputs), effect.parameters)
 
 
 def _place_law(effect: ModelEffect, law: Law, channels: Channels) -> PlacedEffect:
@@ -95,16 +102,14 @@ def _place_law(effect: ModelEffect, law: Law, channels: Channels) -> PlacedEffec
         entry = law_effect(law, channels)
     except LawError as error:
         raise PlacingError(f"{effect.kind} on {effect.axis}: {error}") from error
-    return PlacedEffect(
-        entry, _find_sites(effect, _channels_of_place(place_of_effect(entry), channels)), law_values(law)
-    )
+    return PlacedEffect(entry, find_sites(effect, channels.inputs, channels.outputs), law_values(law))
 
 
-def _channels_of_place(place: Place, channels: Channels) -> tuple[str, ...]:
-    return channels.outputs if place == "sensor" else channels.inputs
-
-
-def _find_sites(effect: ModelEffect, channels: tuple[str, ...]) -> tuple[int, ...]:
+def find_sites(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:
+    """Numbers of the axes or channels that an effect of a model names; all of them where it names none. Raises
+    PlacingError."""
+    place = EFFECTS_BY_NAME[effect.kind].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
+    channels = outputs if place == "sensor" else inputs
     if effect.axis is None:
         return tuple(range(len(channels)))
     exact = tuple(number for number, channel in enumerate(channels) if channel == effect.axis)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, axis_names
-from equalizer.effects.placing import axis_letter, place_effects
+from equalizer.effects.placing import axis_letter, find_sites
 from equalizer.laws.law import Law
 from equalizer.laws.tree import Apply, Node, Variable, format_formula
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
@@ -44,13 +44,13 @@ def _turned_effects(
         return (effect,)
     if effect.law is not None and effect.law.acts_on == "response":
         return (effect,)
-    (placed,) = place_effects(replace(model, effects=(effect,)), inputs, outputs)
+    sites = find_sites(effect, inputs, outputs)
     if effect.law is not None:
-        return (replace(effect, law=_turned_law(effect.law, placed.sites[0], way, channels)),)
-    letters = [effect.axis] if effect.axis is not None else [axis_letter(inputs[site], inputs) for site in placed.sites]
+        return (replace(effect, law=_turned_law(effect.law, sites[0], way, channels)),)
+    letters = [effect.axis] if effect.axis is not None else [axis_letter(inputs[site], inputs) for site in sites]
     return tuple(
         replace(effect, axis=letter, parameters=_turned_numbers(effect, site, way))
-        for site, letter in zip(placed.sites, letters, strict=True)
+        for site, letter in zip(sites, letters, strict=True)
     )
 
 

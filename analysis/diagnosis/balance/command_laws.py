@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from analysis.diagnosis.balance.judged_law import Formula
+from analysis.diagnosis.balance.law import Formula
 from equalizer.effects.force_nonlinearity import square_law_force
 from equalizer.signals.signal import FloatArray
 

@@ -24,10 +24,16 @@ SHARP = RESTS
 """Width of the smoothed sign of a dry friction, over the rms speed, where nothing shows a wider one."""
 
 
+def friction_widths(of: Scales) -> tuple[FloatArray, tuple[tuple[float, float]]]:
+    """Widths of the smoothed sign of a dry friction, m/s, and between which they may be refined."""
+    sharp = SHARP * of.speed
+    return sharp * np.geomspace(1.0, 50.0, 7), ((0.1 * sharp, 0.5 * of.speed),)
+
+
 def friction_laws(c: int, of: Scales) -> Iterator[Law]:
     sharp = SHARP * of.speed
-    spans = ((0.1 * sharp, 0.5 * of.speed),)
-    for width in sharp * np.geomspace(1.0, 50.0, 7):
+    widths_of_sign, spans = friction_widths(of)
+    for width in widths_of_sign:
         yield Law(
             "coulomb_friction", c, (float(width),), lambda m, n: smooth_sign(m.velocity[:, c : c + 1], n[0]),
             name_positive_weight("level"), bounded=spans,

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.all_laws import fit_all_laws
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.balance.regression import Regression, regression_of
+from analysis.diagnosis.balance.regression import Regression, fit_all_laws, regression_of
 from equalizer.signals.signal import FloatArray
 
 FIXED = 1e6

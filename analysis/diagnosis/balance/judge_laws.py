@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.all_laws import fit_all_laws
 from analysis.diagnosis.balance.blocks import Block
 from analysis.diagnosis.balance.judged_law import DRAWS, JudgedLaw, bootstrap_draws, force_ratio, gain_with_bound
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.plainest_structure import NOTABLE, numbers_of, plainest_structure
-from analysis.diagnosis.balance.regression import Regression
+from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import Structure, StructureSearch, values_of
 from analysis.diagnosis.settings import STILL_SHARE
 from equalizer.effects.catalogue import EFFECTS
@@ -42,7 +41,7 @@ CANCELLED = 2.0
 """Standard deviation of a law's own force at most, over the recorded one's: more is cancelled by other columns."""
 DRY_FRICTIONS = {
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
-    "position_dependent_friction", "drifting_friction",
+    "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
 }  # fmt: skip
 FAMILIES = (
     DRY_FRICTIONS | {"quadratic_damping"},
@@ -194,7 +193,10 @@ def _judge_law(
     if not why_not and law.effect in PLAYED_AS:
         alike = (law.effect, *(effect for effect in alike if effect != PLAYED_AS[law.effect]))
         chosen, law = law.effect, replace(law, effect=PLAYED_AS[law.effect])
-    return JudgedLaw(number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, possible=possible)
+    formula = None if law.formula is None or values is None else law.formula(values)
+    return JudgedLaw(
+        number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, formula=formula, possible=possible
+    )
 
 
 def _special_cases(effect: str) -> tuple[str, ...]:
@@ -254,9 +256,8 @@ def _why_not(
     others = [effect for effect in alike if law.effect not in _special_cases(effect)]
     if strange or (len(others) >= MOST_ALIKE and not {law.effect, *others} <= DRY_FRICTIONS):
         return f"these data cannot tell it from {', '.join(strange or alike)}"
-    return (
-        "" if {law.effect, PLAYED_AS.get(law.effect)} & set(EFFECTS_BY_NAME) else "no simulation of ours plays it yet"
-    )
+    played = law.formula is not None or not {law.effect, PLAYED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)
+    return "" if played else "no simulation of ours plays it yet"
 
 
 def _judge_further_laws(

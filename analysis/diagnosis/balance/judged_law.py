@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.law import Formula, Law
 from analysis.diagnosis.balance.regression import Regression
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
@@ -15,15 +15,6 @@ DRAWS, SEED, LEVEL = 2000, 1, 0.025
 
 NO_COLUMN = -1
 """Place in a regression of a law that changes the force itself."""
-
-
-@dataclass(frozen=True, slots=True)
-class Formula:
-    """A law of the command in the language of `equalizer.laws`; f is the command of its own axis."""
-
-    text: str
-    """Its free numbers are p0, p1, …"""
-    numbers: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +41,7 @@ class JudgedLaw:
     """The law that was chosen, where it has no simulation and this one is fitted in its place."""
 
     formula: Formula | None = None
-    """Of a law of the command that no catalogue effect plays."""
+    """Of a law that no catalogue effect plays."""
     possible: bool = True
     """Its numbers have signs and sizes that such physics can have."""
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
@@ -18,6 +19,16 @@ Values = Callable[[FloatArray, Numbers, float], dict[str, float] | None]
 not physical."""
 
 
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A law in the language of `equalizer.laws`; q, v and f are its own axis' position, velocity and command."""
+
+    text: str
+    """Its free numbers are p0, p1, …"""
+    numbers: tuple[float, ...]
+    acts_on: Literal["force", "command"] = "command"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Law:
     effect: str
@@ -31,6 +42,8 @@ class Law:
     """Linear in the motion: a linear model of a higher order could take its place."""
     bounded: tuple[tuple[float, float], ...] = ()
     """Bounds of each nonlinear number."""
+    formula: Callable[[dict[str, float]], Formula] | None = None
+    """Of its parameters: what simulations play where the catalogue holds no such effect."""
 
     @property
     def key(self) -> tuple[str, int]:

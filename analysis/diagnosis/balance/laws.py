@@ -8,10 +8,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from analysis.diagnosis.balance.condition_laws import condition_laws
 from analysis.diagnosis.balance.friction_laws import damping_laws, friction_laws
 from analysis.diagnosis.balance.law import Law, Scales, name_weights, relative_time, scales_of
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.balance.stiffness_laws import condition_laws, dynamic_laws, stiffness_laws
+from analysis.diagnosis.balance.stiffness_laws import dynamic_laws, stiffness_laws
 from equalizer.signals.signal import FloatArray
 
 
@@ -24,7 +25,7 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
         yield from stiffness_laws(channel, scales)
         if np.isfinite(scales.band_hz):
             yield from dynamic_laws(channel, scales)
-        yield from condition_laws(motions, channel)
+        yield from condition_laws(motions, channel, scales)
     if np.isfinite(motions[0].band_hz) and motions[0].order < 2:
         yield Law("drifting_force", -1, (), lambda m, _: relative_time(m), name_weights("change"))
 

@@ -7,7 +7,7 @@ above the band's beginning, found likewise by the position, for below it their i
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
@@ -16,6 +16,7 @@ from analysis.diagnosis.balance.band import band_begin_hz, band_end_hz
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.types import Mask
+from equalizer.effects.discovered_law import condition_names
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.band_limited import low_pass_gain, odd_extension
 from equalizer.signals.recording import Hold, Recording
@@ -31,6 +32,17 @@ EDGE = 0.5
 
 class NoMotionError(ValueError):
     """The recording holds no motion from which forces could be told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A recorded condition that changes within the recordings."""
+
+    name: str
+    """In a formula."""
+    mean: float
+    spread: float
+    """Standard deviation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +71,8 @@ class Motion:
     """(n,): held-out samples."""
     lowest_hz: float = 0.0
     """Where the band begins: above 0 for integrated accelerations."""
+    conditions: tuple[Condition, ...] = ()
+    """Of `condition`, column by column."""
 
     def decimate(self, columns: FloatArray) -> FloatArray:
         """(kept samples, k): columns (n, k) filtered to the band and decimated by `step`."""
@@ -115,9 +129,9 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
     if band_hz is None:
         band_hz = np.inf if untimed else band_end_hz(filled, rate_hz, order)
     lowest_hz = band_begin_hz(filled, rate_hz) if order == 2 and not untimed else 0.0
-    conditions = _standardised_conditions(records)
+    known, conditions = _standardised_conditions(records)
     return tuple(
-        _motion(record, (samples, order), (band_hz, lowest_hz), condition, moved[0].channels)
+        replace(_motion(record, (samples, order), (band_hz, lowest_hz), condition, moved[0].channels), conditions=known)
         for record, samples, condition in zip(records, filled, conditions, strict=True)
     )
 
@@ -230,12 +244,15 @@ def _end_to_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, F
     return np.asarray(line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
 
 
-def _standardised_conditions(records: Sequence[Observed]) -> list[FloatArray]:
+def _standardised_conditions(records: Sequence[Observed]) -> tuple[tuple[Condition, ...], list[FloatArray]]:
+    """The conditions that change, and their standardised samples, (n, q) per record."""
     signals = [getattr(record.recording, "condition", None) for record in records]
     if any(signal is None for signal in signals):
-        return [np.zeros((len(record.command), 0)) for record in records]
+        return (), [np.zeros((len(record.command), 0)) for record in records]
     filled = [fill_gaps(signal.samples) for signal in signals if signal is not None]
     whole = np.vstack(filled)
-    spread = whole.std(axis=0)
-    varying = spread > 0
-    return [(each[:, varying] - whole.mean(axis=0)[varying]) / spread[varying] for each in filled]
+    mean, spread = whole.mean(axis=0), whole.std(axis=0)
+    names = condition_names(signals[0].channels) if signals[0] is not None else ()
+    varying = np.flatnonzero(spread > 0)
+    known = tuple(Condition(names[k], float(mean[k]), float(spread[k])) for k in varying)
+    return known, [(each[:, varying] - mean[varying]) / spread[varying] for each in filled]

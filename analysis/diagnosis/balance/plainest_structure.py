@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 
-from analysis.diagnosis.balance.all_laws import fit_all_laws
-from analysis.diagnosis.balance.regression import Regression
+from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import Structure, StructureSearch, is_better
 
 PLAIN = 0.1
@@ -11,6 +10,10 @@ PLAIN = 0.1
 MOST_OF_REST, NOTABLE = 0.5, 0.3
 """Shares that further laws must take: of the error that a plain structure leaves above that of all laws together, and
 of all that it leaves."""
+
+
+WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
+"""Laws whose only nonlinear number is the width of a smoothed sign."""
 
 
 def plainest_structure(search: StructureSearch) -> Structure:
@@ -30,9 +33,19 @@ def _further(search: StructureSearch, plain: Structure, ceiling: float) -> Struc
     more = [
         each
         for each in search.ranked
-        if set(plain.laws) < set(each.laws) and each.error <= allowed and is_better(plain, each)
+        if _extends(search.regression, plain.laws, each.laws) and each.error <= allowed and is_better(plain, each)
     ]
     return min(more, key=lambda each: (numbers_of(search.regression, each.laws), each.error), default=None)
+
+
+def _extends(regression: Regression, plain: Sequence[int], richer: Sequence[int]) -> bool:
+    """Whether these laws are the plain ones and more, a dry friction perhaps as one that depends on a condition."""
+    covered, known = set(richer), {regression.laws[number].key for number in richer}
+    for number in plain:
+        effect, channel = regression.laws[number].key
+        if effect == "coulomb_friction" and ("condition_dependent_friction", channel) in known:
+            covered.add(number)
+    return set(plain) < covered
 
 
 def numbers_of(regression: Regression, laws: Sequence[int]) -> int:
@@ -41,6 +54,6 @@ def numbers_of(regression: Regression, laws: Sequence[int]) -> int:
     count = 0
     for number in laws:
         law, place = regression.laws[number], regression.places[number]
-        count += place.stop - place.start + (0 if law.effect == "coulomb_friction" else len(law.numbers))
+        count += place.stop - place.start + (0 if law.effect in WIDTH_ALONE else len(law.numbers))
         count -= law.effect == "gravity_torque"
     return count

@@ -1,6 +1,6 @@
 """Springs that are not linear, stops, play, weight on a lever, and linear dynamics of a higher order."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -77,19 +77,3 @@ def _mode_force(m: Motion, c: int, n: Numbers) -> FloatArray:
 
 def _mode_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
     return {"frequency": n[0], "mass": float(w[0]), "damping_ratio": n[1]} if w[0] > 0 else None
-
-
-def condition_laws(motions: Sequence[Motion], c: int) -> Iterator[Law]:
-    for k in range(motions[0].condition.shape[1]):
-        yield Law(
-            "condition_dependent_damping", c, (float(k),),
-            lambda m, n: m.condition[:, [int(n[0])]] * m.velocity[:, [c]], name_weights("change"),
-        )  # fmt: skip
-        yield Law(
-            "condition_dependent_friction", c, (float(k),),
-            lambda m, n: m.condition[:, [int(n[0])]] * np.sign(m.velocity[:, [c]]), name_weights("change"),
-        )  # fmt: skip
-        yield Law(
-            "condition_dependent_stiffness", c, (float(k),),
-            lambda m, n: m.condition[:, [int(n[0])]] * m.position[:, [c]], name_weights("change"),
-        )  # fmt: skip

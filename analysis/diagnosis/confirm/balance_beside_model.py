@@ -14,7 +14,7 @@ from analysis.diagnosis.balance.given_base import GivenBase
 from analysis.diagnosis.balance.judge_laws import OF_SIGNAL, Balance, judge_laws
 from analysis.diagnosis.balance.motion import OVERSAMPLED, Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.structures import search_structures
-from analysis.diagnosis.data.carried_weight import add_carried_weight
+from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observed_parts
@@ -22,7 +22,7 @@ from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.forces.needed_force import band_motion, needed_force
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import PlacedEffect, Structure
-from equalizer.effects.placing import place_effects
+from equalizer.effects.placing import place_recorded_effects
 from equalizer.effects.simulation.along_motion import actuator_force, force_along
 from equalizer.effects.simulation.bodies import bodies_of
 from equalizer.plant.linear_simulation import driven_axes
@@ -79,7 +79,7 @@ class _BalanceData:
 
 def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _BalanceData:
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
-    known = place_effects(model, recording.command.channels, recording.response.channels)
+    known = under_conditions(place_recorded_effects(model, recording), recording)
     at = _structure(add_carried_weight(model, recording), known)
     whole = needed_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     course = whole.axis_position, whole.axis_velocity, whole.axis_acceleration

@@ -16,7 +16,9 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 CONSTANT = "constant_force"
-_COMMAND = re.compile(r"\bf\b")
+_OWN = re.compile(r"\b[qvf]\b")
+_PREFIX = {"q": "", "v": "v", "f": "f"}
+"""Of an axis' signals in the language of laws, by what a balance's formula calls its own."""
 
 
 def can_be_played(own: int, judged: JudgedLaw) -> bool:
@@ -41,8 +43,13 @@ def refit_laws(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw
         regression = balances[axis].search.regression
         places = [other.place for of, other in named if of == axis and other.place != NO_COLUMN]
         values = values_of(regression, places)[places.index(law.place)]
-        found.append((axis, law if values is None else replace(law, values=values)))
+        found.append((axis, law if values is None else _with_values(law, values)))
     return found
+
+
+def _with_values(judged: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
+    formula = judged.formula if judged.law.formula is None else judged.law.formula(values)
+    return replace(judged, values=values, formula=formula)
 
 
 def find_special_case(
@@ -83,9 +90,9 @@ def hypothesis_of_judged(axis: int, judged: JudgedLaw, recording: Recording) -> 
         from equalizer.effects.discovered_law import axis_names
         from equalizer.laws.law import Law
 
-        name = axis_names(recording.command.channels)[axis]
-        text = _COMMAND.sub(f"f{name}", judged.formula.text)
-        return hypothesis_of_law(Law(text, judged.formula.numbers, (), "command", name), axis, recording)
+        name, formula = axis_names(recording.command.channels)[axis], judged.formula
+        text = _OWN.sub(lambda signal: f"{_PREFIX[signal[0]]}{name}", formula.text)
+        return hypothesis_of_law(Law(text, formula.numbers, (), formula.acts_on, name), axis, recording)
     effect = EFFECTS[judged.law.effect]
     return hypothesis_of_claim(
         Claim(effect, "one", (axis,)), [{p.name: judged.values[p.name] for p in effect.parameters}]

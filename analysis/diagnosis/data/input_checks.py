@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from analysis.diagnosis.data.carried_weight import weight_problems
+from analysis.diagnosis.data.as_recorded import weight_problems
 from analysis.diagnosis.data.driven_response import response_significance
 from analysis.diagnosis.data.growth import free_motion_rates, growth_rate
 from analysis.diagnosis.data.observed_parts import samples_to_fit
@@ -21,7 +21,7 @@ from analysis.diagnosis.settings import (
     SHORTEST_S,
     SHORTEST_SAMPLES,
 )
-from equalizer.effects.placing import PlacingError, place_effects
+from equalizer.effects.placing import PlacingError, place_recorded_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -253,7 +253,7 @@ def _too_fast_modes(model: MechanicalModel, recording: Recording) -> Iterator[st
 
 def _misplaced_effects(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     try:
-        place_effects(model, recording.command.channels, recording.response.channels)
+        place_recorded_effects(model, recording)
     except PlacingError as problem:
         yield str(problem)
 

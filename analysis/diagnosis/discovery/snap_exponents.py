@@ -9,11 +9,10 @@ import numpy as np
 from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.intervals import standard_errors
-from analysis.diagnosis.errors.law_hypothesis import channels_of
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, SearchContext, sensitivity_at
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
-from equalizer.effects.discovered_law import law_effect, law_values
+from equalizer.effects.discovered_law import law_channels, law_effect, law_values
 from equalizer.laws.law import Law
 from equalizer.laws.roles import roles
 
@@ -47,7 +46,7 @@ def _with_simple_exponents(context: SearchContext, whole: Hypothesis, errors: np
             continue
         simple = _simplify_exponents(law, own)
         changed |= simple is not law
-        effect = law_effect(simple, channels_of(recording))
+        effect = law_effect(simple, law_channels(recording))
         parts.append(hypothesis_of_claim(Claim(effect, "one", claim.sites), [law_values(simple)]))
     if not changed:
         return None

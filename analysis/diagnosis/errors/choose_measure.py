@@ -9,7 +9,7 @@ import numpy as np
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed, error_units
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.effect_words import EFFECT_WORDS
+from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.measure_rule import UNTIMED, Choice, choose_measure, samples_to_settle
@@ -19,7 +19,7 @@ from analysis.diagnosis.noise.noise_floor import NoiseFloor, noise_floor
 from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.diagnosis.settings import UNKNOWN_NOISE_SHARE
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.placing import place_effects
+from equalizer.effects.placing import place_recorded_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -73,7 +73,7 @@ def measure_of(
     choice = choose_measure((*records, *others), model)
     if compared == "motion" and choice.measure == "predicted force":
         choice = Choice("windows", ASKED_MOTION)
-    known = place_effects(model, recordings[0].command.channels, recordings[0].response.channels)
+    known = place_recorded_effects(model, recordings[0])
     remarks = (*((choice.why,) if choice.why else ()), *_of_known(known))
     if choice.measure == "free simulation":
         return Chosen(FreeSimulation(records, unit, noise, known=known), floors, remarks)
@@ -92,7 +92,7 @@ def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, ba
     """The force that the model needs along the measured motion, up to a frequency, without asking the rule; see
     `has_motion`."""
     records = observed_parts(recordings, model.outputs)
-    known = place_effects(model, recordings[0].command.channels, recordings[0].response.channels)
+    known = place_recorded_effects(model, recordings[0])
     floors = [noise_floor(record.recording) for record in records]
     return _by_force(records, model, floors, (BY_FORCE, *_of_known(known)), band_hz)
 
@@ -104,7 +104,7 @@ def _by_force(
     remarks: tuple[str, ...],
     band_hz: float | None = None,
 ) -> Chosen:
-    known = place_effects(model, records[0].recording.command.channels, records[0].recording.response.channels)
+    known = place_recorded_effects(model, records[0].recording)
     views = force_views(records, model, floors, band_hz)
     said = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
     return Chosen(replace(views.measure, known=known), views.floors, tuple(filter(None, (*remarks, said))))
@@ -113,7 +113,7 @@ def _by_force(
 def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
     if not known:
         return ()
-    kinds = ", ".join(dict.fromkeys(EFFECT_WORDS[placed.effect.name].noun for placed in known))
+    kinds = ", ".join(dict.fromkeys(noun_of(placed.effect.name) for placed in known))
     return (f"The model names effects of its own, which are part of every simulation: {kinds}.",)
 
 

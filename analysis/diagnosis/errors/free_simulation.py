@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from analysis.diagnosis.data.carried_weight import add_carried_weight
+from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.unexplained_motion import evidence_of
 from equalizer.effects.effect import AxisForce, Effect, JointForce, PlacedEffect
@@ -63,7 +63,7 @@ class FreeSimulation:
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         seen = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
         model = add_carried_weight(model, signals)
-        every = [_coarsen(placed, self.coarser) for placed in (*self.known, *effects)]
+        every = [_coarsen(placed, self.coarser) for placed in under_conditions((*self.known, *effects), signals)]
         return simulate(model, record.command, signals.sample_rate_hz, every, signals.hold, seen)
 
     def evidence(

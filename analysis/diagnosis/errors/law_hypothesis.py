@@ -1,16 +1,11 @@
 """A law without a name as a hypothesis, to be fitted by output error."""
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, hypothesis_of_claim
-from equalizer.effects.discovered_law import Channels, law_effect, law_values
+from equalizer.effects.discovered_law import law_channels, law_effect, law_values
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
 
 
 def hypothesis_of_law(law: Law, axis: int, recording: Recording) -> Hypothesis:
-    effect = law_effect(law, channels_of(recording))
+    effect = law_effect(law, law_channels(recording))
     return hypothesis_of_claim(Claim(effect, "one", (axis,)), [law_values(law)])
-
-
-def channels_of(recording: Recording) -> Channels:
-    response = recording.response
-    return Channels(recording.command.channels, response.channels, response.quantities[0])

@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from analysis.diagnosis.data.carried_weight import add_carried_weight
+from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.free_simulation import predicted_channels
@@ -97,7 +97,7 @@ class Windows:
             model,
             record.command,
             (recording.sample_rate_hz, recording.hold),
-            effects,
+            under_conditions(effects, recording),
             Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
             Restarts(length, states),
         )

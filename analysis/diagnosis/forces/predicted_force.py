@@ -6,7 +6,7 @@ from typing import Self, TypeVar, cast
 
 import numpy as np
 
-from analysis.diagnosis.data.carried_weight import add_carried_weight
+from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.forces.needed_force import BandMotion, NeededForce, band_motion, needed_force
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
@@ -96,6 +96,7 @@ class PredictedForce:
         ahead = np.concatenate([needed.force[1:], needed.force[-1:]])
         course = needed.axis_position, needed.axis_velocity, needed.axis_acceleration
         pushing = entered.within - (needed.force + ahead) / 2
+        effects = under_conditions(effects, record.recording)
         added = force_along(structure, effects, course, (record.command, pushing), rate_hz)
         # Both are means over the step that begins at a sample; the needed force is that around it.
         total = entered.around

@@ -42,6 +42,8 @@ def propose_experiment(context: SearchContext, found: Explanation) -> Proposal |
             continue
         named, other = fitted_candidates[0].fitted, rival.fitted
         claims = named.hypothesis.claims[-1], other.hypothesis.claims[-1]
+        if any(claim.effect.with_conditions for each in (named, other) for claim in each.hypothesis.claims):
+            continue  # no experiment of the menu sets a condition
         record = context.measure.records[0]
         sensed = place_of_effect(claims[0].effect) == "sensor"
         axis = min(claims[0].sites[0], record.command.shape[1] - 1) if sensed else claims[0].sites[0]

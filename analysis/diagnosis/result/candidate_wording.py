@@ -1,9 +1,10 @@
 """Sentences about laws that the data cannot tell apart, and about unconfirmed candidates."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.diagnosis.document import Candidate, Diagnosis, Estimate, NamedEffect
-from analysis.diagnosis.effect_words import noun_of, numbers_text, place_words, unit_of
+from analysis.diagnosis.effect_words import PLAYED_AS_FORMULA, noun_of, numbers_text, place_words, unit_of
 from analysis.diagnosis.unit_wording import share_text
 from analysis.wording import capitalise, end_sentence
 from equalizer.signals.unit_system import UnitSystem
@@ -13,7 +14,8 @@ _FAMILIES = (
         "friction",
         "friction whose law these data leave open",
         {"coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
-         "position_dependent_friction", "viscous_damping", "quadratic_damping", "drifting_friction"},
+         "position_dependent_friction", "viscous_damping", "quadratic_damping", "drifting_friction",
+         "condition_dependent_friction"},
     ),
     (
         "a stiffness that changes along the travel",
@@ -58,26 +60,27 @@ class Device:
 def class_noun(effect: NamedEffect) -> str:
     """What an effect is called together with what these data cannot part from it: "friction (dry friction or 2 laws
     like it)"; its own noun where there is nothing like it."""
-    others = len(effect.class_) - 1
-    family = _family(effect)
-    if others < 1:
-        return noun_of(effect.effect)
-    if family is None or ":" in family[0]:
-        return noun_of(effect.effect) if family is None else family[0]
-    return f"{family[0]} ({noun_of(effect.effect)}, or {others} {'law' if others == 1 else 'laws'} like it)"
+    names = _class_names(effect)
+    others = len(names) - 1
+    family = _family(names)
+    if others < 1 or family is None:
+        return noun_of(names[0])
+    if ":" in family[0]:
+        return family[0]
+    return f"{family[0]} ({noun_of(names[0])}, or {others} {'law' if others == 1 else 'laws'} like it)"
 
 
 def class_sentence(effect: NamedEffect) -> str:
     """Which laws would explain the data as well; empty where the data tell it from all others."""
     inseparable = [rival.effect for rival in effect.rivals if rival.inseparable]
-    names = tuple(dict.fromkeys((*effect.class_, *inseparable)))
+    names = tuple(dict.fromkeys((*_class_names(effect), *inseparable)))
     if len(names) < 2:
         return ""
-    family = _family(effect)
+    family = _family(_class_names(effect))
     title = family[1] if family is not None else "one of several laws that these data cannot tell apart"
     return (
         f"{capitalise(title)}: {', '.join(map(noun_of, names[:-1]))} or {noun_of(names[-1])} would each explain it as "
-        f"well on held-out data. The numbers are those of {noun_of(effect.effect)}."
+        f"well on held-out data. The numbers are those of {noun_of(names[0])}."
     )
 
 
@@ -91,9 +94,14 @@ def refinement_sentence(effect: NamedEffect) -> str:
     return f"{capitalise(said)} {hold} nothing on held-out data."
 
 
-def _family(effect: NamedEffect) -> tuple[str, str] | None:
-    names = set(effect.class_)
-    return next(((short, long) for short, long, members in _FAMILIES if names and names <= members), None)
+def _class_names(effect: NamedEffect) -> tuple[str, ...]:
+    """The effect's name and those of its class; of a formula that stands for a law with a name, that name."""
+    names = effect.class_ or (effect.effect,)
+    return names[1:] if len(names) > 1 and names[1] in PLAYED_AS_FORMULA else names
+
+
+def _family(names: Sequence[str]) -> tuple[str, str] | None:
+    return next(((short, long) for short, long, members in _FAMILIES if set(names) <= members), None)
 
 
 def candidate_title(candidate: Candidate, device: Device | None = None) -> str:

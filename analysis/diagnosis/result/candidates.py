@@ -1,5 +1,6 @@
 """What a force balance adds to the findings: classes of laws that cannot be parted, candidates, what all laws reach."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from analysis.wording import conjoin
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
 
+_NAME, _FREE, _OWN_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
 MOST = 6
 REFINING = {
     "drifting_friction": ("coulomb_friction",),
@@ -82,18 +84,18 @@ def with_balances(
     of the motion. A constant force that no balance names is a number of the model, no effect."""
     if not balances:
         return diagnosis
-    weighed = {
-        (law.played_as, axis_letter(channels[axis], channels)): (law, _explained_share(balance, law))
+    weighed = [
+        (law, axis_letter(channels[axis], channels), _explained_share(balance, law))
         for axis, balance in enumerate(balances)
         for law in balance.laws
-    }
+    ]
     constants = {
         f"{effect.effect.replace('_', ' ')} {effect.axis}": effect.parameters[CONSTANTS[effect.effect]].value
         for effect in diagnosis.effects
-        if effect.effect in CONSTANTS and (effect.effect, effect.axis or "") not in weighed
+        if effect.effect in CONSTANTS and _weighed_law(effect, weighed) is None
     }
     effects = tuple(
-        _with_class(effect, weighed.get((effect.effect, effect.axis or "")))
+        _with_class(effect, _weighed_law(effect, weighed))
         for effect in diagnosis.effects
         if f"{effect.effect.replace('_', ' ')} {effect.axis}" not in constants
     )
@@ -111,6 +113,26 @@ def with_balances(
     if not effects and diagnosis.effects:
         verdict = "parameters" if verdict == "explained" else "unexplained"
     return replace(diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_once(left)[:MOST])
+
+
+def _weighed_law(
+    effect: NamedEffect, weighed: Sequence[tuple[JudgedLaw, str, float]]
+) -> tuple[JudgedLaw, float] | None:
+    """The law of a balance that an effect was named after, and its share of the mismatch. weighed: with axis and
+    share."""
+    for law, axis, share in weighed:
+        same = (law.played_as, axis) == (effect.effect, effect.axis or "")
+        if same and law.formula is not None and effect.law is not None:
+            same = law.named and _form(effect.law.expression) == _form(law.formula.text)
+        if same:
+            return law, share
+    return None
+
+
+def _form(formula: str) -> list[str]:
+    """Its signals and functions in order, those of an axis called as a balance calls its own."""
+    names = (_FREE.sub("", name) for name in _NAME.findall(formula))
+    return [_OWN_SIGNAL.sub(lambda own: own[1] or "q", name) for name in names if name]
 
 
 def _names_covered_by(effect: NamedEffect) -> tuple[str, ...]:
@@ -194,7 +216,8 @@ def _with_class(effect: NamedEffect, found: tuple[JudgedLaw, float] | None) -> N
         for name in weighed.alike
         if name not in said
     )
-    alike = (effect.effect, *others) if others else ()
+    own = (effect.effect,) if weighed.formula is None else (effect.effect, weighed.law.effect)
+    alike = (*own, *others) if len(own) + len(others) > 1 else ()
     return replace(
         effect,
         share=share,

@@ -28,10 +28,11 @@ from equalizer.laws.kernel import BEGUN, END, START, commit_step, run
 from equalizer.laws.program import DEEPEST
 from equalizer.signals.signal import FloatArray
 
-AXES, ACCELERATION, PROGRAM = 0, 1, 2
-"""Places in `numbers`: how many axes are driven; whether the law reads an acceleration; where its program begins."""
+AXES, ACCELERATION, CONDITIONS, SAMPLES, RATE_HZ, TABLE = range(6)
+"""Places in `numbers`: how many axes are driven; whether the law reads an acceleration; how many conditions were
+recorded, in how many samples, at which rate; where these begin, sample by sample. The program follows them."""
 PER_AXIS = 4
-"""Signals: the time, then each axis' position, velocity, acceleration and command."""
+"""Signals: the time, then each axis' position, velocity, acceleration and command, then the conditions."""
 CLOSE = 1e-7
 """Relative tolerance of a force that depends on the motion it causes."""
 TRIES = 60
@@ -43,8 +44,9 @@ def _law_value(
 ) -> float:
     """The law at the step's start or end, if it gives this force over the step. Accelerations are means over the step;
     ahead: 1 for those at its end."""
-    axes, step_s = int(numbers[AXES]), at[STEP_S]
-    signals = memory[DEEPEST : DEEPEST + 1 + PER_AXIS * axes]
+    axes, conditions, step_s = int(numbers[AXES]), int(numbers[CONDITIONS]), at[STEP_S]
+    count = 1 + PER_AXIS * axes + conditions
+    signals = memory[DEEPEST : DEEPEST + count]
     time_s = at[TIME_S] + (step_s if phase == END else 0.0)
     signals[0] = time_s
     for axis in range(axes):
@@ -57,8 +59,14 @@ def _law_value(
         if ahead != 0.0:
             signals[to + 2] += signals[to + 2] - at[begin + SEEN_A] - at[begin + SEEN_A_PER_N] * force
         signals[to + 3] = at[begin + SEEN_COMMAND]
-    kept = memory[DEEPEST + 1 + PER_AXIS * axes :]
-    return float(run(numbers[PROGRAM:], signals, kept, memory[:DEEPEST], phase, time_s, step_s))
+    samples = int(numbers[SAMPLES])
+    if conditions > 0:
+        # The middle of the step lies in its sample, however its ends are rounded.
+        now = min(int((at[TIME_S] + 0.5 * step_s) * numbers[RATE_HZ]), samples - 1)
+        for k in range(conditions):
+            signals[count - conditions + k] = numbers[TABLE + now * conditions + k]
+    program = numbers[TABLE + samples * conditions :]
+    return float(run(program, signals, memory[DEEPEST + count :], memory[:DEEPEST], phase, time_s, step_s))
 
 
 @njit(inline="always")
@@ -74,7 +82,8 @@ def _end_share(start: float, first: float, second: float) -> float:
 def law_force(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     heavy = numbers[ACCELERATION] != 0.0
     start = low = _law_value(numbers, memory, at, START, 0.0, 0.0)
-    kept = memory[DEEPEST + 1 + PER_AXIS * int(numbers[AXES]) :]
+    conditions = int(numbers[CONDITIONS])
+    kept = memory[DEEPEST + 1 + PER_AXIS * int(numbers[AXES]) + conditions :]
     kept[0] = BEGUN
     end = first = high = _law_value(numbers, memory, at, END, low, 0.0)
     second = _law_value(numbers, memory, at, END, high, 0.0)
@@ -100,5 +109,5 @@ def law_force(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
             high, high_off = force, off
     # What sticks is held by a force between those of both ways.
     at[F_END] = _law_value(numbers, memory, at, END, force, 1.0) if heavy else (force - (1 - late) * start) / late
-    commit_step(numbers[PROGRAM:], kept, at[TIME_S] + at[STEP_S])
+    commit_step(numbers[TABLE + int(numbers[SAMPLES]) * conditions :], kept, at[TIME_S] + at[STEP_S])
     return float(force)

@@ -14,6 +14,9 @@ from study.errors import DeviceError
 REST_S = 2.0
 """In each position: at 2 kHz the mean of 4000 samples, 1 mg of noise away from the truth at the most."""
 
+SETTLE_S = 0.3
+"""What comes sooner may be of the position before."""
+
 RANGE_G = 3.0
 """What the ADXL335 promises to measure; beyond, a channel counts as clipped."""
 
@@ -55,8 +58,9 @@ def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
 def _record_position(port: Port, position: str, before_each: Callable[[str], None], rest_s: float) -> FloatArray:
     """Raw samples (n, 3)."""
     before_each(position)
-    while len(port.read(AT_ONCE)) == AT_ONCE:
-        pass  # of before
+    settled_s = time.monotonic() + SETTLE_S
+    while len(port.read(AT_ONCE)) == AT_ONCE or time.monotonic() < settled_s:
+        pass  # of before: the line holds some, and the board waits with more where that is full
     parser, found = PacketParser(), [np.zeros((0, 3))]
     until_s = time.monotonic() + rest_s
     while time.monotonic() < until_s:

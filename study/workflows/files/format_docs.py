@@ -88,7 +88,9 @@ LAWS = "\n\n".join(
         "zero.",
         "Signals are `x`, `vx`, `ax`, `fx` (position, velocity, acceleration, command of the x axis; y, z likewise), "
         "`t` (seconds from the first sample), or the recording's own channels. Where these do not end in x, y, z, the "
-        "axes are called so in their order. A law of a command knows commands and `t`, one of a response "
+        "axes are called so in their order. A law of the force knows the recording's conditions, too, as `c1`, `c2`, … "
+        "where a condition's channel is no such name, or means something else. "
+        "A law of a command knows commands and `t`, one of a response "
         "knows responses and `t`.",
         "Numbers with a point or exponent (`4.1`, `1e-3`) are free: a fit may move them. Whole numbers (`2`) belong "
         f"to the form. A formula has up to {LONGEST} characters and {LARGEST} parts, and up to {DEEPEST} numbers at "

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from equalizer.effects.placing import PlacingError, place_effects
+from equalizer.effects.placing import PlacingError, place_recorded_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.store.formats.mechanical_model_file import read_mechanical_model
@@ -36,6 +36,6 @@ def _problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording
         if (len(commands), len(responses)) != (model.inputs, model.outputs):
             continue
         try:
-            place_effects(model, commands, responses)
+            place_recorded_effects(model, recording)
         except PlacingError as error:
             yield f"With {path.name}: {error}"

@@ -34,7 +34,8 @@ NUMBERS = {
     "constant_force": {"force": 0.3},
     "gravity_torque": {"torque": 0.3, "angle": 0.7},
     "cogging": {"amplitude": 0.2, "pitch": 0.002, "phase": 0.7},
-    "backlash": {"gap": 1e-4, "motor_mass": 0.1, "contact_stiffness": 1e5, "contact_damping": 5.0},
+    # Damped so that blows do not rebound: rebounds would grow rounding errors.
+    "backlash": {"gap": 1e-4, "motor_mass": 0.1, "contact_stiffness": 1e5, "contact_damping": 50.0},
     "loose_joint": {"gap": 1e-4, "stiffness": 500.0, "slip": 0.01},
     "end_stop": {"position": 5e-4, "stiffness": 1e4, "opposite": 0.3},
     "pose_dependent_inertia": {"per_m": 50.0, "speed_share": 0.5},

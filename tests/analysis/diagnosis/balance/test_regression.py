@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.all_laws import fit_all_laws
 from analysis.diagnosis.balance.blocks import FOLDS
 from analysis.diagnosis.balance.law import Law, name_weights
 from analysis.diagnosis.balance.motion import motions_of
-from analysis.diagnosis.balance.regression import keep_laws, regression_of, replace_law
+from analysis.diagnosis.balance.regression import fit_all_laws, keep_laws, regression_of, replace_law
 from analysis.diagnosis.balance.structures import Structure, is_better
 from analysis.diagnosis.data.observed_parts import observed_parts
 

@@ -158,7 +158,6 @@ def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
     def lay_down(position: str) -> None:
         board.acceleration = GRAVITY_MPS2 * UP[len(laid)]
         laid.append(position)
-        time.sleep(0.5)  # what the system still buffers of the position before is read away
 
     table = tomllib.loads(calibrate_on_table(board.path, 115_200, lay_down, rest_s=0.3))["accelerometer"]
     assert laid == list(POSITIONS)

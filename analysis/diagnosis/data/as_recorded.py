@@ -1,9 +1,12 @@
-"""Adds a known weight that the device carried during one recording to the model of that recording."""
+"""The model and the effects as they were during one recording: with the weight that the device carried, and under the
+conditions that were recorded."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
 
+from analysis.diagnosis.data.measured_motion import fill_gaps
+from equalizer.effects.effect import PlacedEffect
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -21,6 +24,21 @@ def add_mass(model: MechanicalModel, added: float) -> MechanicalModel:
     """The model with `added` kg (kg m^2) more mass (inertia) along every driven axis."""
     axes = driven_axes(model)
     return replace(model, mass=model.mass + added * axes @ axes.T)
+
+
+def under_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> tuple[PlacedEffect, ...]:
+    """The effects, those that depend on conditions with the recording's; what is missing of these is interpolated.
+    Without recorded conditions such effects stay as they are, and cannot be simulated."""
+    signal = recording.condition
+    if signal is None or all(placed.effect.with_conditions is None for placed in effects):
+        return tuple(effects)
+    samples, found = fill_gaps(signal.samples), []
+    for placed in effects:
+        acting = placed.effect.with_conditions
+        if acting is not None:
+            placed = replace(placed, effect=replace(placed.effect, acts=acting(samples, recording.sample_rate_hz)))
+        found.append(placed)
+    return tuple(found)
 
 
 def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:

@@ -1,0 +1,70 @@
+"""Friction, damping, stiffness and force that depend on a recorded condition, such as a temperature or a setting.
+
+Each is linear in the condition's deviation from its mean, in units of its standard deviation. No catalogue effect
+plays them: simulations play them as formulas.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from analysis.diagnosis.balance.friction_laws import friction_widths
+from analysis.diagnosis.balance.law import Columns, Formula, Law, Scales, name_weights, smooth_sign
+from analysis.diagnosis.balance.motion import Condition, Motion
+from equalizer.signals.signal import FloatArray
+
+
+def condition_laws(motions: Sequence[Motion], c: int, of: Scales) -> Iterator[Law]:
+    for k, known in enumerate(motions[0].conditions):
+        yield from _laws_of_condition(known, k, c, of)
+
+
+def _laws_of_condition(known: Condition, k: int, c: int, of: Scales) -> Iterator[Law]:
+    """k: its column."""
+    sharp, spans = friction_widths(of)
+    for width in sharp:
+        yield Law(
+            "condition_dependent_friction", c, (float(width),), _friction_columns(c, k), _friction_values,
+            bounded=spans, formula=_friction_formula(known),
+        )  # fmt: skip
+    if np.isfinite(of.band_hz):
+        yield Law(
+            "condition_dependent_damping", c, (), lambda m, _: m.condition[:, [k]] * m.velocity[:, [c]],
+            name_weights("change"), formula=_formula(known, "v"),
+        )  # fmt: skip
+    yield Law(
+        "condition_dependent_stiffness", c, (), lambda m, _: m.condition[:, [k]] * m.position[:, [c]],
+        name_weights("change"), formula=_formula(known, "q"),
+    )  # fmt: skip
+    yield Law(
+        "condition_dependent_force", c, (), lambda m, _: m.condition[:, [k]], name_weights("change"),
+        formula=_formula(known),
+    )  # fmt: skip
+
+
+def _friction_columns(c: int, k: int) -> Columns:
+    def columns(m: Motion, n: tuple[float, ...]) -> FloatArray:
+        rubbing = smooth_sign(m.velocity[:, [c]], n[0])
+        return np.hstack([rubbing, rubbing * m.condition[:, [k]]])
+
+    return columns
+
+
+def _friction_values(w: FloatArray, n: tuple[float, ...], mass: float) -> dict[str, float] | None:
+    return {"level": float(w[0]), "change": float(w[1])} if w[0] > 0 else None
+
+
+def _friction_formula(known: Condition) -> Callable[[dict[str, float]], Formula]:
+    # A friction below zero would push.
+    text = f"-maximum(p0 + p1*{_deviation(known)}, 0)*sign(v)"
+    return lambda of: Formula(text, (of["level"], of["change"]), "force")
+
+
+def _formula(known: Condition, *factors: str) -> Callable[[dict[str, float]], Formula]:
+    text = "*".join(("-p0", _deviation(known), *factors))
+    return lambda of: Formula(text, (of["change"],), "force")
+
+
+def _deviation(known: Condition) -> str:
+    mean = f"- {known.mean:.6g}" if known.mean >= 0 else f"+ {-known.mean:.6g}"
+    return f"(({known.name} {mean})/{known.spread:.6g})"
