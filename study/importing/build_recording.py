@@ -112,6 +112,8 @@ def _part(wanted: ImportMap, files: PartFiles, said: ImportNotes, counter: _Coun
     def say(sentence: str) -> None:
         said.add(files.label, sentence)
 
+    for note in dict.fromkeys(note for arrays in read.values() for note in arrays.notes):
+        say(note)
     ready = align_signals(tuple(loggers), say)
     signals = part_signals(wanted, files.part, ready, say, counter.step)
     numbers = {name: ready[0].names.number(text) for name, text in wanted.numbers.items()}

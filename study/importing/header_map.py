@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 from study.importing.arrays.arrays import Arrays
 from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap
 from study.importing.map_format.signal_words import ParsedName, name_signal, open_roles, plain_names, roles_of
+from study.importing.surplus_arrays import CLOCK_WORDS, surplus_arrays
 
-_TIME = re.compile(r"(t|time|zeit|temps)(_?(s|ms|us))?", re.IGNORECASE)
+_TIME = re.compile(rf"({'|'.join(sorted(CLOCK_WORDS))})(_?(s|ms|us))?", re.IGNORECASE)
 
 
 def header_map(arrays: Arrays) -> ImportMap | None:
@@ -48,9 +49,14 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
 
 
 def _columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
-    """Time columns with their unit, and all others."""
-    columns = [name_signal(header) for header in arrays.by_name]
-    times = [column for column in columns if column.unit and _is_time(column) and column.quantity == "time"]
+    """Time columns with their unit, and all others; without those that say nothing more."""
+    surplus = surplus_arrays(arrays)
+    columns = [name_signal(header) for header in arrays.by_name if header not in surplus]
+    times = [
+        column
+        for column in columns
+        if column.header in arrays.clocks or (column.unit and _is_time(column) and column.quantity == "time")
+    ]
     return times, [column for column in columns if column not in times]
 
 

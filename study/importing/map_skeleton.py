@@ -1,19 +1,13 @@
 """Make an incomplete map for a file of which only the arrays are known, to be completed by its owner."""
 
 import json
-import re
 from collections.abc import Iterator
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
 
 from study.importing.arrays.array_groups import groups_in
 from study.importing.arrays.arrays import Arrays
 from study.importing.map_format.signal_words import name_signal, propose_roles, unit_in
+from study.importing.surplus_arrays import LEAST_SAMPLES, is_growing_time, name_words, surplus_arrays
 
-_LEAST_SAMPLES = 16
-_CLOCK_WORDS = {"t", "time", "timestamp", "timestamps", "zeit", "temps"}
 _RATE_WORDS = {"fs", "rate", "samplerate"}
 _TIME_UNITS = ("s", "ms", "us", "min")
 
@@ -24,13 +18,18 @@ def map_skeleton(arrays: Arrays) -> str:
 
 
 def _lines(whole: Arrays) -> Iterator[str]:
-    groups = groups_in(whole.by_name, _LEAST_SAMPLES)
+    groups = groups_in(whole.by_name, LEAST_SAMPLES)
     inside = [name for name in whole.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
     common = {name: array for name, array in whole.by_name.items() if name not in inside}
     first = {name: whole.by_name[full] for name, full in groups.names.items()}
-    arrays = Arrays(whole.path, {**first, **common})
-    clocks = [name for name, array in arrays.by_name.items() if _is_time(name, array)]
-    roles = _roles(arrays, clocks)
+    arrays = Arrays(whole.path, {**first, **common}, whole.clocks)
+    surplus = surplus_arrays(arrays)
+    clocks = [
+        name
+        for name, array in arrays.by_name.items()
+        if name not in surplus and (name in whole.clocks or is_growing_time(name, array))
+    ]
+    roles = _roles(arrays, [*clocks, *surplus])
     yield f"# A map for {arrays.name}. Keys and examples: docs/importing.md."
     yield 'device = ""               # what was recorded'
     yield 'hold = "zero-order"       # how the command moves between samples: zero-order, band-limited, linear'
@@ -38,9 +37,11 @@ def _lines(whole: Arrays) -> Iterator[str]:
     for name, array in arrays.by_name.items():
         if name in clocks:
             continue
-        if array.dtype.kind not in "fiub":
+        if name in surplus:
+            yield f"\n# {name} {surplus[name]}"
+        elif array.dtype.kind not in "fiub":
             yield f"\n# {name} holds no numbers"
-        elif array.size < _LEAST_SAMPLES:
+        elif array.size < LEAST_SAMPLES:
             yield f"\n# {name}: {_shape(array.shape)}, a constant for expressions"
         elif array.ndim == 1:
             own = [clock for clock in clocks if arrays.by_name[clock].shape == array.shape]
@@ -57,9 +58,9 @@ def _lines(whole: Arrays) -> Iterator[str]:
     yield "split = { fit = 0.5, test = 0.5 }"
 
 
-def _roles(arrays: Arrays, clocks: list[str]) -> dict[str, str]:
-    """Roles by name, where names and units tell them."""
-    channels = [name for name, array in arrays.by_name.items() if array.size >= _LEAST_SAMPLES and name not in clocks]
+def _roles(arrays: Arrays, others: list[str]) -> dict[str, str]:
+    """Roles by name, where names and units tell them; others: what is no channel."""
+    channels = [name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in others]
     return dict(zip(channels, propose_roles([name_signal(name) for name in channels]), strict=True))
 
 
@@ -69,11 +70,6 @@ def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
     for prefix in prefixes:
         yield "\n[[part]]"
         yield f"prefix = {json.dumps(prefix)}"
-
-
-def _is_time(name: str, array: npt.NDArray[Any]) -> bool:
-    grows = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= _LEAST_SAMPLES
-    return grows and bool(_words(name) & _CLOCK_WORDS) and bool((np.diff(array) > 0).all())
 
 
 def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
@@ -88,7 +84,7 @@ def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
     if clocks:
         return
     yield "\n[[clock]]"
-    rates = [name for name, array in arrays.by_name.items() if array.size == 1 and _words(name) & _RATE_WORDS]
+    rates = [name for name, array in arrays.by_name.items() if array.size == 1 and name_words(name) & _RATE_WORDS]
     yield f"rate = {json.dumps(rates[0])}           # in hertz" if rates else "# rate_hz = 1000, or unknown = true"
 
 
@@ -116,10 +112,6 @@ def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> 
 
 def _quote(name: str) -> str:
     return name if name.isidentifier() else f"array('{name}')"
-
-
-def _words(name: str) -> set[str]:
-    return set(re.split(r"[^a-z0-9]+", unit_in(name)[0].lower()))
 
 
 def _shape(shape: tuple[int, ...]) -> str:

@@ -14,6 +14,11 @@ from study.importing.map_format.import_map import ChannelMap, ImportMap, PartMap
 from study.importing.map_format.map_errors import ImportProblemError
 from study.importing.time_base import MOST_SAMPLES
 
+_OF_COMMANDS = (
+    'A command that moves in straight lines between its samples has resample = "linear" and, at the top of the map, '
+    'hold = "linear"; one that stays until the next has "held" and hold = "zero-order"'
+)
+
 Key = tuple[str, str]
 """Role and name of a channel."""
 
@@ -54,6 +59,9 @@ def part_signals(
     for channel, samples in sources:
         columns[channel.role, channel.name] = _on_grid(channel, samples, grid, say)
         step()
+    for logger in loggers:
+        if said := logger.base.gaps():
+            say(said)
     for computed in wanted.computed:
         named = {name: column for (_, name), column in reversed(columns.items())}  # of one name, the first counts
         columns[computed.role, computed.name] = _compute_channel(
@@ -104,7 +112,9 @@ def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources
         steps_ms = np.diff(uneven[0].base.times_s(0)) * 1e3
         raise ImportProblemError(
             f"clock '{uneven[0].clock.name}' has uneven stamps (steps of {steps_ms.min():.4g} to {steps_ms.max():.4g} "
-            "ms); state the rate_hz of the recording, and resample (held, band-limited, linear) of each channel"
+            "ms); state the rate_hz of the recording, and resample (held, band-limited, linear) of each channel: "
+            f"at the top of the map rate_hz = {uneven[0].base.fastest_hz:.4g}, under each [[channel]] "
+            f'resample = "linear". {_OF_COMMANDS}'
         )
     rate_hz = wanted.rate_hz or max(logger.base.rate_hz for logger in loggers)
     begin_s = max(float(samples.times_s[0]) for samples in sources)
@@ -136,7 +146,8 @@ def _on_grid(channel: ChannelMap, samples: Samples, grid: Grid, say: Callable[[s
     elif channel.resample == "":
         raise ImportProblemError(
             f"channel '{channel.name}' has to be resampled to {grid.rate_hz:g} Hz; state how: resample = \"held\" for "
-            'a command that stays until the next, "band-limited" for a signal sampled behind a filter, or "linear"'
+            'a command that stays until the next, "band-limited" for a signal sampled behind a filter, or "linear", '
+            f"under its [[channel]] in the map.{' ' + _OF_COMMANDS if channel.role == 'command' else ''}"
         )
     else:
         column = _resample(channel, channel.resample, samples, grid, say)

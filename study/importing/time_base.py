@@ -18,6 +18,9 @@ UNEVEN = 0.02
 """Stamps are uniform if each is within this fraction of a step of its place."""
 LEFT_OUT = 0.02
 """A uniform logger skips at most this fraction of its rows; more indicates rounded stamps."""
+_USUAL_GAP = 3
+"""Median steps from which on stamps leave a gap."""
+_HOUR_S = 3600.0
 _PLAIN_DIGITS = (4, 5, 6)
 NUMBERED_HZ = 1.0
 """Nominal rate of samples without known time."""
@@ -53,9 +56,26 @@ class TimeBase:
             return evened
         return self.stamps_s
 
+    def gaps(self) -> str:
+        """How many gaps the stamps have, and the key that says otherwise; empty where there are none."""
+        steps_s = np.diff(self.times_s(0)) if self.stamps_s is not None else np.zeros(0)
+        wide_s = steps_s[steps_s > self.gap_s]
+        if not len(wide_s):
+            return ""
+        count = f"{len(wide_s)} gap{'s' if len(wide_s) > 1 else ''}"
+        return (
+            f"Clock '{self.name}' has {count} (the widest {wide_s.max():.4g} s): their samples are missing. Where "
+            f"nothing is, as in a log of changes, write gap_s = {1.01 * wide_s.max():.3g} and its `time` under "
+            "[[clock]] in the map, and resample under each [[channel]]."
+        )
+
     def samples(self, values: Value) -> Samples:
-        """In the reference clock's time; rows skipped by a uniform logger are missing samples."""
+        """In the reference clock's time; rows skipped by a uniform logger are missing samples, unless the map calls no
+        step a gap."""
         times_s = self.times_s(len(values)) + self.offset_s
+        widest_s = 0.0 if self.places is None else float(np.max(np.diff(self.places))) / self.rate_hz
+        if self.places is not None and self.places[-1] > len(self.places) - 1 and widest_s <= self.gap_s:
+            return Samples(times_s, values, 0.0, self.gap_s)  # the map says that nothing is missing between them
         if self.places is None or self.places[-1] == len(self.places) - 1:
             return Samples(times_s, values, self.rate_hz, self.gap_s)
         every = np.full(self.places[-1] + 1, np.nan)
@@ -85,7 +105,7 @@ def _from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
         raise ImportProblemError(
             f"clock '{clock.name}': {clock.time} has the shape {stamps_s.shape}; stamps are one row of two or more"
         )
-    if problem := _wrong_stamps(stamps_s):
+    if problem := _wrong_stamps(stamps_s, clock.time, unit.factor):
         raise ImportProblemError(f"clock '{clock.name}': {clock.time} {problem}")
     rate_hz, places = _uniform(stamps_s)
     if places is not None and places[-1] >= MOST_SAMPLES:
@@ -93,24 +113,43 @@ def _from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
         raise ImportProblemError(
             f"clock '{clock.name}': {clock.time} jumps from {stamps_s[widest]:.9g} to {stamps_s[widest + 1]:.9g} s at "
             f"sample {widest + 1}; at {rate_hz:g} Hz the recording would be {places[-1] + 1:.3g} samples long, most of "
-            "them missing. Correct the stamps, or cut the file there"
+            "them missing. Correct the stamps, or cut the file there into several, which are imported together"
         )
-    gap_s = clock.gap_s or 3 * float(np.median(np.diff(stamps_s)))
+    gap_s = clock.gap_s or _USUAL_GAP * float(np.median(np.diff(stamps_s)))
+    if places is not None and not clock.gap_s:
+        gap_s = min(gap_s, 1.5 / rate_hz)
     return TimeBase(clock.name, rate_hz, stamps_s, places, gap_s)
 
 
-def _wrong_stamps(stamps_s: Value) -> str:
-    """Problem with the stamps; empty if they increase."""
+def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
+    """Problem with the stamps, and the key that mends it; empty if they increase."""
     if not np.isfinite(stamps_s).all():
         first = int(np.argmax(~np.isfinite(stamps_s)))
         return f"is no number at sample {first}; time is never missing"
     steps_s = np.diff(stamps_s)
     if (steps_s < 0).any():
         first = int(np.argmax(steps_s < 0)) + 1
-        return f"runs backwards at sample {first}, from {stamps_s[first - 1]:.9g} to {stamps_s[first]:.9g} s"
+        back_s = float(-steps_s[first - 1])
+        found = f"runs backwards at sample {first}, from {stamps_s[first - 1]:.9g} to {stamps_s[first]:.9g} s"
+        if abs(back_s - _HOUR_S) > _HOUR_S / 60:
+            return f"{found}; put the rows in order, or cut the file there into several, which are imported together"
+        mended = f"{time} + {_HOUR_S / unit_s:g} * cumsum(diff({time}) < 0)"
+        return f'{found}, as a clock that is set back by an hour; the map\'s [[clock]] mends it: time = "{mended}"'
     if (steps_s == 0).any():
         first = int(np.argmax(steps_s == 0)) + 1
-        return f"stands still at sample {first}, at {stamps_s[first]:.9g} s"
+        rate_hz = (len(stamps_s) - 1) / float(np.ptp(stamps_s)) if np.ptp(stamps_s) else 1000.0
+        return (
+            f"stands still at sample {first}, at {stamps_s[first]:.9g} s; where the sampling was even and only the "
+            f"stamps are coarse, state the rate in place of `time` in the map's [[clock]], as in "
+            f"rate_hz = {rate_hz:.4g}"
+        )
+    ahead = np.flatnonzero(np.abs(steps_s - _HOUR_S) < 10 * float(np.median(steps_s)))
+    if len(ahead) == 1 and float(np.median(steps_s)) < _HOUR_S / 1000:
+        mended = f"{time} - {_HOUR_S / unit_s:g} * cumsum(diff({time}) > {steps_s[ahead[0]] / 2 / unit_s:.4g})"
+        return (
+            f"jumps ahead by an hour at sample {ahead[0] + 1}, as a clock that is set to summer time; the map's "
+            f'[[clock]] mends it: time = "{mended}"'
+        )
     return ""
 
 

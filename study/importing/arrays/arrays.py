@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.csv_arrays import read_csv_arrays
+from study.importing.arrays.csv_arrays import Table, read_csv_arrays, timed_arrays
 from study.importing.arrays.mat_arrays import read_mat5_arrays
 from study.importing.arrays.stored_arrays import read_hdf5_arrays, read_npz_arrays
 from study.importing.map_format.import_map import CsvMap
@@ -31,6 +31,10 @@ class Arrays:
 
     path: Path
     by_name: Mapping[str, Array]
+    clocks: tuple[str, ...] = ()
+    """Arrays that were dates or clock times, now in seconds since the first."""
+    notes: tuple[str, ...] = ()
+    """Sentences: how such arrays were read, and what was left out."""
 
     @property
     def name(self) -> str:
@@ -49,12 +53,18 @@ def read_arrays(path: Path, table: CsvMap) -> Arrays:
         raise ImportRefusedError(path.name, refused.happened, _CHECK) from refused
     except DAMAGED as problem:
         raise ImportRefusedError(path.name, str(problem) or type(problem).__name__, _CHECK) from problem
-    if not found:
+    if not found.by_name:
         raise ImportRefusedError(path.name, "it holds no arrays", "Check that it is the right file.")
-    return Arrays(path, {name: np.squeeze(array) for name, array in found.items()})
+    return Arrays(path, {name: np.squeeze(array) for name, array in found.by_name.items()}, found.clocks, found.notes)
 
 
-def _read(path: Path, table: CsvMap) -> dict[str, Array]:
+def _read(path: Path, table: CsvMap) -> Table:
+    if path.suffix.lower() in TABLES:
+        return read_csv_arrays(path, table)
+    return timed_arrays(_read_stored(path))
+
+
+def _read_stored(path: Path) -> dict[str, Array]:
     match path.suffix.lower():
         case ".npz" | ".npy":
             return read_npz_arrays(path)
@@ -62,6 +72,4 @@ def _read(path: Path, table: CsvMap) -> dict[str, Array]:
             return read_hdf5_arrays(path, transposed=True) if is_hdf5(path) else read_mat5_arrays(path)
         case ".h5" | ".hdf5":
             return read_hdf5_arrays(path, transposed=False)
-        case suffix if suffix in TABLES:
-            return read_csv_arrays(path, table)
     raise ValueError(f"its kind is not known here; known are {KINDS}")

@@ -4,6 +4,8 @@ import codecs
 import io
 import re
 from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from study.importing.arrays.table_layout import EMPTY, Line, TableLayout, find_layout, is_comment, split_row
+from study.importing.arrays.time_stamps import STAMP_WORDS, is_stamp, join_stamps, read_stamps
 from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.signal_words import unit_in
 from study.regular_file import TABLE_BYTES, read_regular
 from study.store.disk.file_errors import CannotReadError
 
@@ -23,14 +27,19 @@ MOST_ROWS = 20_000_000
 MOST_COLUMNS = 10_000
 _LOOKED_AT = 4096
 """Bytes in which UTF-16 without a mark shows: every other one of a table in it is zero."""
-_AS_NUMBERS: dict[str, Any] = {
-    "dtype": np.float64,
-    "na_values": [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"],
-}
-_AS_WORDS: dict[str, Any] = {"dtype": str}
+_MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
 
 
-def read_csv_arrays(path: Path, settings: CsvMap) -> dict[str, npt.NDArray[Any]]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """Columns by name; of them those that were dates or clock times, now in seconds since the first; remarks."""
+
+    by_name: dict[str, npt.NDArray[Any]]
+    clocks: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def read_csv_arrays(path: Path, settings: CsvMap) -> Table:
     """Empty fields are missing samples. Raises CannotReadError; ValueError with line and column of a problem."""
     layout = find_layout(_lines(_read_text(path), settings), settings)
     if not layout.body:
@@ -42,12 +51,65 @@ def read_csv_arrays(path: Path, settings: CsvMap) -> dict[str, npt.NDArray[Any]]
     body = [line for line in layout.body if not is_comment(line[1])]
     _require_equal_rows(body, layout)
     text = "\n".join(line for _, line in body)
+    first = next((fields for _, line in body if all(fields := split_row(line, layout.delimiter))), [])
+    dated = [name for name, field in zip(layout.names, first, strict=False) if is_stamp(field)]
+    numbers = {name: str if name in dated else np.float64 for name in layout.names}
     try:
-        numbers = _read(text, layout, _AS_NUMBERS)
+        found = _read(text, layout, {"dtype": numbers, "na_values": _MISSING})
     except ValueError:
-        words = _read(text, layout, _AS_WORDS)  # slower, and it tells which field is wrong
-        return {name: _numbers(words[name], name, body, layout) for name in layout.names}
-    return {name: numbers[name].to_numpy() for name in layout.names}
+        words = _read(text, layout, {"dtype": str})  # slower, and it tells which field is wrong
+        return _table({name: words[name] for name in layout.names}, body, layout)
+    return _table({name: found[name] for name in layout.names}, body, layout)
+
+
+def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
+    """Raises ValueError for a field that is neither a number nor, in a column of such, a date or a clock time."""
+    numbers, stamps = {}, {}
+    for name, column in columns.items():
+        if column.dtype == np.float64:
+            numbers[name] = column.to_numpy()
+        elif (found := read_stamps(column.mask(column.str.strip().str.lower().isin(EMPTY)))) is not None:
+            stamps[name] = found
+        else:
+            numbers[name] = _numbers(column, name, body, layout)
+    joined = join_stamps(stamps)
+    in_seconds = {name: f"{unit_in(name)[0]} [s]" for name in joined}
+    every = numbers | {name: stamp.seconds - stamp.seconds[0] for name, stamp in joined.items()}
+    notes = tuple(f"{name}: read as seconds since {stamp.first}." for name, stamp in joined.items())
+    by_name = {in_seconds.get(name, name): every[name] for name in columns if name in every}
+    return Table(by_name, tuple(in_seconds.values()), notes)
+
+
+def timed_arrays(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
+    """Arrays of dates, times, or texts of them become seconds, as columns of a table do. Raises ValueError."""
+    found, clocks, notes = {}, [], []
+    for name, array in stored.items():
+        dated = _seconds(array)
+        key = name if dated is None else f"{unit_in(name)[0]} [s]"
+        found[key] = array if dated is None else dated[0]
+        if dated is not None:
+            clocks.append(key)
+            notes.append(f"{name}: read as seconds since {dated[1]}.")
+    return Table(found, tuple(clocks), tuple(notes))
+
+
+def _seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], str] | None:
+    """Seconds since the first of an array of dates or times, and the first; None for other arrays."""
+    line = np.ravel(array)
+    if len(line) < 2 or len(line) != max(array.shape) or array.dtype.kind not in "MmSU":
+        return None
+    if array.dtype.kind in "Mm":
+        since = line - line[0]
+        return np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s")), str(line[0])
+    if not is_stamp(str(line[0].decode("utf-8", "replace") if isinstance(line[0], bytes) else line[0]).strip()):
+        return None
+    import pandas as pd
+
+    stamps = read_stamps(pd.Series(np.char.decode(line, "utf-8") if array.dtype.kind == "S" else line))
+    if stamps is None:
+        return None
+    joined = join_stamps({"": stamps})[""]
+    return joined.seconds - joined.seconds[0], joined.first
 
 
 def _read_text(path: Path) -> str:
@@ -114,11 +176,14 @@ def _numbers(column: "pd.Series[str]", name: str, body: list[Line], layout: Tabl
         fields = fields.str.replace(".", " ", regex=False).str.replace(",", ".", regex=False)
     missing = fields.str.lower().isin(EMPTY)
     values = pd.to_numeric(fields.where(~missing), errors="coerce")
-    wrong = np.flatnonzero((values.isna() & ~missing).to_numpy())
+    none = (values.isna() & ~missing).to_numpy()
+    stamps = fields.map(is_stamp).to_numpy() & none if none.any() else none
+    wrong = np.flatnonzero(none & ~stamps if (none & ~stamps).any() else none)
     if len(wrong):
         number = body[int(wrong[0])][0]
         text = str(column.iloc[int(wrong[0])])
         comma = layout.decimal == "." and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", text.strip())
         hint = '; where the decimal sign is a comma, the map says decimal = "," under [csv]' if comma else ""
-        raise ValueError(f"line {number}, column '{name}': '{text}' is not a number{hint}")
+        dated = f"; {STAMP_WORDS}" if re.search(r"\d[-/:]\d", text) else ""
+        raise ValueError(f"line {number}, column '{name}': '{text}' is not a number{hint}{dated}")
     return np.asarray(values, dtype=np.float64)

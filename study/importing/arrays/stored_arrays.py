@@ -9,6 +9,7 @@ import zipfile
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import h5py
 import numpy as np
 import numpy.typing as npt
 
@@ -83,6 +84,8 @@ def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
                 continue
             if entry.dtype.kind in "fiub":
                 values = np.asarray(entry[()])
+            elif h5py.check_string_dtype(entry.dtype) is not None and entry.ndim == 1 and len(entry):
+                values = np.asarray(entry.asstr(errors="replace")[()], dtype=str)
             elif entry.dtype.kind in "SUO":
                 values = _NO_NUMBERS
             else:

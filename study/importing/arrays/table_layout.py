@@ -9,8 +9,10 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from equalizer.signals.units import UnknownUnitError, parse_unit, plain_unit
+from study.importing.arrays.time_stamps import is_stamp
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.signal_words import name_signal
 
@@ -47,8 +49,10 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
         if begin is None or any(_holds_number(split_row(text, delimiter), decimal) for _, text in rows[:begin]):
             begin = 0 if all(is_number(field, decimal) for field in first) else 1
         return TableLayout(delimiter, decimal, names, rows[begin:])
-    width = len(split_row(rows[begin][1], delimiter))
-    header, units = _header_and_units(_rows_above(lines, rows, begin, delimiter), width, decimal)
+    fields = split_row(rows[begin][1], delimiter)
+    width = len(fields)
+    above = [_name_date(row, fields) for row in _rows_above(lines, rows, begin, delimiter)]
+    header, units = _header_and_units(above, width, decimal)
     if header is None:
         if begin == 0:
             return TableLayout(delimiter, decimal, tuple(f"column{k + 1}" for k in range(width)), rows)
@@ -82,7 +86,9 @@ def is_number(field: str, decimal: str) -> bool:
 
 
 def _all_numbers(fields: Sequence[str], decimal: str) -> bool:
-    return all(is_number(field, decimal) for field in fields) and any(field.lower() not in EMPTY for field in fields)
+    """Or dates and clock times beside a number."""
+    plain = [field for field in fields if not is_stamp(field)]
+    return all(is_number(field, decimal) for field in plain) and any(field.lower() not in EMPTY for field in plain)
 
 
 def _first_numbers(rows: Sequence[Line], delimiter: str, decimal: str) -> int | None:
@@ -91,7 +97,7 @@ def _first_numbers(rows: Sequence[Line], delimiter: str, decimal: str) -> int | 
     begin, width = next(((k, len(row)) for k, row in enumerate(split) if _all_numbers(row, decimal)), (None, 0))
     while begin:
         above = split_row(rows[begin - 1][1], delimiter)
-        if len(above) != width or any(field.lower() not in EMPTY for field in above):
+        if len(above) != width or any(field.lower() not in EMPTY and not is_stamp(field) for field in above):
             break
         begin -= 1
     return begin
@@ -154,6 +160,12 @@ def _rows_above(lines: Sequence[Line], rows: Sequence[Line], begin: int, delimit
     if not plain:
         return comments
     return plain + [fields for fields in comments if len(fields) == len(plain[-1]) and _are_units(fields)][-1:]
+
+
+def _name_date(header: list[str], fields: Sequence[str]) -> list[str]:
+    """A header that has one name for a date and the clock time behind it, where blanks delimit, gets a second."""
+    at = next((k for k, pair in enumerate(pairwise(fields)) if all(map(is_stamp, pair))), None)
+    return header if at is None or len(header) != len(fields) - 1 else [*header[:at], "date", *header[at:]]
 
 
 def _header_and_units(

@@ -126,6 +126,9 @@ def _roles(found: ImportMap) -> Iterator[str]:
             yield f"there is no channel with the role '{needed}'; a recording needs both command and response"
 
 
+_RESAMPLED = {"zero-order": "held", "linear": "linear", "band-limited": "band-limited"}
+
+
 def _holds(found: ImportMap) -> Iterator[str]:
     """The interpolation of a command between samples is stated in two places, which must agree."""
     for channel in found.channel:
@@ -133,7 +136,8 @@ def _holds(found: ImportMap) -> Iterator[str]:
         if channel.role == "command" and says and (says == "zero-order") != (found.hold == "zero-order"):
             yield (
                 f"command '{channel.name}' is resampled {channel.resample}, but the recording's hold is {found.hold}; "
-                "a command either stays between its samples (held, zero-order) or it does not"
+                "a command either stays between its samples (held, zero-order) or it does not: "
+                f'write hold = "{says}" at the top of the map, or resample = "{_RESAMPLED[found.hold]}" here'
             )
 
 

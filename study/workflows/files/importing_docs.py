@@ -108,13 +108,20 @@ cannot be understood is refused by name, and then nothing is written. `hapteq va
 * **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.
 * **No time**: where none is known, `unknown = true` of the clock numbers the samples, at 1 Hz; `meta/time` says so
   (`unknown`; `stamps` where the rate is that of the file's own time).
+* **Dates and clock times** (`2024-03-01T12:00:00.123+01:00`, with a blank for the T, with or without a zone;
+  `12:00:00.123`; a date and a clock time in two columns) are read as seconds since the first, and that is said. Dates
+  that do not begin with the year are read where all are the same. Clock times without a date may pass midnight. A clock
+  that was set back or ahead by an hour is refused with the expression that mends it:
+  `time = "t + 3600 * cumsum(diff(t) < 0)"` under `[[clock]]`.
+* **Left out** of what is proposed, and said: columns without any number, and further columns of the same time.
 * **Resampling** is never done unasked. `held`: a command that stays until the next one. `band-limited`: a signal that
   was sampled behind a filter; flat to {FLAT_TO:.0%} of the lower Nyquist frequency, what is above the new one is taken
   out. `linear`: straight lines. Between uniform rates the band-limited way is exact to 1e-4 of the amplitude up to four
   fifths of the lower Nyquist frequency; from uneven stamps to 5e-5 up to a tenth, and 2e-3 up to a fifth, of their mean
   rate (tested with sinusoids).
 * **Missing** samples are NaN. Rows that a uniform logger has left out, and gaps in uneven stamps, become NaN; what lies
-  beside them stays.
+  beside them stays. Where nothing is missing between them, as in a log of changes, `gap_s` of the clock says from which
+  step on there is a gap; the channels then need `resample`.
 * **Clocks** of several loggers are brought to the first by `offset_s`, by a trigger that both saw, or by correlating
   one motion that both saw. The offset is said. Where nothing agrees, or two offsets agree equally well, it is refused.
 * **Parts**: several files, or several groups of arrays in one file (`prefix`), go one after another; the state of the

@@ -10,13 +10,19 @@ from typing import Any
 from equalizer.signals.joining import join
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
-from study.importing.arrays.arrays import read_arrays
+from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map, header_problems
 from study.importing.map_format.import_map import CsvMap, ImportMap
-from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportRefusedError, MapNeededError
+from study.importing.map_format.map_errors import (
+    NOTHING_WRITTEN,
+    ImportProblemError,
+    ImportRefusedError,
+    MapNeededError,
+)
 from study.importing.map_library import NO_DATA, MapFile, find_map, map_by_header, map_of_files, read_map
 from study.importing.map_skeleton import map_skeleton
+from study.importing.surplus_arrays import surplus_arrays
 from study.store.disk.hdf5_file import format_of, is_hdf5
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import read_recording, write_recording
@@ -114,7 +120,8 @@ def _by_found_map(folder: Path, on_progress: Progress) -> Foreign:
         return _by_map(found[0].source, found[0].files, on_progress)
     if not found:
         by_header = map_by_header(folder)
-        return _with_header(by_header.source.map, by_header.files, on_progress)
+        arrays = read_arrays(by_header.files[0], CsvMap())
+        return _with_header(by_header.source.map, arrays, by_header.files, on_progress)
     listed = "; ".join(f"{entry.source.name} for {', '.join(path.name for path in entry.files)}" for entry in found)
     raise WrongUseError(
         "Which recording is meant?",
@@ -145,13 +152,20 @@ def _by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
         return replace(found, notes=(f"Imported by our map '{shipped.name}', which fits these files.", *found.notes))
     if wanted is None:
         raise MapNeededError(files[0].name, "; ".join(header_problems(arrays)), map_skeleton(arrays))
-    return _with_header(wanted, files, on_progress)
+    return _with_header(wanted, arrays, files, on_progress)
 
 
-def _with_header(wanted: ImportMap, files: Sequence[Path], on_progress: Progress) -> Foreign:
-    built = build_recording(wanted, files, on_progress)
+def _with_header(wanted: ImportMap, arrays: Arrays, files: Sequence[Path], on_progress: Progress) -> Foreign:
+    """arrays: of the first file. Raises MapNeededError, with all that is known, for what only a map can mend."""
+    try:
+        built = build_recording(wanted, files, on_progress)
+    except ImportRefusedError as refused:
+        if not isinstance(refused.__cause__, ImportProblemError):
+            raise
+        raise MapNeededError(files[0].name, refused.happened, map_skeleton(arrays)) from refused
+    left_out = tuple(f"Left out: '{name}' {why}." for name, why in surplus_arrays(arrays).items())
     told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
-    notes = (f"Taken from the header: {told}.", *_perhaps_imposed(built.recording), *built.notes)
+    notes = (f"Taken from the header: {told}.", *left_out, *_perhaps_imposed(built.recording), *built.notes)
     return Foreign(built.recording, tuple(files), "header", "", notes)
 
 

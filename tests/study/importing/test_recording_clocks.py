@@ -10,10 +10,15 @@ from tests.recording_maps import N, U, Y, built, map_text, refusal
     ("spoil", "sentence"),
     [
         (lambda t: t.__setitem__(7, np.nan), "Clock 'clock': t is no number at sample 7; time is never missing."),
-        (lambda t: t.__setitem__(7, t[5]), "Clock 'clock': t runs backwards at sample 7, from 6 to 5 s."),
-        (lambda t: t.__setitem__(7, t[6]), "Clock 'clock': t stands still at sample 7, at 6 s."),
+        (lambda t: t.__setitem__(7, t[5]),
+         "Clock 'clock': t runs backwards at sample 7, from 6 to 5 s; put the "
+         "rows in order, or cut the file there into several, which are imported together."),
+        (lambda t: t.__setitem__(7, t[6]),
+         "Clock 'clock': t stands still at sample 7, at 6 s; where the sampling was even "
+         "and only the stamps are coarse, state the rate in place of `time` in the map's [[clock]], as in "
+         "rate_hz = 1."),
     ],
-)
+)  # fmt: skip
 def test_time_that_is_none_is_refused(files, spoil, sentence):
     stamps = np.arange(float(N))
     spoil(stamps)
@@ -53,7 +58,8 @@ def test_rows_that_a_logger_left_out_are_missing_samples(files):
     found = built(map_text('time = "t"\ntime_unit = "ms"'), files(u=U[there], y=Y[there], t=there * 1.0))
     assert len(found.recording) == N
     assert list(np.flatnonzero(np.isnan(found.recording.command.samples[:, 0]))) == [100, 101, 102]
-    assert found.notes == ("fx: 3 of 400 samples are missing.", "ax: 3 of 400 samples are missing.")
+    assert found.notes[:2] == ("fx: 3 of 400 samples are missing.", "ax: 3 of 400 samples are missing.")
+    assert found.notes[2].startswith("Clock 'clock' has 1 gap (the widest 0.004 s): their samples are missing.")
 
 
 def test_missing_samples_of_the_file_stay_missing(files):

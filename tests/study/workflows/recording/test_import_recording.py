@@ -187,7 +187,7 @@ def test_a_name_that_cannot_be_written_is_reported_before_anything_is_read(tmp_p
 
 def test_what_is_refused_leaves_nothing_behind(tmp_path):
     (tmp_path / "a.csv").write_text(TABLE.replace("0.005,", "0.001,", 1))
-    with pytest.raises(ImportRefusedError, match="runs backwards at sample 5"):
+    with pytest.raises(MapNeededError, match="runs backwards at sample 5"):
         import_recording(ImportPlan((tmp_path / "a.csv",), None, tmp_path / "r.h5"))
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
 

@@ -1,0 +1,117 @@
+"""Read dates and clock times (`2024-03-01T12:00:00.123+01:00`, `12:00:00.123`) as seconds since the first.
+
+Field by field: the date, the time of day and the offset from UTC. A date in a column of its own belongs to the clock
+time beside it. Dates that do not begin with the year leave open which number is the day: they are understood only
+where all are the same.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Seconds = npt.NDArray[np.float64]
+
+_DATE = r"\d{4}(?P<between>[-/.])\d{1,2}(?P=between)\d{1,2}|\d{1,2}(?P<mark>[-/.])\d{1,2}(?P=mark)\d{4}"
+_CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2}(?:[.,]\d+|:\d{3})?)\s?(?P<half>[AaPp]\.?[Mm]\.?)?"
+_ZONE = r"\s?(?P<zone>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)"
+_STAMP = re.compile(rf"(?:(?P<date>{_DATE})(?:[T ]\s*|$))?(?:{_CLOCK}(?:{_ZONE})?)?")
+DAY_S, HOUR_S = 86400.0, 3600.0
+STAMP_WORDS = "dates and clock times are understood as 2024-03-01T12:00:00.123, with or without a zone, or 12:00:00.123"
+
+
+@dataclass(frozen=True, slots=True)
+class StampColumn:
+    """Fields of one column: seconds of a date, of a clock time, or of both."""
+
+    seconds: npt.NDArray[np.float64]
+    """(n,) Since the midnight before the first; NaN where the field is empty."""
+    has_date: bool
+    has_clock: bool
+    first: str
+
+
+def is_stamp(field: str) -> bool:
+    """Whether a field is a date, a clock time, or both."""
+    return bool(field) and _STAMP.fullmatch(field) is not None
+
+
+def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
+    """None unless each field is a stamp or missing, and they are of one kind. Raises ValueError for dates whose order
+    is open, or that do not exist."""
+    given = fields.notna()
+    text = fields[given].str.strip()
+    if text.empty or not text.map(is_stamp).all():
+        return None
+    parts = text.str.extract(_STAMP)
+    has_date, has_clock = parts["date"].notna(), parts["hour"].notna()
+    if has_date.any() != has_date.all() or has_clock.any() != has_clock.all():
+        return None
+    values = np.zeros(len(text))
+    if has_clock.all():
+        values += _of_clock(parts)
+    if has_date.all():
+        values += _of_dates(parts["date"])
+    every = np.full(len(fields), np.nan)
+    every[given.to_numpy()] = values
+    return StampColumn(every, bool(has_date.all()), bool(has_clock.all()), str(text.iloc[0]))
+
+
+def _of_clock(parts: "pd.DataFrame") -> Seconds:
+    second = parts["second"].str.replace(r"[,:]", ".", regex=True).astype(float)
+    hour = parts["hour"].astype(float)
+    half = parts["half"].fillna("").str.lower().str[:1]
+    hour = hour.where(half == "", hour % 12) + 12.0 * (half == "p")
+    ahead = parts["zone"].fillna("").map({zone: _zone_s(zone) for zone in parts["zone"].fillna("").unique()})
+    return np.asarray(hour * HOUR_S + parts["minute"].astype(float) * 60 + second - ahead, dtype=np.float64)
+
+
+def _zone_s(zone: str) -> float:
+    digits = re.sub(r"\D", "", zone)
+    ahead_s = (int(digits[:2]) * 60 + int(digits[2:] or 0)) * 60.0 if digits else 0.0
+    return -ahead_s if zone.startswith("-") else ahead_s
+
+
+def _of_dates(dates: "pd.Series[str]") -> Seconds:
+    """Seconds since the first date: since 1970 they would leave no digits for microseconds."""
+    days: dict[str, float] = {}  # none for the only date where its order is open
+    several = dates.nunique() > 1
+    for date in dates.unique():
+        numbers = [int(part) for part in re.split(r"\D", date)]
+        if numbers[0] < 1000 and several:
+            raise ValueError(f"'{date}' may be day and month or month and day; write dates as 2024-03-01")
+        if numbers[0] >= 1000:
+            days[date] = _day(numbers, date)
+    first = days.get(str(dates.iloc[0]), 0.0)
+    return np.asarray(dates.map(lambda date: days.get(date, first) - first), dtype=np.float64)
+
+
+def _day(numbers: list[int], date: str) -> float:
+    year, month, day = numbers
+    try:
+        return float(np.datetime64(f"{year:04d}-{month:02d}-{day:02d}", "D").astype(np.int64)) * DAY_S
+    except ValueError as error:
+        raise ValueError(f"'{date}' is no date; write dates as 2024-03-01") from error
+
+
+def join_stamps(columns: Mapping[str, StampColumn]) -> dict[str, StampColumn]:
+    """A column of dates is added to a column of clock times beside it, and disappears. Clock times without a date
+    that pass midnight go on with the next day."""
+    dates = {name: column for name, column in columns.items() if not column.has_clock}
+    clocks = {name: column for name, column in columns.items() if not column.has_date}
+    joined = dict(columns)
+    if len(dates) == 1 and len(clocks) == 1:
+        (day_name, day), (clock_name, clock) = *dates.items(), *clocks.items()
+        del joined[day_name]
+        both = StampColumn(day.seconds + clock.seconds, True, True, f"{day.first} {clock.first}")
+        return joined | {clock_name: both}
+    for name, clock in clocks.items():
+        over = np.cumsum(np.diff(clock.seconds, prepend=clock.seconds[:1]) < -DAY_S / 2)
+        joined[name] = StampColumn(clock.seconds + over * DAY_S, False, True, clock.first)
+    return joined

@@ -1,0 +1,71 @@
+"""Arrays that a proposed map leaves out: those without any number, and further columns of the same time."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from equalizer.signals.units import UnknownUnitError, parse_unit
+from study.importing.arrays.arrays import Array, Arrays
+from study.importing.map_format.signal_words import unit_in
+
+LEAST_SAMPLES = 16
+"""Shorter arrays are constants."""
+CLOCK_WORDS = {
+    "t", "time", "timestamp", "timestamps", "datetime", "zeit", "zeitstempel", "temps", "tiempo", "tempo", "date",
+}  # fmt: skip
+SAME_CLOCK = 0.5
+"""Stamps that differ by at most this fraction of a step, when both begin at 0, are one clock."""
+
+
+def surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
+    """Why arrays are left out, by name."""
+    empty = {name: "holds no numbers at all" for name, array in arrays.by_name.items() if _is_empty(array)}
+    return empty | dict(_equal_clocks(arrays))
+
+
+def is_growing_time(name: str, array: Array) -> bool:
+    """Whether an array is called a time and grows."""
+    grows = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
+    return grows and bool(name_words(name) & CLOCK_WORDS) and bool((np.diff(array) > 0).all())
+
+
+def name_words(name: str) -> set[str]:
+    """Words of a name without its unit, in small letters."""
+    plain = unit_in(name)[0].lower()
+    return set("".join(letter if letter.isalnum() else " " for letter in plain).split())
+
+
+def _is_empty(array: Array) -> bool:
+    return array.dtype.kind == "f" and array.size >= LEAST_SAMPLES and bool(np.isnan(array).all())
+
+
+def _equal_clocks(arrays: Arrays) -> Iterator[tuple[str, str]]:
+    kept: list[str] = []
+    clocks = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
+    for name in sorted(clocks, key=lambda name: (_seconds(name) is None, name not in arrays.clocks)):
+        same = next((other for other in kept if _is_same_clock(arrays.by_name, other, name)), None)
+        if same is None:
+            kept.append(name)
+        else:
+            yield name, f"is the same time as '{same}'"
+
+
+def _is_same_clock(by_name: Mapping[str, Array], first: str, second: str) -> bool:
+    """Whether both grow alike; without a unit of its own, a clock may be in any."""
+    one, other = (by_name[name].astype(float) for name in (first, second))
+    if one.shape != other.shape or one.ndim != 1 or not np.isfinite([one[[0, -1]], other[[0, -1]]]).all():
+        return False
+    one, other = one - one[0], other - other[0]
+    units = _seconds(first), _seconds(second)
+    ratio = one[-1] / other[-1] if None in units and other[-1] else (units[1] or 1) / (units[0] or 1)
+    step = float(np.nanmedian(np.diff(one)))
+    return bool(np.nanmax(np.abs(other * ratio - one)) <= SAME_CLOCK * step)
+
+
+def _seconds(name: str) -> float | None:
+    """Factor to seconds of the unit in brackets; None where there is none."""
+    try:
+        unit = parse_unit(unit_in(name)[1])
+    except UnknownUnitError:
+        return None
+    return unit.factor if unit.si == "s" else None
