@@ -1,4 +1,4 @@
-"""Dates, clock times, gaps and equal clocks in files that nobody prepared."""
+"""Dates, clock times, gaps and equal clocks in files that were not prepared for an import."""
 
 import h5py
 import numpy as np
