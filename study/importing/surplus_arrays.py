@@ -6,11 +6,12 @@ import numpy as np
 
 from equalizer.signals.units import UnknownUnitError, parse_unit
 from study.importing.arrays.arrays import Array, Arrays
-from study.importing.map_format.signal_words import unit_in
+from study.importing.map_format.signal_words import FOREIGN_WORDS, unit_in
 
 LEAST_SAMPLES = 16
 """Shorter arrays are constants."""
 CLOCK_WORDS = {
+    *(word for word, quantity in FOREIGN_WORDS.items() if quantity == "time"),
     "t", "time", "timestamp", "timestamps", "datetime", "zeit", "zeitstempel", "temps", "tiempo", "tempo", "date",
 }  # fmt: skip
 SAME_CLOCK = 0.5

@@ -1,11 +1,10 @@
 """Columns of a table as arrays: encoding and layout are detected, invalid fields are reported."""
 
-import codecs
 import io
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from study.importing.arrays.table_layout import EMPTY, Line, TableLayout, find_layout, is_comment, split_row
+from study.importing.arrays.table_text import read_text
 from study.importing.arrays.time_stamps import STAMP_WORDS, is_stamp, join_stamps, read_stamps
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.signal_words import unit_in
-from study.regular_file import TABLE_BYTES, read_regular
-from study.store.disk.file_errors import CannotReadError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,8 +23,6 @@ if TYPE_CHECKING:
 MOST_ROWS = 20_000_000
 """Five hours at 1 kHz."""
 MOST_COLUMNS = 10_000
-_LOOKED_AT = 4096
-"""Bytes in which UTF-16 without a mark shows: every other one of a table in it is zero."""
 _MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
 
 
@@ -41,7 +37,8 @@ class Table:
 
 def read_csv_arrays(path: Path, settings: CsvMap) -> Table:
     """Empty fields are missing samples. Raises CannotReadError; ValueError with line and column of a problem."""
-    layout = find_layout(_lines(_read_text(path), settings), settings)
+    whole = read_text(path, settings.encoding)
+    layout = find_layout(_lines(whole.text, settings), settings)
     if not layout.body:
         raise ValueError("it has a header, but no rows below it")
     if len(layout.names) > MOST_COLUMNS:
@@ -58,8 +55,10 @@ def read_csv_arrays(path: Path, settings: CsvMap) -> Table:
         found = _read(text, layout, {"dtype": numbers, "na_values": _MISSING})
     except ValueError:
         words = _read(text, layout, {"dtype": str})  # slower, and it tells which field is wrong
-        return _table({name: words[name] for name in layout.names}, body, layout)
-    return _table({name: found[name] for name in layout.names}, body, layout)
+        made = _table({name: words[name] for name in layout.names}, body, layout)
+    else:
+        made = _table({name: found[name] for name in layout.names}, body, layout)
+    return replace(made, notes=(*made.notes, *filter(None, (whole.note,))))
 
 
 def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
@@ -110,27 +109,6 @@ def _seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], str] | N
         return None
     joined = join_stamps({"": stamps})[""]
     return joined.seconds - joined.seconds[0], joined.first
-
-
-def _read_text(path: Path) -> str:
-    """UTF-8, UTF-16, or what Windows writes in western languages. Raises CannotReadError, ValueError."""
-    try:
-        data = read_regular(path, TABLE_BYTES)
-        if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-            return data.decode("utf-16")
-        if b"\0" in data[:_LOOKED_AT]:
-            high_bytes = data[1:_LOOKED_AT:2], data[:_LOOKED_AT:2]
-            for zeros, encoding in zip(high_bytes, ("utf-16-le", "utf-16-be"), strict=True):
-                if 2 * zeros.count(0) > len(zeros):
-                    return data.decode(encoding)
-            raise ValueError("it holds bytes of zero, as no text does; is it a table?")
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as problem:
-        if problem.encoding != "utf-8":
-            raise ValueError(f"it is no whole {problem.encoding} text") from problem
-    except OSError as problem:
-        raise CannotReadError(path, problem) from problem
-    return data.decode("cp1252", errors="replace")
 
 
 def _lines(text: str, settings: CsvMap) -> list[Line]:

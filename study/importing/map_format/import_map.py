@@ -23,6 +23,12 @@ class CsvMap:
     skip_lines: Annotated[int, Field(ge=0, description="Lines before the header. Default 0.")] = 0
     delimiter: Annotated[str, Field(description="Between fields. Default: what the numbers show.")] = ""
     decimal: Annotated[Literal["", ".", ","], Field(description="Decimal sign. Default: what the numbers show.")] = ""
+    encoding: Annotated[
+        str,
+        Field(
+            description='Of the text, as "gb18030", "shift_jis", "cp1251". Default: UTF-8, UTF-16, or what it shows.'
+        ),
+    ] = ""
     names: Annotated[
         tuple[str, ...], Field(description="Names of the columns of a table without a header. Default: none.")
     ] = ()

@@ -26,6 +26,21 @@ _WORDS = {
     "setting": ("setting",),
 }
 _QUANTITY = {word: quantity for quantity, words in _WORDS.items() for word in words}
+_FOREIGN = {
+    "time": ("时间", "時間", "時刻", "시간", "время", "χρόνος"),
+    "force": ("载荷", "荷重", "하중", "сила", "усилие", "δύναμη"),
+    "torque": ("扭矩", "转矩", "トルク", "토크", "момент", "ροπή"),
+    "position": ("位移", "位置", "変位", "ストローク", "변위", "위치", "перемещение", "положение", "θέση"),
+    "angle": ("角度", "转角", "각도", "угол", "γωνία"),
+    "velocity": ("速度", "转速", "속도", "скорость", "ταχύτητα"),
+    "acceleration": ("加速度", "가속도", "ускорение", "επιτάχυνση"),
+    "voltage": ("电压", "電圧", "전압", "напряжение", "τάση"),
+    "current": ("电流", "電流", "전류", "ток", "ρεύμα"),
+    "temperature": ("温度", "온도", "температура", "θερμοκρασία"),
+    "pressure": ("压力", "圧力", "압력", "давление", "πίεση"),
+}
+FOREIGN_WORDS = {word: quantity for quantity, words in _FOREIGN.items() for word in words}
+"""Words in other scripts, by which an encoding is recognised, and the quantity of each."""
 _WRITTEN_TOGETHER = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
 _SAID: dict[str, SignalRole] = {
     **dict.fromkeys(("command", "cmd", "commanded"), "command"),
@@ -80,7 +95,9 @@ def unit_in(header: str) -> tuple[str, str]:
 def name_signal(header: str) -> ParsedName:
     """Interpret one header."""
     name, unit = unit_in(header)
+    foreign = max((word for word in FOREIGN_WORDS if word in name.lower()), key=len, default="")
     words = [_QUANTITY[part.lower()] for part in _WORD.findall(name) if part.lower() in _QUANTITY]
+    words += [FOREIGN_WORDS[foreign]] if FOREIGN_WORDS.get(foreign, "time") != "time" else []
     word = words[-1] if words else ""  # the last says it: a load angle is an angle
     told = unit or _unit_at_end(name)[1]
     try:

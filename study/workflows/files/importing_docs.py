@@ -103,6 +103,8 @@ cannot be understood is refused by name, and then nothing is written. `hapteq va
 * **Tables** are read from their rows of numbers upwards: the row above them is the header, or units (`s,N,mm`,
   `[s] [N]`) with the header above; what stands higher, and lines with `#` or `%`, are remarks. Delimiter and decimal
   sign are those by which the rows are numbers. UTF-8, UTF-16 and Windows' western encoding (`µ`, `°`) are understood.
+  Other encodings (GBK, Shift-JIS, EUC, KOI8 ...) are recognised by a word for what is measured in them, such as 位移 or
+  сила, and that is said; else `encoding` under `[csv]` states it, and the error shows how the text reads in each.
 * **Units** are never guessed: a channel without one keeps its numbers, in the unit `1`, and that is said. So is the
   unit in which each computed channel is taken to be. {ALLOWED[0].upper()}{ALLOWED[1:]}; `lb` and `oz` are masses.
 * **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.

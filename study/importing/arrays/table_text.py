@@ -1,0 +1,108 @@
+"""The text of a table: its encoding, as stated or found from the bytes.
+
+UTF-8 and UTF-16 show by themselves. In other encodings each byte sequence means something else: Windows' western one is
+taken where bytes beyond ASCII stand alone or within words, as in `µs`, `°` and `Größe`; else the encoding in which the
+text holds a word for what is measured. Where several do, or none does, the readings are named.
+"""
+
+import codecs
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from study.importing.map_format.signal_words import FOREIGN_WORDS
+from study.regular_file import TABLE_BYTES, read_regular
+from study.store.disk.file_errors import CannotReadError
+
+_LOOKED_AT = 4096
+"""Bytes in which UTF-16 without a mark shows: every other byte of a table in it is zero."""
+_READ_FOR_WORDS = 65536
+_ENCODINGS = ("gb18030", "shift_jis", "euc_jp", "euc_kr", "big5", "cp1251", "koi8_r", "cp1250", "cp1253")
+_BEYOND_ASCII = re.compile(r"[^\x00-\x7f]+")
+_SHOWN = 24
+
+
+@dataclass(frozen=True, slots=True)
+class TableText:
+    text: str
+    note: str
+    """A sentence where the encoding was found from words; else empty."""
+
+
+def read_text(path: Path, encoding: str) -> TableText:
+    """encoding: as the map states; empty to find it. Raises CannotReadError; ValueError with the key to state it."""
+    try:
+        data = read_regular(path, TABLE_BYTES)
+    except OSError as problem:
+        raise CannotReadError(path, problem) from problem
+    if encoding:
+        return TableText(_decode(data, encoding), "")
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return TableText(_decode(data, "utf-16"), "")
+    if b"\0" in data[:_LOOKED_AT]:
+        high_bytes = data[1:_LOOKED_AT:2], data[:_LOOKED_AT:2]
+        for zeros, name in zip(high_bytes, ("utf-16-le", "utf-16-be"), strict=True):
+            if 2 * zeros.count(0) > len(zeros):
+                return TableText(_decode(data, name), "")
+        raise ValueError("it holds bytes of zero, as no text does; is it a table?")
+    try:
+        return TableText(data.decode("utf-8-sig"), "")
+    except UnicodeDecodeError:
+        return _of_other_encoding(data)
+
+
+def _decode(data: bytes, encoding: str) -> str:
+    try:
+        return data.decode(encoding)
+    except LookupError as problem:
+        raise ValueError(f"there is no encoding '{encoding}'; usual are utf-8, cp1252, {', '.join(_ENCODINGS)}") from (
+            problem
+        )
+    except UnicodeDecodeError as problem:
+        raise ValueError(f"it is no whole {encoding} text") from problem
+
+
+def _of_other_encoding(data: bytes) -> TableText:
+    """By the lines beyond ASCII that are no remarks."""
+    begin = data if len(data) <= _READ_FOR_WORDS else data[: data.rfind(b"\n", 0, _READ_FOR_WORDS) + 1]
+    lines = [line for line in begin.splitlines() if not line.isascii() and not line.lstrip().startswith((b"#", b"%"))]
+    beyond = b"\n".join(lines)
+    if _is_western(beyond):
+        return TableText(data.decode("cp1252", errors="replace"), "")
+    readings = {encoding: text for encoding in _ENCODINGS if (text := _readable(beyond, encoding))}
+    sure = {
+        encoding: text for encoding, text in readings.items() if any(word in text.lower() for word in FOREIGN_WORDS)
+    }
+    distinct = {text: encoding for encoding, text in reversed(sure.items())}
+    if len(distinct) == 1:
+        encoding = next(iter(distinct.values()))
+        return TableText(
+            _decode(data, encoding), f"Read in the encoding {encoding}, in which its words are understood."
+        )
+    shown = ", ".join(f"{name}: '{_beyond_ascii(text)}'" for name, text in (sure or readings).items())
+    raise ValueError(
+        f"it is no UTF-8 text, and its encoding is open ({shown}); save it as UTF-8, or state the encoding in the map: "
+        f'under [csv], encoding = "{next(iter(sure or readings), "cp1252")}"'
+    )
+
+
+def _is_western(data: bytes) -> bool:
+    text = data.decode("cp1252", errors="replace")
+    for found in _BEYOND_ASCII.finditer(text):
+        beside = text[found.start() - 1 : found.start()] + text[found.end() : found.end() + 1]
+        word = len(found[0]) == 2 and found[0].isalpha() and any(letter.isalpha() for letter in beside)
+        if not word and (len(found[0]) > 1 or found[0] == "\ufffd"):
+            return False
+    return True
+
+
+def _readable(data: bytes, encoding: str) -> str:
+    """The text; empty where it cannot be in this encoding."""
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        return ""
+
+
+def _beyond_ascii(text: str) -> str:
+    return " ".join(_BEYOND_ASCII.findall(text))[:_SHOWN]

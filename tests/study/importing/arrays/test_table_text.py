@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+
+from study.importing.arrays.arrays import read_arrays
+from study.importing.header_map import header_map
+from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.map_errors import ImportRefusedError
+
+ROWS = "\n".join(f"{k / 10},{k % 7},{k % 5}" for k in range(30))
+
+
+def read(tmp_path, header, encoding, stated=""):
+    path = tmp_path / "a.csv"
+    path.write_bytes(f"{header}\n{ROWS}\n".encode(encoding))
+    return read_arrays(path, CsvMap(encoding=stated))
+
+
+@pytest.mark.parametrize(
+    ("header", "encoding", "found"),
+    [
+        ("时间(s),载荷(N),位移(mm)", "gbk", "gb18030"),
+        ("時間(s),荷重(N),変位(mm)", "shift_jis", "shift_jis"),
+        ("時間(s),荷重(N),変位(mm)", "euc_jp", "euc_jp"),
+        ("시간(s),하중(N),변위(mm)", "euc_kr", "euc_kr"),
+        ("время(s),сила(N),перемещение(mm)", "cp1251", "cp1251"),
+    ],
+)
+def test_a_header_in_an_encoding_of_its_language_is_read_and_understood(tmp_path, header, encoding, found):
+    arrays = read(tmp_path, header, encoding)
+    assert list(arrays.by_name) == header.split(",")
+    assert arrays.notes == (f"Read in the encoding {found}, in which its words are understood.",)
+    wanted = header_map(arrays)
+    assert wanted is not None
+    assert [channel.role for channel in wanted.channel] == ["command", "response"]
+
+
+@pytest.mark.parametrize("header", ["time [µs],force größe [N],angle [°]", "t [s],force été [N],angle ±1 [deg]"])
+def test_western_letters_need_no_word(tmp_path, header):
+    assert list(read(tmp_path, header, "cp1252").by_name) == header.split(",")
+
+
+def test_an_encoding_that_is_open_is_refused_with_its_readings_and_the_key_and_read_when_stated(tmp_path):
+    header = "项目一(s),项目二(N),项目三(mm)"
+    with pytest.raises(ImportRefusedError) as refused:
+        read(tmp_path, header, "gbk")
+    assert "gb18030: '项目一 项目二 项目三'" in refused.value.happened
+    assert 'under [csv], encoding = "gb18030"' in refused.value.happened
+    assert list(read(tmp_path, header, "gbk", "gb18030").by_name) == header.split(",")
+
+
+def test_a_remark_in_another_encoding_does_not_matter(tmp_path):
+    found = read(tmp_path, "# 项目一项目二\nt,u,v", "gbk").by_name
+    np.testing.assert_array_equal(found["u"], np.arange(30) % 7)
+
+
+@pytest.mark.parametrize(
+    ("stated", "said"), [("klingon", "There is no encoding 'klingon'"), ("ascii", "no whole ascii")]
+)
+def test_an_encoding_that_cannot_be_is_named(tmp_path, stated, said):
+    with pytest.raises(ImportRefusedError, match=said):
+        read(tmp_path, "t,µ,v", "cp1252", stated)
