@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.balance.condition_laws import condition_laws
 from analysis.diagnosis.balance.friction_laws import damping_laws, friction_laws
 from analysis.diagnosis.balance.law import Law, Scales, name_weights, relative_time, scales_of
 from analysis.diagnosis.balance.motion import Motion
@@ -25,7 +24,11 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
         yield from stiffness_laws(channel, scales)
         if np.isfinite(scales.band_hz):
             yield from dynamic_laws(channel, scales)
-        yield from condition_laws(motions, channel, scales)
+        if motions[0].conditions:
+            # Imported here: few recordings hold any.
+            from analysis.diagnosis.balance.condition_laws import condition_laws
+
+            yield from condition_laws(motions, channel, scales)
     if np.isfinite(motions[0].band_hz) and motions[0].order < 2:
         yield Law("drifting_force", -1, (), lambda m, _: relative_time(m), name_weights("change"))
 

@@ -30,6 +30,11 @@ EDGE = 0.5
 """Periods of the band's end that are left out at either end of a part: there the filter reaches beyond the data."""
 
 
+FREE = "free"
+"""Of a recording's `meta["imposed"]`: nothing drove the motion, and the command is the force per unit mass that it
+shows; see `first_model.free_motion`."""
+
+
 class NoMotionError(ValueError):
     """The recording holds no motion from which forces could be told."""
 
@@ -170,6 +175,9 @@ def _motion(
     position, velocity, acceleration = (
         _derivative(samples, rate_hz, (band_hz, lowest_hz), wanted - order, early_s) for wanted in range(3)
     )
+    if record.recording.meta.get("imposed") == FREE:
+        # It is the force, turned round: no law may explain it by itself.
+        acceleration = np.zeros_like(acceleration)
     return Motion(
         rate_hz, band_hz, max(int(rate_hz / (OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
         acceleration, fill_gaps(record.command), condition, record.fit | record.choose, record.test, lowest_hz,

@@ -13,6 +13,7 @@ from analysis.diagnosis.errors.fit_score import fit_score
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.first_model.free_motion import is_read_as_free
 from analysis.diagnosis.first_model.model_of_balance import first_model, share_within
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
@@ -77,7 +78,7 @@ def list_fitting_measures(
     if not any(balance.named for balance in balances):
         return
     chosen = measure_of(recordings, model)
-    if is_quasi_static(recordings[0]):
+    if is_quasi_static(recordings[0]) or is_read_as_free(recordings[0]):
         yield FittingMeasure(model, chosen)
         return
     if (chosen.measure.name == "free simulation" or chosen.measure.name.startswith("windows")) and compared != "force":

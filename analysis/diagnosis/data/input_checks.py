@@ -154,7 +154,10 @@ def _impossible_values(recording: Recording, name: str) -> Iterator[str]:
 
 def _constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
     if all(np.ptp(recording.command.samples, axis=0).max(initial=0.0) == 0 for recording in recordings):
-        yield "the command never changes, so the device was not excited"
+        yield (
+            "the command never changes, so the device was not excited; a free motion, measured as positions or speeds "
+            "over time, is diagnosed without a model"
+        )
     for side in ("response", "position"):
         signals: list[Signal] = [found for recording in recordings if (found := getattr(recording, side)) is not None]
         for channel, name in enumerate(signals[0].channels if signals else ()):

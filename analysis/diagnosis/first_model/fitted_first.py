@@ -1,6 +1,7 @@
 """Fits the model that a diagnosis starts from where none was given."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,8 +10,14 @@ from analysis.diagnosis.balance.motion import NoMotionError
 from analysis.diagnosis.data.as_recorded import has_carried_weight
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static
+from analysis.diagnosis.first_model.free_motion import is_read_as_free
 from analysis.diagnosis.first_model.model_of_balance import FirstModel, plain_model
-from analysis.diagnosis.first_model.model_structures import StructureRefused, balance_recordings, fit_structure
+from analysis.diagnosis.first_model.model_structures import (
+    HELD_FIXED,
+    StructureRefused,
+    balance_recordings,
+    fit_structure,
+)
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from equalizer.effects.simulation.simulator import simulate_response
@@ -36,6 +43,11 @@ UNTIMED_SAID = (
     "The mass in the file is a floor that no force shows; damping and mass are not known."
 )
 
+FREE_SAID = (
+    "No model was given. A damper and a spring per axis were fitted first to the force per unit mass that the free "
+    "motion shows; the mass in the file is a floor."
+)
+
 
 def first_model_of(
     recordings: Sequence[Recording],
@@ -49,8 +61,9 @@ def first_model_of(
     _require_no_weight(recordings)
     on_progress("weighing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(without), time_left, map_)
-    if any(map(is_quasi_static, recordings)) and (still := _massless_model(recordings)) is not None:
-        return FirstModel(still, (UNTIMED_SAID,), balances)
+    free = is_read_as_free(recordings[0])
+    if (free or any(map(is_quasi_static, recordings))) and (still := _massless_model(recordings)) is not None:
+        return FirstModel(_hold_mass(still) if free else still, (FREE_SAID if free else UNTIMED_SAID,), balances)
     model = plain_model(balances, recordings[0], "fitted to these recordings")
     if model is not None:
         return FirstModel(model, (BALANCE_SAID,), balances)
@@ -59,6 +72,12 @@ def first_model_of(
         recordings, lambda share: on_progress("fitting a linear model, as none was given", 0.5 + share / 2)
     )
     return FirstModel(model, remarks, balances)
+
+
+def _hold_mass(model: MechanicalModel) -> MechanicalModel:
+    """The model with a mass that re-tuning leaves as it is."""
+    assert model.tolerance is not None
+    return replace(model, tolerance=replace(model.tolerance, mass_kg=HELD_FIXED * float(np.abs(model.mass).max())))
 
 
 def _massless_model(recordings: Sequence[Recording]) -> MechanicalModel | None:

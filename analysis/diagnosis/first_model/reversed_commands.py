@@ -19,6 +19,7 @@ from analysis.diagnosis.balance.regression import regression_of
 from analysis.diagnosis.balance.structures import Structure, is_better
 from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.first_model.free_motion import is_read_as_free
 from analysis.wording import conjoin
 from equalizer.effects.turned_commands import with_turned_commands
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -60,7 +61,9 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 
 def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
     """The model driven by the commands as they were recorded. model: of the recording as it is compared, where commands
-    may have been reversed."""
+    may have been reversed, and a free motion has the force per unit mass as its command."""
+    if is_read_as_free(recording):
+        return replace(model, mass=np.eye(len(model.mass)))
     channels, turned = recording.command.channels, recording.meta.get(REVERSED)
     if not isinstance(turned, Sequence) or not set(turned) & set(channels):
         return model

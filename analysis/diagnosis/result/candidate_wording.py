@@ -97,7 +97,8 @@ def refinement_sentence(effect: NamedEffect) -> str:
 def _class_names(effect: NamedEffect) -> tuple[str, ...]:
     """The effect's name and those of its class; of a formula that stands for a law with a name, that name."""
     names = effect.class_ or (effect.effect,)
-    return names[1:] if len(names) > 1 and names[1] in PLAYED_AS_FORMULA else names
+    formula = effect.law is not None and len(names) > 1 and names[1] in PLAYED_AS_FORMULA
+    return names[1:] if formula else names
 
 
 def _family(names: Sequence[str]) -> tuple[str, str] | None:

@@ -1,0 +1,92 @@
+"""Decays without a command: what they show per unit of mass, also across parts, and what they do not show."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.diagnose_values import diagnose_values
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ, FINER, NOISE_RAD = 200.0, 16, 2e-4
+TURN_RAD_PER_S2 = 38.0
+"""Of a pendulum's weight over its inertia."""
+SPRING, DAMPING = 40.0, 0.15
+
+
+def decay(acceleration, start: float, seconds: float, seed: int) -> np.ndarray:
+    """(n,): position from rest at `start`, by semi-implicit Euler steps of a sixteenth of a sample, with noise."""
+    count, step_s = int(seconds * RATE_HZ), 1 / (RATE_HZ * FINER)
+    q, v, found = start, 0.0, np.zeros(count)
+    for k in range(count):
+        found[k] = q
+        for _ in range(FINER):
+            v += step_s * acceleration(q, v)
+            q += step_s * v
+    return found + NOISE_RAD * np.random.default_rng(seed).standard_normal(count)
+
+
+def recording(*decays: np.ndarray) -> Recording:
+    """The decays one after the other, as parts of one recording."""
+    ends = np.cumsum([len(each) for each in decays])
+    parts = [
+        {"start": int(end - len(each)), "stop": int(end), "name": str(number)}
+        for number, (each, end) in enumerate(zip(decays, ends, strict=True))
+    ]
+    angle = np.concatenate(decays)[:, None]
+    return Recording(
+        "rig", Signal(np.zeros_like(angle), RATE_HZ, "torque", "N m", ("none",)),
+        Signal(angle, RATE_HZ, "angle", "rad", ("angle",)), meta={"parts": parts},
+    )  # fmt: skip
+
+
+def names_of(found) -> set[str]:
+    return {name for effect in found.diagnosis.effects for name in (effect.effect, *effect.class_)}
+
+
+def pendulum(q: float, v: float) -> float:
+    return -TURN_RAD_PER_S2 * np.sin(q) - DAMPING * v
+
+
+def rubbing(q: float, v: float) -> float:
+    return -SPRING * q - DAMPING * v - 0.8 * np.tanh(v / 0.01)
+
+
+def linear(q: float, v: float) -> float:
+    return -SPRING * q - DAMPING * v
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_weight_of_a_pendulum_is_named_from_its_decays(seed):
+    found = diagnose_values(recording(decay(pendulum, 1.6, 12, seed), decay(pendulum, 0.9, 12, seed + 10)))
+    assert "gravity_torque" in names_of(found)
+    assert found.diagnosis.fit.test.after < 0.3 * found.diagnosis.fit.test.retuned
+    # Its two numbers make one: spring and weight together hold the small motion.
+    (weight,) = (each for each in found.diagnosis.effects if each.effect == "gravity_torque")
+    held = found.improved.stiffness[0, 0] + weight.parameters["torque"].value
+    assert held == pytest.approx(TURN_RAD_PER_S2, rel=0.05)
+    assert found.improved.mass == pytest.approx(np.eye(1))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_dry_friction_is_named_from_a_decay(seed):
+    found = diagnose_values(recording(decay(rubbing, 1.0, 8, seed)))
+    (friction,) = found.diagnosis.effects
+    assert "coulomb_friction" in names_of(found)
+    assert friction.parameters["level"].value == pytest.approx(0.8, rel=0.25)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_linear_decay_names_nothing(seed):
+    found = diagnose_values(recording(decay(linear, 1.0, 12, seed), decay(linear, 0.4, 12, seed + 10)))
+    assert names_of(found) == set()
+    assert found.diagnosis.fit.test.retuned < 0.1
+
+
+def test_a_standing_command_with_accelerations_alone_is_refused_with_a_way_on():
+    swing = recording(decay(linear, 1.0, 8, 1))
+    response = Signal(swing.response.samples, RATE_HZ, "angular acceleration", "rad/s^2", ("alpha",))
+    with pytest.raises(NothingToDiagnose, match="a free motion, measured as positions or speeds"):
+        diagnose_values(replace(swing, response=response))
