@@ -34,6 +34,12 @@ def header_map(arrays: Arrays) -> ImportMap | None:
 
 def header_problems(arrays: Arrays) -> tuple[str, ...]:
     """What the names leave open, one clause each with the column; empty if `header_map` gives a map."""
+    others = [(name, array) for name, array in arrays.by_name.items() if array.dtype.kind not in "fiub"]
+    if len(others) == len(arrays.by_name):
+        kinds = ", ".join(
+            f"'{name}' is {array.item()}" for name, array in others if array.dtype.kind == "O" and array.item()
+        )
+        return (f"it holds no arrays of numbers{f' ({kinds})' if kinds else ''}",)
     if len({array.shape for array in arrays.by_name.values()}) != 1:
         return ("its arrays have several lengths",)
     if next(iter(arrays.by_name.values())).ndim != 1:

@@ -1,12 +1,20 @@
 """Make an incomplete map for a file of which only the arrays are known, to be completed by its owner."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import takewhile
 
-from study.importing.arrays.array_groups import groups_in
-from study.importing.arrays.arrays import Arrays
+from study.importing.arrays.array_groups import Groups, groups_in
+from study.importing.arrays.arrays import Array, Arrays
 from study.importing.map_format.signal_words import name_signal, propose_roles, unit_in
-from study.importing.surplus_arrays import LEAST_SAMPLES, is_growing_time, name_words, surplus_arrays
+from study.importing.surplus_arrays import (
+    LEAST_SAMPLES,
+    equal_clocks,
+    is_growing_time,
+    name_words,
+    surplus_arrays,
+    time_in_table,
+)
 
 _RATE_WORDS = {"fs", "rate", "samplerate"}
 _TIME_UNITS = ("s", "ms", "us", "min")
@@ -19,38 +27,28 @@ def map_skeleton(arrays: Arrays) -> str:
 
 def _lines(whole: Arrays) -> Iterator[str]:
     groups = groups_in(whole.by_name, LEAST_SAMPLES)
-    inside = [name for name in whole.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
-    common = {name: array for name, array in whole.by_name.items() if name not in inside}
-    first = {name: whole.by_name[full] for name, full in groups.names.items()}
-    arrays = Arrays(whole.path, {**first, **common}, whole.clocks)
+    arrays = _first_run(whole, groups)
     surplus = surplus_arrays(arrays)
-    clocks = [
-        name
-        for name, array in arrays.by_name.items()
-        if name not in surplus and (name in whole.clocks or is_growing_time(name, array))
-    ]
-    roles = _roles(arrays, [*clocks, *surplus])
+    every = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
+    clocks = [name for name in every if name not in surplus]
+    roles = _roles(arrays, [*every, *surplus])
     yield f"# A map for {arrays.name}. Keys and examples: docs/importing.md."
     yield 'device = ""               # what was recorded'
     yield 'hold = "zero-order"       # how the command moves between samples: zero-order, band-limited, linear'
     yield from _clocks(arrays, clocks)
     for name, array in arrays.by_name.items():
-        if name in clocks:
-            continue
+        own = _clock_of(name, arrays, every) if len(clocks) > 1 else ""
+        numbers = array.dtype.kind in "fiub" and array.size >= LEAST_SAMPLES
         if name in surplus:
             yield f"\n# {name} {surplus[name]}"
-        elif array.dtype.kind not in "fiub":
-            yield f"\n# {name} holds no numbers"
-        elif array.size < LEAST_SAMPLES:
-            yield f"\n# {name}: {_shape(array.shape)}, a constant for expressions"
-        elif array.ndim == 1:
-            own = [clock for clock in clocks if arrays.by_name[clock].shape == array.shape]
-            clock = own[0] if own and len(clocks) > 1 else ""
-            yield from _channel((name, name, name), _shape(array.shape), clock, roles.get(name, ""))
-        elif array.ndim == 2:
-            yield from _table(name, array.shape)
+        elif name in clocks:
+            continue
+        elif array.ndim == 1 and numbers:
+            yield from _channel((_stem(name), name, _stem(name)), _shape(array.shape), own, roles.get(name, ""))
+        elif array.ndim == 2 and numbers:
+            yield from _table(name, array, own, roles.get(name, ""))
         else:
-            yield f"\n# {name}: {_shape(array.shape)}; a channel is one row of it, as in {_quote(name)}[0, 0]"
+            yield from _no_channel(name, array)
     yield from _parts(groups.prefixes)
     yield ""
     yield "[[segment]]"
@@ -58,10 +56,57 @@ def _lines(whole: Arrays) -> Iterator[str]:
     yield "split = { fit = 0.5, test = 0.5 }"
 
 
+def _first_run(whole: Arrays, groups: Groups) -> Arrays:
+    """Arrays of the first of several runs and those of none; the time of a table, [time, value ...], on its own."""
+    inside = [name for name in whole.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
+    common = {name: array for name, array in whole.by_name.items() if name not in inside}
+    found = {**{name: whole.by_name[full] for name, full in groups.names.items()}, **common}
+    times = {_line(name, array, 0): _line_0(array) for name, array in found.items() if time_in_table(array)}
+    return Arrays(whole.path, {**found, **times}, (*whole.clocks, *times))
+
+
+def _clock_of(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
+    """Of those with as many samples, the clock whose name begins most alike; of equal clocks the one that is kept."""
+    fitting = [clock for clock in clocks if len(arrays.by_name[clock]) == max(arrays.by_name[name].shape, default=0)]
+
+    def alike(clock: str) -> int:
+        return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(name, clock, strict=False)))
+
+    near = max(fitting, key=alike, default="")
+    return equal_clocks(arrays).get(near, near)
+
+
+def _no_channel(name: str, array: Array) -> Iterator[str]:
+    if array.dtype.kind not in "fiub":
+        what = array.item() if array.dtype.kind == "O" and array.size == 1 and isinstance(array.item(), str) else ""
+        yield f"\n# {name} holds no numbers" + (f": it is {what}" if what else "")
+        if "timeseries" in what:
+            yield f"# in Matlab: {name} = struct('time', {name}.Time, 'values', {name}.Data)"
+    elif array.size < LEAST_SAMPLES:
+        yield f"\n# {name}: {_shape(array.shape)}, a constant for expressions"
+    else:
+        yield f"\n# {name}: {_shape(array.shape)}; a channel is one row of it, as in {_quote(name)}[0, 0]"
+
+
+def _stem(name: str) -> str:
+    """`force` for `force.signals.values`, as Simulink stores a signal."""
+    for end in (".signals.values", ".values", ".Data", ".data"):
+        name = name.removesuffix(end)
+    return name
+
+
+def _line(name: str, array: Array, number: int) -> str:
+    return f"{_quote(name)}[{number}]" if array.shape[0] < array.shape[1] else f"{_quote(name)}[:, {number}]"
+
+
+def _line_0(array: Array) -> Array:
+    return array[0] if array.shape[0] < array.shape[1] else array[:, 0]
+
+
 def _roles(arrays: Arrays, others: list[str]) -> dict[str, str]:
     """Roles by name, where names and units tell them; others: what is no channel."""
     channels = [name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in others]
-    return dict(zip(channels, propose_roles([name_signal(name) for name in channels]), strict=True))
+    return dict(zip(channels, propose_roles([name_signal(_stem(name)) for name in channels]), strict=True))
 
 
 def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
@@ -74,7 +119,7 @@ def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
 
 def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
     for name in clocks:
-        plain, unit = unit_in(name)
+        plain, unit = unit_in(name) if name in arrays.by_name and name_signal(name).quantity == "time" else (name, "")
         last = plain.rpartition("_")[2]
         yield "\n[[clock]]"
         if len(clocks) > 1:
@@ -88,11 +133,15 @@ def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
     yield f"rate = {json.dumps(rates[0])}           # in hertz" if rates else "# rate_hz = 1000, or unknown = true"
 
 
-def _table(name: str, shape: tuple[int, ...]) -> Iterator[str]:
-    rows_are_channels = shape[0] < shape[1]
-    for number in range(min(shape)):
-        index = f"[{number}]" if rows_are_channels else f"[:, {number}]"
-        yield from _channel((f"{name}{number + 1}", f"{_quote(name)}{index}", name), _shape(shape), "", "")
+def _table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
+    """A channel of each line; of [time, value] the value has the name and the role that the table's name says."""
+    timed = time_in_table(array)
+    for number in range(int(timed), min(array.shape)):
+        single = timed and min(array.shape) == 2
+        own = name if single else f"{name}{number + (not timed)}"
+        yield from _channel(
+            (own, _line(name, array, number), name), _shape(array.shape), clock if timed else "", role if single else ""
+        )
 
 
 def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """Arrays that a proposed map leaves out: those without any number, and further columns of the same time."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -12,8 +12,11 @@ LEAST_SAMPLES = 16
 """Shorter arrays are constants."""
 CLOCK_WORDS = {
     *(word for word, quantity in FOREIGN_WORDS.items() if quantity == "time"),
-    "t", "time", "timestamp", "timestamps", "datetime", "zeit", "zeitstempel", "temps", "tiempo", "tempo", "date",
+    "t", "time", "timestamp", "timestamps", "datetime", "zeit", "zeitstempel", "temps", "tiempo", "tempo",
+    "tout", "date",
 }  # fmt: skip
+_USUAL_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
+_EVEN = 0.02
 SAME_CLOCK = 0.5
 """Stamps that differ by at most this fraction of a step, when both begin at 0, are one clock."""
 
@@ -21,13 +24,14 @@ SAME_CLOCK = 0.5
 def surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
     """Why arrays are left out, by name."""
     empty = {name: "holds no numbers at all" for name, array in arrays.by_name.items() if _is_empty(array)}
-    return empty | dict(_equal_clocks(arrays))
+    return empty | {name: f"is the same time as '{other}'" for name, other in equal_clocks(arrays).items()}
 
 
+@np.errstate(all="ignore")
 def is_growing_time(name: str, array: Array) -> bool:
     """Whether an array is called a time and grows."""
     grows = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
-    return grows and bool(name_words(name) & CLOCK_WORDS) and bool((np.diff(array) > 0).all())
+    return grows and bool(name_words(name) & CLOCK_WORDS) and bool((array[1:] > array[:-1]).all())
 
 
 def name_words(name: str) -> set[str]:
@@ -40,25 +44,42 @@ def _is_empty(array: Array) -> bool:
     return array.dtype.kind == "f" and array.size >= LEAST_SAMPLES and bool(np.isnan(array).all())
 
 
-def _equal_clocks(arrays: Arrays) -> Iterator[tuple[str, str]]:
+def equal_clocks(arrays: Arrays) -> Mapping[str, str]:
+    """Time columns that repeat another, each with that one."""
     kept: list[str] = []
+    found = {}
     clocks = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
     for name in sorted(clocks, key=lambda name: (_seconds(name) is None, name not in arrays.clocks)):
         same = next((other for other in kept if _is_same_clock(arrays.by_name, other, name)), None)
         if same is None:
             kept.append(name)
         else:
-            yield name, f"is the same time as '{same}'"
+            found[name] = same
+    return found
 
 
+@np.errstate(all="ignore")
+def time_in_table(array: Array) -> bool:
+    """Whether the first row or column of a table, along its short side, grows as a time does: [time, value ...]."""
+    if array.ndim != 2 or array.dtype.kind not in "fiu" or max(array.shape) < LEAST_SAMPLES:
+        return False
+    lines = array if array.shape[0] < array.shape[1] else array.T
+    grows = [bool((line[1:] > line[:-1]).all()) for line in lines]
+    steps = np.diff(lines[0].astype(float))
+    even = bool(np.ptp(steps) <= _EVEN * abs(np.median(steps)))  # beside a value that grows, too
+    return len(lines) > 1 and grows[0] and (even or not all(grows))
+
+
+@np.errstate(all="ignore")
 def _is_same_clock(by_name: Mapping[str, Array], first: str, second: str) -> bool:
-    """Whether both grow alike; without a unit of its own, a clock may be in any."""
+    """Whether both grow alike; where one has no unit, in any usual one."""
     one, other = (by_name[name].astype(float) for name in (first, second))
     if one.shape != other.shape or one.ndim != 1 or not np.isfinite([one[[0, -1]], other[[0, -1]]]).all():
         return False
     one, other = one - one[0], other - other[0]
     units = _seconds(first), _seconds(second)
-    ratio = one[-1] / other[-1] if None in units and other[-1] else (units[1] or 1) / (units[0] or 1)
+    ratios = _USUAL_RATIOS if None in units else ((units[1] or 1) / (units[0] or 1),)
+    ratio = min(ratios, key=lambda ratio: abs(other[-1] * ratio - one[-1]))
     step = float(np.nanmedian(np.diff(one)))
     return bool(np.nanmax(np.abs(other * ratio - one)) <= SAME_CLOCK * step)
 

@@ -18,13 +18,13 @@ MOST_MAT_BYTES = 2**32
 DEEPEST = 32
 _HEADER_BYTES = 128
 _COMPRESSED, _MATRIX = 15, 14
-_CELL, _STRUCT, _TEXT, _FIRST_NUMBER, _LAST_NUMBER = 1, 2, 4, 6, 15
+_CELL, _STRUCT, _OBJECT, _TEXT, _FIRST_NUMBER, _LAST_NUMBER, _OPAQUE = 1, 2, 3, 4, 6, 15, 17
 _COMPLEX = 0x0800
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _CLASSES = {
     6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8",
 }  # fmt: skip
-_NO_NUMBERS = np.array(None, dtype=object)
+_LEFT_OUT = {_CELL: "a cell", _TEXT: "a text", _OBJECT: "an object", 5: "a sparse matrix", 16: "a function"}
 
 
 class _Bytes:
@@ -100,13 +100,21 @@ def _matrix(element: _Bytes, depth: int) -> tuple[str, Any]:
         return "", np.empty(0)
     flags = int(element.numbers()[0])
     code = flags & 0xFF
+    if code == _OPAQUE:
+        name, _, kind = (bytes(element.element()[1].content).decode("utf-8", "replace") for _ in range(3))
+        return name, _no_numbers(f"an object of the class {kind}")
     shape = tuple(int(length) for length in element.numbers())
     name = bytes(element.element()[1].content).decode("utf-8", "replace")
     if _FIRST_NUMBER <= code <= _LAST_NUMBER:
         return name, np.array(0j) if flags & _COMPLEX else _numeric(element, shape, _CLASSES[code])
-    if code == _STRUCT and math.prod(shape) == 1:
-        return name, _fields(element, depth)
-    return name, _NO_NUMBERS  # texts, cells, sparse matrices, objects, arrays of structures
+    if code == _STRUCT:
+        return name, _structures(element, math.prod(shape), depth)
+    return name, _no_numbers(_LEFT_OUT.get(code, "no array"))
+
+
+def _no_numbers(what: str) -> Array:
+    """Stands for what is left out, and says what it was."""
+    return np.array(what, dtype=object)
 
 
 def _numeric(element: _Bytes, shape: tuple[int, ...], number: str) -> Array:
@@ -116,19 +124,24 @@ def _numeric(element: _Bytes, shape: tuple[int, ...], number: str) -> Array:
     return values.astype(number).reshape(shape, order="F")
 
 
-def _fields(element: _Bytes, depth: int) -> dict[str, Any]:
+def _structures(element: _Bytes, count: int, depth: int) -> dict[str, Any]:
+    """Fields by name; of several structures each under its number, as in `signals.2`."""
     length = int(element.numbers()[0])
     names = bytes(element.element()[1].content)
     if length < 1 or len(names) % length:
         raise ValueError("the names of a structure's fields are damaged")
     words = [names[at : at + length].split(b"\0")[0].decode("utf-8", "replace") for at in range(0, len(names), length)]
-    found: dict[str, Any] = {}
-    for word in words:
-        kind, inner = element.element()
-        if kind != _MATRIX:
-            raise ValueError(f"the field '{word}' of a structure is damaged")
-        found[word] = _matrix(inner, depth + 1)[1]
-    return found
+    if count * len(words) * 8 > element.left:
+        raise ValueError(f"{count} structures of {len(words)} fields are longer than what is left of the file")
+    every = [{word: _field(element, word, depth) for word in words} for _ in range(count)]
+    return every[0] if count == 1 else {str(number): fields for number, fields in enumerate(every, start=1)}
+
+
+def _field(element: _Bytes, word: str, depth: int) -> Any:
+    kind, inner = element.element()
+    if kind != _MATRIX:
+        raise ValueError(f"the field '{word}' of a structure is damaged")
+    return _matrix(inner, depth + 1)[1]
 
 
 def _add(found: dict[str, Array], name: str, value: Any) -> None:

@@ -138,6 +138,9 @@ cannot be understood is refused by name, and then nothing is written. `hapteq va
   motion is a condition.
   The map that is proposed also takes `cmd`, `u` beside `y`, and `ref` or `target` (a helper) for what they say.
 * **Time** runs along the only dimension of a channel. Of a table of arrays take a row (`y[0]`) or column (`y[:, 0]`).
+  Signals that carry their own time, as tables of [time, value] and as Simulink stores them (`force.time`,
+  `force.signals.values`, several as `scope.signals.1.values`), get a `[[clock]]` each in the map that is proposed;
+  signals of one time share it.
 
 With `hold = "zero-order"`, `command[k]` is held from t_k to t_(k+1) and `response[k]` is taken just before. With
 `"band-limited"` or `"linear"` both are samples of the same instant.
@@ -170,7 +173,8 @@ def importing_markdown() -> str:
         f"less, or cut the recording, where that is refused. Tables may have {TABLE_BYTES // 2**20} MiB and "
         f"{MOST_ROWS:.0e} rows. HDF5: no external storage, no virtual datasets, no links to other files. NPY and NPZ: "
         "versions 1.0 and 2.0, stored or deflated, no Python objects. MAT: versions 5 to 7.3 (Matlab's -v6, -v7, "
-        "-v7.3); texts, cells, sparse matrices and arrays of structures are left out.",
+        "-v7.3); texts, cells, sparse matrices and objects (timeseries, tables) are left out, and named: save them as "
+        "structures.",
         "## Keys of a map",
         _keys("At the top", MAP_SCHEMA),
         *(_keys(_title(name, node), _table_of(node)) for name, node in _tables()),
