@@ -48,6 +48,8 @@ FAMILIES = (
     {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
 )  # fmt: skip
 """Effects that may stand in one class: they act alike. Of different families, none is named."""
+BY_CONDITION = {"condition_dependent_friction", "condition_dependent_damping"}
+"""The same of laws of a condition, which may be told from all other friction where they are not from each other."""
 PLAYED_AS = {"drifting_friction": "coulomb_friction"}
 """Laws that have no simulation, and the law that is fitted in their place and forms a class with them."""
 
@@ -251,7 +253,7 @@ def _why_not(
         return (
             f"with it, {100 * (1 - explained):.0f} % of what all laws together take are left: the main part is another"
         )
-    family = family_of(law.effect)
+    family = family_of(law.effect) | (BY_CONDITION if law.effect in BY_CONDITION else set())
     strange = [effect for effect in alike if effect not in family]
     others = [effect for effect in alike if law.effect not in _special_cases(effect)]
     if strange or (len(others) >= MOST_ALIKE and not {law.effect, *others} <= DRY_FRICTIONS):

@@ -5,7 +5,7 @@ evidence is the gain on held-out data instead of a remainder in units of noise.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,9 +46,29 @@ ONLY_BESIDE_CALIBRATION = (
 BESIDE_RUNAWAY = "the model without it leaves more than the mean of the signal, and all that bounds it gains"
 VAGUE = 1.96 * INTERVAL_FACTOR
 """Half width of an interval in standard errors: a logarithm with a larger relative error leaves its number open."""
+_Named = list[tuple[int, JudgedLaw]]
+
 HELD_BY_SIMULATION = 0.9
 """Times the held-out error without new physics that the completed model may leave at most, in the measure that suits.
 """
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Confirming:
+    """What every fit of named laws begins from."""
+
+    whole: SearchContext
+    context: SearchContext
+    """`whole`, fitted to all samples but the held-out ones."""
+    balances: tuple[Balance, ...]
+    repeats: bool
+    constants: int
+    """How many constants come before the laws."""
+    before: FittedCandidate
+    retuned: FittedCandidate
+    confirmed: FittedCandidate
+    """`retuned`, scored on the held-out samples."""
+    plain: FittedCandidate
 
 
 def search_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> SearchResult | None:
@@ -62,29 +82,55 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
     ]
     if not named:
         return None
-    whole_context, context = context, context.fit_to_all()
+    within = context.fit_to_all()
     constant = constants_of(balances)
-    given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), constant)
-    before, retuned = context.with_test_score(context.candidate(given)), context.candidate(refine(context, given))
-    confirmed = context.with_test_score(retuned)
-    named, plain = refit_laws(balances, named), Explanation(before, confirmed, confirmed, (), ()).plain
+    given = evaluate_fit(within.measure, within.tuning, np.zeros(len(within.tuning.names)), constant)
+    before, retuned = within.with_test_score(within.candidate(given)), within.candidate(refine(within, given))
+    confirmed = within.with_test_score(retuned)
+    plain = Explanation(before, confirmed, confirmed, (), ()).plain
+    begun = _Confirming(
+        context, within, tuple(balances), repeats, len(constant.claims), before, retuned, confirmed, plain
+    )
+    found = _confirm(begun, named)
+    return None if found is None else _prefer_special_case(begun, *found)
+
+
+def _confirm(begun: _Confirming, named: Sequence[tuple[int, JudgedLaw]]) -> tuple[SearchResult, _Named] | None:
+    """The result with those of the laws that simulations confirm, and these laws; None where there are none."""
+    context, named = begun.context, refit_laws(begun.balances, named)
     while named:
-        steps, after = _from_starts(context, balances, (retuned, plain), named)
-        explained = Explanation(before, confirmed, after, tuple((step,) for step in steps), tuple(steps))
+        steps, after = _from_starts(context, begun.balances, (begun.retuned, begun.plain), named)
+        explained = Explanation(begun.before, begun.confirmed, after, tuple((step,) for step in steps), tuple(steps))
         vague: int | None = len(named) - 1
         errors: FloatArray | None = None
-        if _is_borne_out(plain, after) and predicts_something(context.whole, after):
+        if _is_borne_out(begun.plain, after) and predicts_something(context.whole, after):
             errors = final_errors(context, explained)
-            vague = _find_vague_law(explained, errors[len(context.tuning.names) :], len(constant.claims))
+            vague = _find_vague_law(explained, errors[len(context.tuning.names) :], begun.constants)
         if vague is None:
             sealed = float(np.nanmax(after.score.test, initial=0.0))
-            whole = repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
+            whole = begun.repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
             judged = Judgement("explained" if whole else "partly_explained", True)
-            return SearchResult(whole_context, explained, judged, errors=errors)
-        kept = [*named[:vague], *named[vague + 1 :]]
-        simpler = None if errors is None else find_special_case(balances, kept, named[vague])
-        named = refit_laws(balances, kept if simpler is None else [*named[:vague], simpler, *named[vague + 1 :]])
+            return SearchResult(begun.whole, explained, judged, errors=errors), named
+        simpler = None if errors is None else find_special_case(begun.balances, _without(named, vague), named[vague])
+        named = refit_laws(begun.balances, _without(named, vague, simpler))
     return None
+
+
+def _prefer_special_case(begun: _Confirming, found: SearchResult, named: _Named) -> SearchResult:
+    """The result with the special case of a law whose further numbers are open, a stiffness before sliding, say, where
+    that leaves hardly more; else as it is."""
+    for place in open_refinements(found, begun.constants):
+        simpler = find_special_case(begun.balances, _without(named, place), named[place])
+        other = None if simpler is None else _confirm(begun, _without(named, place, simpler))
+        if other is None or len(other[1]) < len(named):
+            continue
+        if other[0].found.after.held_out <= found.found.after.held_out - np.log(HELD_BY_SIMULATION):
+            return other[0]
+    return found
+
+
+def _without(named: _Named, place: int, instead: tuple[int, JudgedLaw] | None = None) -> _Named:
+    return [*named[:place], *([] if instead is None else [instead]), *named[place + 1 :]]
 
 
 def require_enough_gain(seen: SearchResult, repeats: bool) -> SearchResult:
@@ -193,12 +239,33 @@ def _all_of_some(said: Sequence[bool]) -> bool:
 
 def leaves_open(result: SearchResult) -> bool:
     """Whether the interval of any positive number of a law reaches zero: a stiffness before sliding, say."""
+    return bool(_open_numbers(result))
+
+
+def open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
+    """Places of the named laws with such a number that their special case lacks."""
+    hypothesis = result.found.steps[-1].fitted.hypothesis
+    found, begin, left_open = [], 0, set(_open_numbers(result))
+    for place, claim in enumerate(hypothesis.claims):
+        free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
+        special = {parameter.name for name in claim.effect.simpler for parameter in EFFECTS[name].parameters}
+        beyond = [begin + number for number, parameter in enumerate(free) if parameter.name not in special]
+        if special and place >= constants and left_open & set(beyond):
+            found.append(place - constants)
+        begin += len(free)
+    return tuple(found)
+
+
+def _open_numbers(result: SearchResult) -> list[int]:
+    """Positive numbers of the laws, in their order, whose intervals reach zero."""
     assert result.errors is not None
     numbers = result.found.steps[-1].fitted.hypothesis.numbers
     errors = result.errors[len(result.context.tuning.names) :]
-    return any(
-        number.parameter.scale == "log" and VAGUE * error >= 1 for number, error in zip(numbers, errors, strict=True)
-    )
+    return [
+        place
+        for place, (number, error) in enumerate(zip(numbers, errors, strict=True))
+        if number.parameter.scale == "log" and VAGUE * error >= 1
+    ]
 
 
 def _is_borne_out(plain: FittedCandidate, after: FittedCandidate) -> bool:

@@ -25,6 +25,7 @@ REFINING = {
     "drifting_force": ("constant_force",),
 }
 """Laws that no simulation plays, and what each holds as a special case."""
+PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further numbers are open"
 ALIKE = "as good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
 """Where one response was measured, a late command is as good as a late reading."""
@@ -101,7 +102,7 @@ def with_balances(
     )
     named = {(name, effect.axis) for effect in effects for name in _names_covered_by(effect)}
     found = [
-        (_rank(law), _candidate(law, axis_letter(channels[axis], channels)))
+        (_rank(law), _candidate(law, axis_letter(channels[axis], channels), effects))
         for axis, balance in enumerate(balances)
         for law in (*balance.laws, *balance.others)
         if law.formula is None or (law.played_as, axis_letter(channels[axis], channels)) not in named
@@ -233,7 +234,10 @@ def refines(effect: str, plain: str) -> bool:
     return plain in known
 
 
-def _candidate(weighed: JudgedLaw, axis: str) -> Candidate:
+def _candidate(weighed: JudgedLaw, axis: str, effects: Sequence[NamedEffect] = ()) -> Candidate:
+    """effects: those that are named."""
+    plainer = any(refines(weighed.law.effect, named.effect) and named.axis == axis for named in effects)
+    why_not = PLAINER if plainer else "simulations of the whole recording do not bear it out"
     return Candidate(
         effect=weighed.law.effect,
         place=place_of(weighed.law.effect),
@@ -241,5 +245,5 @@ def _candidate(weighed: JudgedLaw, axis: str) -> Candidate:
         parameters=weighed.values,
         held_out_gain=min(max(weighed.gain, 0.0), 1.0),
         share_of_black_box=min(max(weighed.share, 0.0), 1.0),
-        why_not=weighed.why_not or "simulations of the whole recording do not bear it out",
+        why_not=weighed.why_not or why_not,
     )

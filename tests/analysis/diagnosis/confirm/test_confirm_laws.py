@@ -12,6 +12,8 @@ from analysis.diagnosis.confirm.confirm_laws import (
     VAGUE,
     _find_vague_law,
     _from_starts,
+    _prefer_special_case,
+    open_refinements,
     unname_doubtful_effects,
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
@@ -62,6 +64,42 @@ def test_a_law_goes_by_its_main_number_and_a_refinement_by_any(laws, errors, dro
     assert _find_vague_law(explained(*laws), np.array([0.0, *errors]), 1) == dropped
 
 
+def result_of(*laws, errors=()):
+    """Fitted with one number of the model, which is known."""
+    context = SimpleNamespace(tuning=SimpleNamespace(names=("mass",)))
+    return SimpleNamespace(found=explained(*laws), context=context, errors=np.array([0.0, 0.0, *errors]))
+
+
+@pytest.mark.parametrize(
+    ("laws", "errors", "open_ones"),
+    [
+        ((BENDING,), (SURE, SURE), ()),
+        ((BENDING,), (SURE, OPEN), (0,)),
+        ((DRY, BENDING), (SURE, SURE, OPEN), (1,)),
+        ((DRY,), (OPEN,), ()),
+        ((BENT,), (SURE, 9.0 * OPEN, 4.0 * OPEN), ()),
+    ],
+    ids=["all known", "no stiffness", "of the second", "nothing simpler", "signed numbers go elsewhere"],
+)
+def test_open_are_positive_numbers_that_the_special_case_lacks(laws, errors, open_ones):
+    assert open_refinements(result_of(*laws, errors=errors), 1) == open_ones
+
+
+@pytest.mark.parametrize(
+    ("left", "held", "preferred"), [(1.05, 1, True), (1.2, 1, False), (0.9, 0, False)],
+    ids=["hardly more", "clearly more", "a law was dropped"],
+)  # fmt: skip
+def test_the_special_case_is_named_where_it_leaves_hardly_more(monkeypatch, left, held, preferred):
+    whole, plain = (
+        SimpleNamespace(found=SimpleNamespace(after=SimpleNamespace(held_out=np.log(e)))) for e in (1, left)
+    )
+    monkeypatch.setattr(by_balance, "open_refinements", lambda found, constants: (0,))
+    monkeypatch.setattr(by_balance, "find_special_case", lambda balances, kept, law: (0, "coulomb"))
+    monkeypatch.setattr(by_balance, "_confirm", lambda begun, named: (plain, named[:held]))
+    found = _prefer_special_case(SimpleNamespace(balances=(), constants=1), whole, [(0, "bending")])
+    assert found is (plain if preferred else whole)
+
+
 def ends_at(error):
     return FittedCandidate(None, SimpleNamespace(test=np.array([error])))
 
@@ -109,6 +147,7 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
         "refit_laws": lambda balances, named: named, "evaluate_fit": lambda *of: given, "refine": lambda *of: 4.0,
         "final_errors": lambda *of: np.zeros(1), "_find_vague_law": lambda *of: None,
         "_from_starts": lambda *of: ([ends_at(1.1)], ends_at(1.1)), "predicts_something": lambda *of: predicts,
+        "open_refinements": lambda *of: (),
     }  # fmt: skip
     for name, stand_in in patched.items():
         monkeypatch.setattr(by_balance, name, stand_in)
