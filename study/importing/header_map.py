@@ -6,8 +6,16 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from study.importing.arrays.arrays import Arrays
+from study.importing.imposed_roles import IMPOSED, NOT_IMPOSED, turn_imposed
 from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap
-from study.importing.map_format.signal_words import ParsedName, name_signal, open_roles, plain_names, roles_of
+from study.importing.map_format.signal_words import (
+    ParsedName,
+    may_be_imposed,
+    name_signal,
+    open_roles,
+    plain_names,
+    roles_of,
+)
 from study.importing.surplus_arrays import CLOCK_WORDS, surplus_arrays
 
 _TIME = re.compile(rf"({'|'.join(sorted(CLOCK_WORDS))})(_?(s|ms|us))?", re.IGNORECASE)
@@ -19,6 +27,7 @@ def header_map(arrays: Arrays) -> ImportMap | None:
         return None
     times, rest = _columns(arrays)
     clock = ClockMap(time=times[0].header, time_unit=times[0].unit)
+    roles = turn_imposed(rest, arrays.by_name, roles_of(rest) or ())
     channels = tuple(
         ChannelMap(
             role=role,
@@ -27,9 +36,21 @@ def header_map(arrays: Arrays) -> ImportMap | None:
             unit=column.unit,
             quantity="" if column.unit else column.quantity,
         )
-        for column, role, name in zip(rest, roles_of(rest) or (), plain_names(rest), strict=True)
+        for column, role, name in zip(rest, roles, plain_names(rest), strict=True)
+        if role
     )
     return ImportMap(channel=channels, device="unknown", title=arrays.path.stem, clock=(clock,))
+
+
+def direction_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
+    """A sentence where names leave open whether the force or the motion was commanded."""
+    _, rest = _columns(arrays)
+    told = {channel.value: channel.role for channel in wanted.channel}
+    forces = [told[column.header] for column in rest if column.quantity in ("force", "torque")]
+    more_forces = forces.count("command") > list(told.values()).count("response")
+    if not may_be_imposed(rest) and not more_forces:
+        return ()
+    return (f"{IMPOSED if 'response' in forces else NOT_IMPOSED}.",)
 
 
 def header_problems(arrays: Arrays) -> tuple[str, ...]:

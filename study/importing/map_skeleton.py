@@ -1,12 +1,15 @@
 """Make an incomplete map for a file of which only the arrays are known, to be completed by its owner."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import takewhile
+from textwrap import wrap
 
 from study.importing.arrays.array_groups import Groups, groups_in
 from study.importing.arrays.arrays import Array, Arrays
-from study.importing.map_format.signal_words import name_signal, propose_roles, unit_in
+from study.importing.imposed_roles import IMPOSED, NOT_IMPOSED, turn_imposed
+from study.importing.map_format.signal_words import may_be_imposed, name_signal, propose_roles, unit_in
 from study.importing.surplus_arrays import (
     LEAST_SAMPLES,
     equal_clocks,
@@ -16,6 +19,7 @@ from study.importing.surplus_arrays import (
     time_in_table,
 )
 
+_FORCES = ("force", "torque")
 _RATE_WORDS = {"fs", "rate", "samplerate"}
 _TIME_UNITS = ("s", "ms", "us", "min")
 
@@ -36,6 +40,7 @@ def _lines(whole: Arrays) -> Iterator[str]:
     yield 'device = ""               # what was recorded'
     yield 'hold = "zero-order"       # how the command moves between samples: zero-order, band-limited, linear'
     yield from _clocks(arrays, clocks)
+    yield from _direction(roles)
     for name, array in arrays.by_name.items():
         own = _clock_of(name, arrays, every) if len(clocks) > 1 else ""
         numbers = array.dtype.kind in "fiub" and array.size >= LEAST_SAMPLES
@@ -76,6 +81,17 @@ def _clock_of(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
     return equal_clocks(arrays).get(near, near)
 
 
+def _direction(roles: Mapping[str, str]) -> Iterator[str]:
+    """Which of force and motion is the command, where names leave it open."""
+    columns = [name_signal(_stem(name)) for name in roles]
+    if may_be_imposed(columns):
+        forces = [roles[name] for name, column in zip(roles, columns, strict=True) if column.quantity in _FORCES]
+        yield from (
+            "",
+            *wrap(IMPOSED if "response" in forces else NOT_IMPOSED, 110, initial_indent="# ", subsequent_indent="# "),
+        )
+
+
 def _no_channel(name: str, array: Array) -> Iterator[str]:
     if array.dtype.kind not in "fiub":
         what = array.item() if array.dtype.kind == "O" and array.size == 1 and isinstance(array.item(), str) else ""
@@ -106,7 +122,8 @@ def _line_0(array: Array) -> Array:
 def _roles(arrays: Arrays, others: list[str]) -> dict[str, str]:
     """Roles by name, where names and units tell them; others: what is no channel."""
     channels = [name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in others]
-    return dict(zip(channels, propose_roles([name_signal(_stem(name)) for name in channels]), strict=True))
+    columns = [replace(name_signal(_stem(name)), header=name) for name in channels]
+    return dict(zip(channels, turn_imposed(columns, arrays.by_name, propose_roles(columns)), strict=True))
 
 
 def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:

@@ -150,6 +150,13 @@ def propose_roles(columns: Sequence[ParsedName]) -> list[SignalRole | Literal[""
     return [_said_role(column, columns) or _role(column, columns) for column in columns]
 
 
+def may_be_imposed(columns: Sequence[ParsedName]) -> bool:
+    """Whether there are forces and places alone, and no name says which of them is the command."""
+    quantities = {column.quantity for column in columns}
+    plain = not any(_said_role(column, columns) in ("command", "helper", "response") for column in columns)
+    return plain and bool(quantities & set(_DRIVES) and quantities & set(_PLACES)) and not quantities & set(_MOTIONS)
+
+
 def _role(column: ParsedName, columns: Sequence[ParsedName]) -> SignalRole | Literal[""]:
     said = _said_role(column, columns)
     if said == "condition":

@@ -136,6 +136,8 @@ cannot be understood is refused by name, and then nothing is written. `hapteq va
   humidity, setting, supply, with a unit in brackets or at the end (`displacement_mm`, `omega_rad_s`, `torque_Nm`).
   Without forces, currents and voltages are commands, or else what is called a command. What is neither drive nor
   motion is a condition.
+  Of a force and a displacement alone, neither called a command, the displacement is the command where it follows ramps
+  or sines and the force does not, as on a testing machine; else the force. Either is said, with the way to turn it.
   The map that is proposed also takes `cmd`, `u` beside `y`, and `ref` or `target` (a helper) for what they say.
 * **Time** runs along the only dimension of a channel. Of a table of arrays take a row (`y[0]`) or column (`y[:, 0]`).
   Signals that carry their own time, as tables of [time, value] and as Simulink stores them (`force.time`,

@@ -12,7 +12,7 @@ from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import header_map, header_problems
+from study.importing.header_map import direction_notes, header_map, header_problems
 from study.importing.map_format.import_map import CsvMap, ImportMap
 from study.importing.map_format.map_errors import (
     NOTHING_WRITTEN,
@@ -165,16 +165,5 @@ def _with_header(wanted: ImportMap, arrays: Arrays, files: Sequence[Path], on_pr
         raise MapNeededError(files[0].name, refused.happened, map_skeleton(arrays)) from refused
     left_out = tuple(f"Left out: '{name}' {why}." for name, why in surplus_arrays(arrays).items())
     told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
-    notes = (f"Taken from the header: {told}.", *left_out, *_perhaps_imposed(built.recording), *built.notes)
+    notes = (f"Taken from the header: {told}.", *left_out, *direction_notes(arrays, wanted), *built.notes)
     return Foreign(built.recording, tuple(files), "header", "", notes)
-
-
-def _perhaps_imposed(recording: Recording) -> tuple[str, ...]:
-    """Remark for more forces than motions: the motion was probably imposed and the forces measured."""
-    command, response = recording.command, recording.response
-    if len(command.channels) <= len(response.channels) or not set(command.quantities) <= {"force", "torque"}:
-        return ()
-    return (
-        f"{len(command.channels)} forces beside {len(response.channels)} motion: they were taken for commands. If the "
-        "motion was imposed and the forces were measured, import by a map with the roles the other way round.",
-    )

@@ -102,7 +102,7 @@ def test_of_two_forces_along_one_motion_it_is_said_that_the_motion_may_be_impose
     (tmp_path / "a.csv").write_text(
         "time [s],drive force [N],tip force [N],displacement [mm]\n" + "\n".join(rows) + "\n"
     )
-    assert any("If the motion was imposed" in note for note in read_any_recording(tmp_path / "a.csv")[1])
+    assert any("The motion is taken for the command" in note for note in read_any_recording(tmp_path / "a.csv")[1])
     (tmp_path / "b.csv").write_text(TABLE)
     assert not any("imposed" in note for note in read_any_recording(tmp_path / "b.csv")[1])
 

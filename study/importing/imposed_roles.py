@@ -1,0 +1,44 @@
+"""Which of force and place was commanded, where names leave it open: the one that follows a law of its own."""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+from analysis.look.imposed_motion import is_imposed
+from study.importing.arrays.arrays import Array
+from study.importing.map_format.import_map import SignalRole
+from study.importing.map_format.signal_words import ParsedName, may_be_imposed
+
+IMPOSED = (
+    "The motion is taken for the command and the force for the response, for the motion follows ramps or sines and the "
+    "force does not. If the force was commanded, import by a map with the roles the other way round: role = "
+    '"command" for the force, role = "response" for the motion'
+)
+NOT_IMPOSED = (
+    "The force is taken for the command. If the motion was imposed and the force was measured, as on a testing "
+    'machine, import by a map with the roles the other way round: role = "command" for the motion, role = "response" '
+    "for the force"
+)
+_TURNED: dict[str, SignalRole] = {"command": "response", "response": "command", "position": "command"}
+
+Role = SignalRole | Literal[""]
+
+
+def turn_imposed(columns: Sequence[ParsedName], by_name: Mapping[str, Array], roles: Sequence[Role]) -> list[Role]:
+    """The roles, forces as responses where the data show that each motion was imposed. columns: of one-dimensional
+    arrays in by_name."""
+    kept = list(roles)
+    if not may_be_imposed(columns):
+        return kept
+    drives = [column for column in columns if column.quantity in ("force", "torque")]
+    places = [column for column in columns if column.quantity in ("position", "angle")]
+    arrays = [by_name[column.header] for column in (*drives, *places)]
+    if len({array.shape for array in arrays}) > 1 or arrays[0].ndim != 1:
+        return kept
+    if not all(
+        is_imposed(by_name[x.header].astype(float), by_name[f.header].astype(float)) for x in places for f in drives
+    ):
+        return kept
+    return [
+        _TURNED.get(role, role) if column in drives or column in places else role
+        for column, role in zip(columns, roles, strict=True)
+    ]
