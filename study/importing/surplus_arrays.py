@@ -29,9 +29,13 @@ def surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
 
 @np.errstate(all="ignore")
 def is_growing_time(name: str, array: Array) -> bool:
-    """Whether an array is called a time and grows."""
+    """Whether an array is called a time and never falls; coarse stamps may repeat."""
     grows = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
-    return grows and bool(name_words(name) & CLOCK_WORDS) and bool((array[1:] > array[:-1]).all())
+    return (
+        grows
+        and bool(name_words(name) & CLOCK_WORDS)
+        and bool((array[1:] >= array[:-1]).all() and array[-1] > array[0])
+    )
 
 
 def name_words(name: str) -> set[str]:

@@ -119,11 +119,18 @@ def _meta(found: ImportMap) -> Iterator[str]:
         yield "meta holds a number that is not finite; leave it out, or write it as text"
 
 
+_FREE = (
+    '; for a device that moves freely, write a force of zero for each axis: [[computed]] with role = "command", '
+    'name = "none", value = "0 * clock_s", unit = "N" ("N m" for angles)'
+)
+
+
 def _roles(found: ImportMap) -> Iterator[str]:
     roles = {channel.role for channel in found.channel} | {channel.role for channel in found.computed}
     for needed in ("command", "response"):
         if needed not in roles:
-            yield f"there is no channel with the role '{needed}'; a recording needs both command and response"
+            free = _FREE if needed == "command" else ""
+            yield f"there is no channel with the role '{needed}'; a recording needs both command and response{free}"
 
 
 _RESAMPLED = {"zero-order": "held", "linear": "linear", "band-limited": "band-limited"}

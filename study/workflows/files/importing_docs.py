@@ -108,6 +108,8 @@ cannot be understood is refused by name, and then nothing is written. `hapteq va
 * **Units** are never guessed: a channel without one keeps its numbers, in the unit `1`, and that is said. So is the
   unit in which each computed channel is taken to be. {ALLOWED[0].upper()}{ALLOWED[1:]}; `lb` and `oz` are masses.
 * **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.
+* **Free motion**: a recording without a command gets one of zeros for each axis, as `[[computed]]` with
+  `role = "command"`, `name = "none"`, `value = "0 * clock_s"`, `unit = "N"` (`"N m"` for angles).
 * **No time**: where none is known, `unknown = true` of the clock numbers the samples, at 1 Hz; `meta/time` says so
   (`unknown`; `stamps` where the rate is that of the file's own time).
 * **Dates and clock times** (`2024-03-01T12:00:00.123+01:00`, with a blank for the T, with or without a zone;

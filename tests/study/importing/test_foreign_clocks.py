@@ -9,6 +9,7 @@ from study.importing.header_map import header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.importing.map_skeleton import map_skeleton
+from study.store.disk.file_errors import UnusableFileError
 from study.workflows.recording.import_recording import read_foreign
 from tests.recording_maps import N, U, Y, built, map_text, refusal
 
@@ -134,3 +135,19 @@ def test_clocks_that_differ_are_not_left_out(tmp_path):
     arrays = read_arrays(tmp_path / "a.csv", CsvMap())
     assert header_map(arrays) is None
     assert map_skeleton(arrays).count("[[clock]]") == 2
+
+
+def test_a_coarse_time_is_proposed_as_the_time_and_its_import_names_the_rate(files):
+    path = files(t=np.floor(np.arange(N) / 2) / 100, u=U, y=Y)
+    assert 'time = "t"' in map_skeleton(read_arrays(path, CsvMap()))
+    assert "as in rate_hz = 200.5" in refusal(map_text(CLOCK), path)
+
+
+def test_a_device_that_moves_freely_has_a_command_of_zeros(files, tmp_path):
+    free = map_text().replace('role = "command"', 'role = "position"').replace('"N"', '"mm"')
+    with pytest.raises(UnusableFileError, match="for a device that moves freely, write a force of zero") as refused:
+        built(free, files())
+    keys = 'role = "command"', 'name = "none"', 'value = "0 * clock_s"', 'unit = "N"'
+    assert all(key in str(refused.value) for key in keys)
+    found = built(free + "\n[[computed]]\n" + "\n".join(keys), files()).recording
+    assert not found.command.samples.any()
