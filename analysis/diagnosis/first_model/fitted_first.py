@@ -62,9 +62,11 @@ def first_model_of(
     on_progress("weighing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(without), time_left, map_)
     free = is_read_as_free(recordings[0])
-    if (free or any(map(is_quasi_static, recordings))) and (still := _massless_model(recordings)) is not None:
-        return FirstModel(_hold_mass(still) if free else still, (FREE_SAID if free else UNTIMED_SAID,), balances)
+    if not free and any(map(is_quasi_static, recordings)) and (still := _massless_model(recordings)) is not None:
+        return FirstModel(still, (UNTIMED_SAID,), balances)
     model = plain_model(balances, recordings[0], "fitted to these recordings")
+    if free and (held := model or _massless_model(recordings)) is not None:
+        return FirstModel(_hold_mass(held), (FREE_SAID,), balances)
     if model is not None:
         return FirstModel(model, (BALANCE_SAID,), balances)
     on_progress("fitting a linear model, as none was given", 0.5)
