@@ -112,6 +112,7 @@ def _fit_structures(
     given: BalancedRecordings | None, recordings: Sequence[Recording], on_progress: Callable[[float], None]
 ) -> tuple[list[StructureFit], tuple[TriedStructure, ...]]:
     kinds: tuple[Kind, ...] = ("mass-spring", "two-mode") if given is None else ("massless", "motor", "mass-spring")
+    kinds = ("motor", "mass-spring") if given is not None and given.free else kinds
     fits, tried = [], []
     for kind in kinds:
         try:

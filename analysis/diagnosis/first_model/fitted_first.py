@@ -14,6 +14,7 @@ from analysis.diagnosis.first_model.free_motion import is_read_as_free
 from analysis.diagnosis.first_model.model_of_balance import FirstModel, plain_model
 from analysis.diagnosis.first_model.model_structures import (
     HELD_FIXED,
+    Kind,
     StructureRefused,
     balance_recordings,
     fit_structure,
@@ -62,10 +63,14 @@ def first_model_of(
     on_progress("weighing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(without), time_left, map_)
     free = is_read_as_free(recordings[0])
-    if not free and any(map(is_quasi_static, recordings)) and (still := _massless_model(recordings)) is not None:
+    if (
+        not free
+        and any(map(is_quasi_static, recordings))
+        and (still := _plain_structure(recordings, "massless")) is not None
+    ):
         return FirstModel(still, (UNTIMED_SAID,), balances)
     model = plain_model(balances, recordings[0], "fitted to these recordings")
-    if free and (held := model or _massless_model(recordings)) is not None:
+    if free and (held := model or _free_model(recordings)) is not None:
         return FirstModel(_hold_mass(held), (FREE_SAID,), balances)
     if model is not None:
         return FirstModel(model, (BALANCE_SAID,), balances)
@@ -82,10 +87,14 @@ def _hold_mass(model: MechanicalModel) -> MechanicalModel:
     return replace(model, tolerance=replace(model.tolerance, mass_kg=HELD_FIXED * float(np.abs(model.mass).max())))
 
 
-def _massless_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
-    """None where no motion was measured along the commands."""
+def _free_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
+    return _plain_structure(recordings, "mass-spring") or _plain_structure(recordings, "motor")
+
+
+def _plain_structure(recordings: Sequence[Recording], kind: Kind) -> MechanicalModel | None:
+    """None where no motion was measured along the commands, or that does not carry the structure."""
     try:
-        return fit_structure(balance_recordings(recordings), "massless").model
+        return fit_structure(balance_recordings(recordings), kind).model
     except (StructureRefused, NoMotionError):
         return None
 

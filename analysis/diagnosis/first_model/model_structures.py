@@ -11,6 +11,7 @@ from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.first_model.free_motion import is_read_as_free
 from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, joint_fit, regressions_of
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
@@ -82,6 +83,8 @@ class BalancedRecordings:
     untimed: bool
     turns: bool
     rotational: bool
+    free: bool = False
+    """Nothing drove the motion: numbers are per unit mass."""
 
 
 def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
@@ -98,13 +101,15 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
     rotational = any(unit.startswith(("rad", "N m")) for unit in (*first.response.units, *first.command.units))
     turns = any(scales_of(motions, axis, rotational).turns for axis in range(count))
     untimed = not np.isfinite(motions[0].band_hz)
-    return BalancedRecordings(first, regressions_of(motions, turns), untimed, turns, rotational)
+    return BalancedRecordings(first, regressions_of(motions, turns), untimed, turns, rotational, is_read_as_free(first))
 
 
 def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
     """A structure fitted by the force balance. Raises StructureRefused."""
     _refuse(given, kind)
-    parts = ("stiffness",) if given.untimed else PARTS_OF[kind]
+    parts: tuple[Part, ...] = ("stiffness",) if given.untimed else PARTS_OF[kind]
+    if given.free:
+        parts = tuple(part for part in parts if part != "mass")
     try:
         fit = joint_fit(given.regressions, parts)
         model = _model(given, fit, kind)
@@ -174,6 +179,8 @@ def _refuse(given: BalancedRecordings, kind: Kind) -> None:
         raise StructureRefused("no time is known, so neither speeds nor accelerations are: only massless can be fitted")
     if kind == "two-mode":
         raise StructureRefused("it is fitted to spectra")
+    if given.free and kind == "massless":
+        raise StructureRefused("what moves by itself has a mass")
     if given.turns and kind != "motor":
         raise StructureRefused("the shaft goes round and round, where no spring holds it: only motor can be fitted")
     if kind == "gravity" and not given.rotational:
@@ -183,7 +190,7 @@ def _refuse(given: BalancedRecordings, kind: Kind) -> None:
 def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalModel:
     """Raises MechanicalModelError."""
     mass, damping, stiffness = (fit.matrices[part] for part in PARTS)
-    if kind == "massless":
+    if kind == "massless" or given.free:
         mass = np.diag(_least_mass(given.regressions[0].motions)) * (HELD_FIXED if given.untimed else 1.0)
     problems = tuple(
         f"the {name} is negative ({matrix.diagonal().min():.3g})"
@@ -248,8 +255,7 @@ def _remarks(given: BalancedRecordings, kind: Kind) -> tuple[str, ...]:
     if kind == "gravity":
         return (
             "The weight is linearised: its stiffness is mass times lever times the acceleration of gravity at the mean "
-            "position, negative above the pivot; the vocabulary has no law of gravity, so large angles are not "
-            "described.",
+            "position, negative above the pivot; at large angles the effect gravity_torque describes it.",
         )
     if kind == "massless":
         timed = "" if not given.untimed else " No time is known: samples are numbered, and damping is not fitted."

@@ -7,6 +7,9 @@ import pytest
 
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.diagnose_values import diagnose_values
+from analysis.diagnosis.first_model.choose_structure import choose_structure
+from analysis.diagnosis.first_model.free_motion import read_free_motion
+from analysis.diagnosis.first_model.model_structures import StructureRefused
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -90,3 +93,25 @@ def test_a_standing_command_with_accelerations_alone_is_refused_with_a_way_on():
     response = Signal(swing.response.samples, RATE_HZ, "angular acceleration", "rad/s^2", ("alpha",))
     with pytest.raises(NothingToDiagnose, match="a free motion, measured as positions or speeds"):
         diagnose_values(replace(swing, response=response))
+
+
+def test_a_first_model_of_a_decay_has_damping_and_spring_per_unit_of_mass():
+    read, _ = read_free_motion((recording(decay(linear, 1.0, 12, 1)),))
+    choice = choose_structure(read, None, lambda share: None)
+    assert choice.fit.kind == "mass-spring"
+    numbers = {number.name: number.value for number in choice.fit.numbers}
+    assert numbers == {"damping angle": pytest.approx(DAMPING, rel=0.1), "stiffness angle": pytest.approx(SPRING, 0.01)}
+    with pytest.raises(StructureRefused, match="has a mass"):
+        choose_structure(read, "massless", lambda share: None)
+
+
+def test_a_rotor_that_runs_down_is_a_motor():
+    noise = NOISE_RAD * np.random.default_rng(1).standard_normal(int(8 * RATE_HZ))
+    read, _ = read_free_motion((recording(spun_down() + noise),))
+    assert choose_structure(read, None, lambda share: None).fit.kind == "motor"
+
+
+def spun_down() -> np.ndarray:
+    """(n,): turned so far, rad, by a rotor that loses half of its speed per second."""
+    time_s = np.arange(int(8 * RATE_HZ)) / RATE_HZ
+    return 60.0 * (1 - np.exp(-0.5 * time_s))
