@@ -8,7 +8,7 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.first_model.fitted_first import first_model_of, fit_first_linear_model
 from analysis.diagnosis.first_model.model_of_balance import FirstModel
-from analysis.diagnosis.prepare_recordings import keep_common_position, prepare
+from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -40,7 +40,7 @@ def diagnose_values(
     require_alike((*given, *settings.clean), (*names, *clean_names))
     ready = prepare(given, names, model is None and not settings.clean)
     clean = prepare(settings.clean, clean_names, False).recordings if settings.clean else ()
-    every = keep_common_position((*ready.recordings, *clean))
+    every = keep_common_signals((*ready.recordings, *clean))
     found, remarks = every.recordings[: len(given)], (*ready.remarks, *every.remarks)
     settings = replace(settings, names=names, clean=every.recordings[len(given) :])
     if model is None:

@@ -55,17 +55,30 @@ def comparable(recordings: Sequence[Recording], names: Sequence[str], short: boo
         if not short or not all(FEW_CYCLES in problem for problem in refusal.problems):
             raise
         few = tuple(f"{begin_sentence(problem)}." for problem in refusal.problems)
-    alike = keep_common_position(recordings)
+    alike = keep_common_signals(recordings)
     moving = _drop_constant_position(alike.recordings)
     return PreparedRecordings(moving.recordings, (*few, *alike.remarks, *moving.remarks))
 
 
-def keep_common_position(recordings: Sequence[Recording]) -> PreparedRecordings:
-    """The recordings with their positions, where all have the same position channels; else without, and a remark."""
+def keep_common_signals(recordings: Sequence[Recording]) -> PreparedRecordings:
+    """The recordings with the positions and conditions that all of them hold; else without, and a remark."""
+    alike = _keep_common_conditions(recordings)
     kinds = {None if each.position is None else (each.position.channels, each.position.units) for each in recordings}
     if len(kinds) < 2:
+        return alike
+    left = _without_position(alike.recordings, "Only some recordings hold the same position channels")
+    return replace(left, remarks=(*alike.remarks, *left.remarks))
+
+
+def _keep_common_conditions(recordings: Sequence[Recording]) -> PreparedRecordings:
+    """The recordings with their conditions, where all hold the same ones; else without, and a remark."""
+    held = [None if each.condition is None else (each.condition.channels, each.condition.units) for each in recordings]
+    if len(set(held)) < 2:
         return PreparedRecordings(tuple(recordings))
-    return _without_position(recordings, "Only some recordings hold the same position channels")
+    return PreparedRecordings(
+        tuple(replace(each, condition=None) for each in recordings),
+        ("Not all recordings hold the same conditions in the same order: no law was asked to depend on them.",),
+    )
 
 
 def _drop_constant_position(recordings: Sequence[Recording]) -> PreparedRecordings:

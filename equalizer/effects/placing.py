@@ -21,23 +21,18 @@ class PlacingError(ValueError):
 
 
 def place_recorded_effects(model: MechanicalModel, recording: Recording) -> tuple[PlacedEffect, ...]:
-    """`place_effects` at a recording's channels, with the conditions that it holds. Raises PlacingError."""
-    return _place_effects(model, replace(law_channels(recording), quantity=model.quantity))
+    """`place_effects` at a recording's channels and conditions. Raises PlacingError."""
+    return place_effects(model, law_channels(recording))
 
 
-def place_effects(
-    model: MechanicalModel, input_channels: tuple[str, ...], output_channels: tuple[str, ...]
-) -> tuple[PlacedEffect, ...]:
+def place_effects(model: MechanicalModel, channels: Channels) -> tuple[PlacedEffect, ...]:
     """`model.effects` at the axes and channels that they name; an effect that names none acts on all.
 
     An axis is named by its channel ('fx', 'ax') or by its letter ('x'). A parameter that a file leaves out takes its
     default. Raises PlacingError for an unknown effect or axis, or a value that must not be negative.
     """
-    return _place_effects(model, Channels(input_channels, output_channels, model.quantity))
-
-
-def _place_effects(model: MechanicalModel, channels: Channels) -> tuple[PlacedEffect, ...]:
-    return tuple(_place_effect(effect, channels) for effect in model.effects)
+    named = replace(channels, quantity=model.quantity)
+    return tuple(_place_effect(effect, named) for effect in model.effects)
 
 
 def model_effects(

@@ -4,6 +4,7 @@ Each is linear in the condition's deviation from its mean, in units of its stand
 plays them: simulations play them as formulas.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -66,5 +67,14 @@ def _formula(known: Condition, *factors: str) -> Callable[[dict[str, float]], Fo
 
 
 def _deviation(known: Condition) -> str:
-    mean = f"- {known.mean:.6g}" if known.mean >= 0 else f"+ {-known.mean:.6g}"
-    return f"(({known.name} {mean})/{known.spread:.6g})"
+    """Of the condition from its mean, in standard deviations, all in whole numbers: these belong to a formula's form,
+    and no fit moves them. The standard deviation keeps four digits or more, the mean a thousandth of it."""
+    finer = 10 ** max(0, min(3 - math.floor(math.log10(known.spread)), 15 - _digits(known.mean)))
+    mean, spread = round(known.mean * finer), max(round(known.spread * finer), 1)
+    scaled = known.name if finer == 1 else f"{finer}*{known.name}"
+    return f"(({scaled} {'-' if mean >= 0 else '+'} {abs(mean)})/{spread})"
+
+
+def _digits(value: float) -> int:
+    """Before the point."""
+    return max(math.floor(math.log10(abs(value))) + 1, 1) if value else 1

@@ -49,7 +49,7 @@ FAMILIES = (
 )  # fmt: skip
 """Effects that may stand in one class: they act alike. Of different families, none is named."""
 BY_CONDITION = {"condition_dependent_friction", "condition_dependent_damping"}
-"""The same of laws of a condition, which may be told from all other friction where they are not from each other."""
+"""Laws of one condition that may stand in one class, though other friction acts otherwise."""
 PLAYED_AS = {"drifting_friction": "coulomb_friction"}
 """Laws that have no simulation, and the law that is fitted in their place and forms a class with them."""
 

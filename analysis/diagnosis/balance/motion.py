@@ -255,12 +255,14 @@ def _end_to_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, F
 def _standardised_conditions(records: Sequence[Observed]) -> tuple[tuple[Condition, ...], list[FloatArray]]:
     """The conditions that change, and their standardised samples, (n, q) per record."""
     signals = [getattr(record.recording, "condition", None) for record in records]
-    if any(signal is None for signal in signals):
+    if len({None if signal is None else signal.channels for signal in signals}) > 1 or signals[0] is None:
         return (), [np.zeros((len(record.command), 0)) for record in records]
     filled = [fill_gaps(signal.samples) for signal in signals if signal is not None]
     whole = np.vstack(filled)
     mean, spread = whole.mean(axis=0), whole.std(axis=0)
-    names = condition_names(signals[0].channels) if signals[0] is not None else ()
+    first = records[0].recording
+    others = (*first.command.channels, *first.response.channels)
+    names = condition_names(signals[0].channels, others)
     varying = np.flatnonzero(spread > 0)
     known = tuple(Condition(names[k], float(mean[k]), float(spread[k])) for k in varying)
     return known, [(each[:, varying] - mean[varying]) / spread[varying] for each in filled]

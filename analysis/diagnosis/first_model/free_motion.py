@@ -31,9 +31,13 @@ def is_read_as_free(recording: Recording) -> bool:
 
 def is_free_motion(recordings: Sequence[Recording]) -> bool:
     """Whether no command ever changes, and positions or velocities were measured over time."""
-    still = all(np.ptp(each.command.samples, axis=0).max(initial=0.0) == 0 for each in recordings)
+    commands = np.vstack([each.command.samples for each in recordings])
+    commands = commands[np.isfinite(commands).all(axis=1)]
+    still = len(commands) > 0 and bool(np.all(np.ptp(commands, axis=0) == 0))
     orders = {DERIVATIVE_OF_QUANTITY.get(quantity, 2) for quantity in recordings[0].response.quantities}
-    return still and len(orders) == 1 and max(orders) < 2 and not any(map(is_quasi_static, recordings))
+    turning = {unit.startswith("rad") for unit in recordings[0].response.units}
+    alike = len(orders) == 1 and len(turning) == 1
+    return still and alike and max(orders) < 2 and not any(map(is_quasi_static, recordings))
 
 
 def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], str]:
@@ -56,7 +60,8 @@ def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, 
             force[start:stop] = -differentiate(samples[start:stop], rate_hz, band_hz, 2 - order)
         quantity, unit = ("torque", "N m") if turning else ("force", "N")
         command = Signal(force, rate_hz, quantity, unit, response.channels)
-        segments = each.segments if any(segment.role for segment in each.segments) else _levels(each, samples)
+        stated = any(segment.role for segment in each.segments) or len({s.amplitude for s in each.segments}) > 1
+        segments = each.segments if stated else _levels(each, samples)
         meta = {**each.meta, "imposed": FREE}
         found.append(replace(each, command=command, excitation=None, segments=segments, meta=meta))
     what = "inertia (1 kg m^2)" if turning else "mass (1 kg)"

@@ -18,6 +18,7 @@ from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
 
 _NAME, _FREE, _OWN_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
+_NUMBER = re.compile(r"(?<![A-Za-z_\d])\d[\d.]*(?:[eE][+-]?\d+)?")
 MOST = 6
 REFINING = {
     "drifting_friction": ("coulomb_friction",),
@@ -132,7 +133,7 @@ def _weighed_law(
 
 def _form(formula: str) -> list[str]:
     """Its signals and functions in order, those of an axis called as a balance calls its own."""
-    names = (_FREE.sub("", name) for name in _NAME.findall(formula))
+    names = (_FREE.sub("", name) for name in _NAME.findall(_NUMBER.sub("", formula)))
     return [_OWN_SIGNAL.sub(lambda own: own[1] or "q", name) for name in names if name]
 
 

@@ -62,7 +62,7 @@ def _law_value(
     samples = int(numbers[SAMPLES])
     if conditions > 0:
         # The middle of the step lies in its sample, however its ends are rounded.
-        now = min(int((at[TIME_S] + 0.5 * step_s) * numbers[RATE_HZ]), samples - 1)
+        now = max(min(int((at[TIME_S] + 0.5 * step_s) * numbers[RATE_HZ]), samples - 1), 0)
         for k in range(conditions):
             signals[count - conditions + k] = numbers[TABLE + now * conditions + k]
     program = numbers[TABLE + samples * conditions :]

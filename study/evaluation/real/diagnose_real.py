@@ -15,7 +15,7 @@ from analysis.diagnosis.errors.prediction_error import PredictionError, predicti
 from analysis.diagnosis.first_model.model_of_balance import FirstModel
 from analysis.diagnosis.first_model.plain_form import plain_form
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
-from analysis.diagnosis.prepare_recordings import keep_common_position, prepare
+from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare
 from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, named_sentences
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.result.findings import Findings
@@ -123,7 +123,7 @@ def _read(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: 
     except NothingToDiagnose as refusal:
         raise not_diagnosable_error(refusal.problems) from refusal
     before = () if wanted.before is None else (import_real_recording(wanted.before),)
-    every = keep_common_position((*ready.recordings, *before))
+    every = keep_common_signals((*ready.recordings, *before))
     recording = every.recordings[0]
     first = _model(wanted, recording, bounds, on_progress)
     remarks = (*ready.remarks, *every.remarks, *first.remarks)

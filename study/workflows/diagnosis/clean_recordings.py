@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_alike
-from analysis.diagnosis.prepare_recordings import keep_common_position
+from analysis.diagnosis.prepare_recordings import keep_common_signals
 from study.errors import StudyError
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error, read_input
 
@@ -39,7 +39,7 @@ def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[P
     except NothingToDiagnose as refusal:
         raise not_diagnosable_error(refusal.problems, NOT_ALIKE) from refusal
     number = len(found.recordings)
-    every = keep_common_position((*found.recordings, *beside.recordings))
+    every = keep_common_signals((*found.recordings, *beside.recordings))
     return WithClean(
         replace(found, recordings=every.recordings[:number], remarks=(*found.remarks, *every.remarks)),
         replace(beside, recordings=every.recordings[number:]),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import CATALOGUE
-from equalizer.effects.discovered_law import law_effect, law_values
+from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.placing import PlacingError, axis_letter, model_effects, place_effects
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -22,7 +22,7 @@ def written(kind: str, axis: str | None, optional: bool) -> ModelEffect:
 
 
 def placed(model, *effects: ModelEffect):
-    return place_effects(replace(model, effects=effects), INPUTS, OUTPUTS)
+    return place_effects(replace(model, effects=effects), Channels(INPUTS, OUTPUTS))
 
 
 def test_the_catalogue_plays_every_name_of_the_vocabulary():
@@ -48,7 +48,7 @@ def test_what_was_fitted_is_written_and_read_back_the_same(bench, effect):
     )
     model = replace(bench.three_axes(), effects=model_effects((fitted,), INPUTS, OUTPUTS))
     assert [each.axis for each in model.effects] == (["y"] if one else [None])
-    (again,) = place_effects(parse_mechanical_model(mechanical_model_toml(model)), INPUTS, OUTPUTS)
+    (again,) = place_effects(parse_mechanical_model(mechanical_model_toml(model)), Channels(INPUTS, OUTPUTS))
     assert again.effect is effect
     assert again.sites == fitted.sites
     assert {name: again.values[name] for name in values} == pytest.approx(values)
@@ -68,7 +68,7 @@ def test_a_sensors_axis_is_a_channel_of_the_response(bench):
 def test_a_letter_that_two_channels_end_with_is_refused(bench):
     model = replace(bench.three_axes(), effects=(written("coulomb_friction", "x", False),))
     with pytest.raises(PlacingError, match="the axis 'x' is on several of fx, tx"):
-        place_effects(model, ("fx", "tx"), OUTPUTS)
+        place_effects(model, Channels(("fx", "tx"), OUTPUTS))
 
 
 def test_an_effect_beyond_the_channels_cannot_be_written(bench):
@@ -99,7 +99,7 @@ def test_a_discovered_law_is_written_and_read_back_the_same(bench, text, acts_on
     model = replace(bench.three_axes(), effects=model_effects((fitted,), INPUTS, OUTPUTS))
     again = parse_mechanical_model(mechanical_model_toml(model))
     assert again.effects == (ModelEffect("discovered_law", "y", {}, law),)
-    (placed_again,) = place_effects(again, INPUTS, OUTPUTS)
+    (placed_again,) = place_effects(again, Channels(INPUTS, OUTPUTS))
     assert (placed_again.sites, placed_again.values) == ((1,), law_values(law))
     commands = 0.1 * bench.commands(3)[:500]
     one, other = (simulate_mechanism(again, commands, 1000.0, [each]).response for each in (fitted, placed_again))

@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
+from equalizer.effects.discovered_law import Channels
 from equalizer.effects.placing import place_effects, place_of_effect
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.effects.turned_commands import SWAPPED, TILTED, TURNED, with_turned_commands
@@ -61,8 +62,8 @@ def apart(bench, effect: ModelEffect) -> float:
     plain = bench.three_axes()
     model = replace(plain, effects=(effect,))
     turned = with_turned_commands(model, WAY, INPUTS, OUTPUTS)
-    before = simulate_mechanism(model, COMMANDS, RATE_HZ, place_effects(model, INPUTS, OUTPUTS))
-    after = simulate_mechanism(turned, COMMANDS * WAY, RATE_HZ, place_effects(turned, INPUTS, OUTPUTS))
+    before = simulate_mechanism(model, COMMANDS, RATE_HZ, place_effects(model, Channels(INPUTS, OUTPUTS)))
+    after = simulate_mechanism(turned, COMMANDS * WAY, RATE_HZ, place_effects(turned, Channels(INPUTS, OUTPUTS)))
     without = simulate_mechanism(plain, COMMANDS, RATE_HZ)
     done = np.std(before.response - without.response)
     assert done > 0

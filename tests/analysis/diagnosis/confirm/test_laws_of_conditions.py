@@ -1,16 +1,22 @@
 """Laws that depend on a recorded condition, found and played without a model: a rubbing mass whose friction falls with
 its temperature, an imposed motion whose friction is set, and one whose condition does nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.condition_laws import _formula
+from analysis.diagnosis.balance.motion import Condition
 from analysis.diagnosis.data.as_recorded import under_conditions
 from analysis.diagnosis.diagnose_values import diagnose_values
+from analysis.diagnosis.prepare_recordings import prepare
 from analysis.diagnosis.result.wording import effect_title
-from equalizer.effects.discovered_law import condition_names
+from equalizer.effects.discovered_law import Channels, condition_names
 from equalizer.effects.placing import PlacingError, place_effects, place_recorded_effects
 from equalizer.effects.simulation.simulator import simulate_mechanism
-from equalizer.laws.law import law_of
+from equalizer.laws.evaluate import evaluate
+from equalizer.laws.law import Law, law_of
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -109,9 +115,27 @@ def test_a_model_with_such_a_law_is_played_with_the_recording_s_condition_and_no
     with pytest.raises(ValueError, match="needs conditions that were not recorded"):
         simulate_mechanism(model, command, RATE_HZ, placed)
     with pytest.raises(PlacingError, match="'T'"):
-        place_effects(model, ("fx",), ("x",))
+        place_effects(model, Channels(("fx",), ("x",)))
 
 
 def test_a_condition_is_called_by_its_channel_where_no_signal_is_called_so():
     names = condition_names(("T", "t", "vx", "oil pressure", "sin", "p1", "supply_bar"))
     assert names == ("T", "c2", "c3", "c4", "c5", "c6", "supply_bar")
+    assert condition_names(("force", "T", "T"), ("force", "x")) == ("c1", "c2", "c3")
+
+
+@pytest.mark.parametrize(("mean", "spread"), [(312.68, 7.64003), (1_013_250.4, 0.3), (-2.5e-4, 1e-5), (3.0, 4e4)])
+def test_a_formula_with_a_condition_keeps_its_free_numbers_when_it_is_read_back(mean, spread):
+    formula = _formula(Condition("T", mean, spread), "v")({"change": 2.5})
+    law = Law(formula.text, formula.numbers, (), "force", "x")
+    again = law_of(law.exact_text, "force", "x")
+    assert again.numbers == (2.5,)
+    at = {"T": np.array([mean + 2 * spread]), "v": np.ones(1)}
+    assert evaluate(again, at, 1.0) == pytest.approx(-5.0, rel=2e-3)
+
+
+def test_conditions_that_not_all_recordings_hold_are_left_out_and_that_is_said():
+    first, second = (rubbing_mass(np.zeros(SAMPLES), warming(seed), seed) for seed in (1, 2))
+    ready = prepare((first, replace(second, condition=None)), ("a", "b"), True)
+    assert all(each.condition is None for each in ready.recordings)
+    assert "Not all recordings hold the same conditions" in " ".join(ready.remarks)

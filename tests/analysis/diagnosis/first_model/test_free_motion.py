@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.first_model.choose_structure import choose_structure
-from analysis.diagnosis.first_model.free_motion import read_free_motion
+from analysis.diagnosis.first_model.free_motion import is_free_motion, read_free_motion
 from analysis.diagnosis.first_model.model_structures import StructureRefused
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -93,6 +93,12 @@ def test_a_standing_command_with_accelerations_alone_is_refused_with_a_way_on():
     response = Signal(swing.response.samples, RATE_HZ, "angular acceleration", "rad/s^2", ("alpha",))
     with pytest.raises(NothingToDiagnose, match="a free motion, measured as positions or speeds"):
         diagnose_values(replace(swing, response=response))
+
+
+def test_commands_that_differ_between_recordings_drive():
+    swing = recording(decay(linear, 1.0, 8, 1))
+    pushed = replace(swing, command=replace(swing.command, samples=swing.command.samples + 2.0))
+    assert is_free_motion((swing, swing)) and not is_free_motion((swing, pushed))
 
 
 def test_a_first_model_of_a_decay_has_damping_and_spring_per_unit_of_mass():
