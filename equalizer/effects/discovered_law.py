@@ -64,7 +64,7 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
     make: dict[str, Callable[[Law, Channels], Acts]] = {
         "force": _force_action, "command": _command_action, "response": _response_action
     }  # fmt: skip
-    known = set(_conditions_of(channels))
+    known = set(condition_names(channels))
     needs = law.acts_on == "force" and not known.isdisjoint(law.variables)
     return Effect(
         name=DISCOVERED_LAW,
@@ -80,17 +80,14 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
     )
 
 
-def condition_names(conditions: tuple[str, ...], others: tuple[str, ...] = ()) -> tuple[str, ...]:
+def condition_names(channels: Channels) -> tuple[str, ...]:
     """Names of recorded conditions in a formula: their channels' names where the language of laws and the recording's
-    other channels have them as names of nothing else, else c1, c2, … in their order. others: commands and responses."""
+    other channels have them as names of nothing else, else c1, c2, … in their order."""
+    conditions, others = channels.conditions, (*channels.inputs, *channels.outputs)
     return tuple(
         name if _is_free(name) and name not in others and conditions.count(name) == 1 else f"c{place}"
         for place, name in enumerate(conditions, 1)
     )
-
-
-def _conditions_of(channels: Channels) -> tuple[str, ...]:
-    return condition_names(channels.conditions, (*channels.inputs, *channels.outputs))
 
 
 def _is_free(name: str) -> bool:
@@ -177,7 +174,7 @@ def reading_names(channels: Channels) -> tuple[str, ...]:
 
 def force_signals(channels: Channels) -> dict[str, int]:
     """Column of each signal among those of the compiled law."""
-    names = _conditions_of(channels)
+    names = condition_names(channels)
     first = 1 + PER_AXIS * len(channels.inputs)
     conditions = {name: place for place, name in enumerate(names, first)}
     return conditions | {"t": 0, **{name: 1 + place for name, place in _motion_signals(channels)}}

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from analysis.diagnosis.balance.band import band_begin_hz, band_end_hz
-from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static
+from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, is_read_as_free
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.types import Mask
-from equalizer.effects.discovered_law import condition_names
+from equalizer.effects.discovered_law import condition_names, law_channels
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.band_limited import low_pass_gain, odd_extension
 from equalizer.signals.recording import Hold, Recording
@@ -28,11 +28,6 @@ MOVING = 0.99
 """Share of the speed's mean square below the end of the band in which the device moves."""
 EDGE = 0.5
 """Periods of the band's end that are left out at either end of a part: there the filter reaches beyond the data."""
-
-
-FREE = "free"
-"""Of a recording's `meta["imposed"]`: nothing drove the motion, and the command is the force per unit mass that it
-shows; see `first_model.free_motion`."""
 
 
 class NoMotionError(ValueError):
@@ -175,7 +170,7 @@ def _motion(
     position, velocity, acceleration = (
         _derivative(samples, rate_hz, (band_hz, lowest_hz), wanted - order, early_s) for wanted in range(3)
     )
-    if record.recording.meta.get("imposed") == FREE:
+    if is_read_as_free(record.recording):
         # It is the force, turned round: no law may explain it by itself.
         acceleration = np.zeros_like(acceleration)
     return Motion(
@@ -260,9 +255,7 @@ def _standardised_conditions(records: Sequence[Observed]) -> tuple[tuple[Conditi
     filled = [fill_gaps(signal.samples) for signal in signals if signal is not None]
     whole = np.vstack(filled)
     mean, spread = whole.mean(axis=0), whole.std(axis=0)
-    first = records[0].recording
-    others = (*first.command.channels, *first.response.channels)
-    names = condition_names(signals[0].channels, others)
+    names = condition_names(law_channels(records[0].recording))
     varying = np.flatnonzero(spread > 0)
     known = tuple(Condition(names[k], float(mean[k]), float(spread[k])) for k in varying)
     return known, [(each[:, varying] - mean[varying]) / spread[varying] for each in filled]

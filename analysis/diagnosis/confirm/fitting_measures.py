@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.data.measured_motion import is_quasi_static
+from analysis.diagnosis.data.measured_motion import is_quasi_static, is_read_as_free
 from analysis.diagnosis.data.operating_point import about_operating_point
 from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
 from analysis.diagnosis.errors.fit_score import fit_score
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.first_model.free_motion import is_read_as_free
 from analysis.diagnosis.first_model.model_of_balance import first_model, share_within
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce

@@ -10,6 +10,9 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalM
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
+FREE = "free"
+"""Of a recording's `meta["imposed"]`."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredMotion:
@@ -67,6 +70,12 @@ def is_quasi_static(recording: Recording) -> bool:
     ]
     orders = [order for quantity in quantities if (order := DERIVATIVE_OF_QUANTITY.get(quantity)) is not None]
     return not recording.is_timed and min(orders, default=0) == 0
+
+
+def is_read_as_free(recording: Recording) -> bool:
+    """Whether nothing drove the motion, and the command is the force per unit mass that it shows; see
+    `first_model.free_motion`."""
+    return recording.meta.get("imposed") == FREE
 
 
 def time_unit(recording: Recording) -> str:

@@ -9,8 +9,7 @@ from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.balance.motion import NoMotionError
 from analysis.diagnosis.data.as_recorded import has_carried_weight
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
-from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static
-from analysis.diagnosis.first_model.free_motion import is_read_as_free
+from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, is_read_as_free
 from analysis.diagnosis.first_model.model_of_balance import FirstModel, plain_model
 from analysis.diagnosis.first_model.model_structures import (
     HELD_FIXED,

@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from analysis.diagnosis.balance.band import band_end_hz
-from analysis.diagnosis.balance.motion import FREE, differentiate
-from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static
+from analysis.diagnosis.balance.motion import differentiate
+from analysis.diagnosis.data.measured_motion import FREE, fill_gaps, is_quasi_static
 from analysis.diagnosis.data.observed import moving_spans
 from analysis.diagnosis.data.observed_parts import parts_of
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -22,11 +22,6 @@ from equalizer.signals.signal import FloatArray, Signal
 
 LEAST_CYCLES, MOST_LEVELS = 4, 6
 """Cycles of a stretch that is fitted to and tested by, by hand; and stretches of one decay."""
-
-
-def is_read_as_free(recording: Recording) -> bool:
-    """Whether `read_free_motion` has changed it."""
-    return recording.meta.get("imposed") == FREE
 
 
 def is_free_motion(recordings: Sequence[Recording]) -> bool:

@@ -9,9 +9,8 @@ import numpy as np
 from analysis.diagnosis.balance.law import scales_of
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.data.measured_motion import time_unit
+from analysis.diagnosis.data.measured_motion import is_read_as_free, time_unit
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.first_model.free_motion import is_read_as_free
 from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, joint_fit, regressions_of
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model

@@ -13,7 +13,7 @@ from analysis.diagnosis.balance.friction_laws import SHARP
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.first_model.free_motion import is_free_motion, read_free_motion
+from analysis.diagnosis.first_model.free_motion import read_free_motion
 from analysis.diagnosis.first_model.restore_sign import restore_sign
 from analysis.diagnosis.first_model.reversed_commands import reverse_commands
 from analysis.diagnosis.first_model.unnamed_motion import name_motion
@@ -44,8 +44,7 @@ def plain_form(recordings: Sequence[Recording], turns: bool = True) -> tuple[Rec
         read_free_motion, name_motion, _separate_conditions, _select_imposed_motion, _select_motions, _select_forces,
         restore_sign, _drop_constant_commands, _merge_commands,
     )  # fmt: skip
-    free = is_free_motion(recordings)
-    for step in (*steps, reverse_commands) if turns and not free else steps:
+    for step in (*steps, reverse_commands) if turns else steps:
         found, sentence = step(found)
         said.append(sentence)
     return found, tuple(filter(None, said))

@@ -18,8 +18,8 @@ from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import regression_of
 from analysis.diagnosis.balance.structures import Structure, is_better
 from analysis.diagnosis.data.force_driven import all_as_force_driven
+from analysis.diagnosis.data.measured_motion import is_read_as_free
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.first_model.free_motion import is_read_as_free
 from analysis.wording import conjoin
 from equalizer.effects.turned_commands import with_turned_commands
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -33,7 +33,10 @@ CLEARLY = 0.1
 
 
 def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """The recordings with such commands reversed, and a sentence. recordings: alike in channels, units and rate."""
+    """The recordings with such commands reversed, and a sentence. recordings: alike in channels, units and rate. A free
+    motion has no command that could be."""
+    if is_read_as_free(recordings[0]):
+        return recordings, ""
     driven = all_as_force_driven(recordings)
     count = len(driven[0].command.channels)
     try:

@@ -101,6 +101,15 @@ def test_commands_that_differ_between_recordings_drive():
     assert is_free_motion((swing, swing)) and not is_free_motion((swing, pushed))
 
 
+def test_a_command_that_is_missing_where_the_motion_is_drives_nothing():
+    """As importing 0 x angle makes it, where samples of the angle are missing."""
+    swing = recording(decay(linear, 1.0, 8, 1))
+    gaps = swing.command.samples.copy()
+    gaps[100:103] = np.nan
+    read, said = read_free_motion((replace(swing, command=replace(swing.command, samples=gaps)),))
+    assert said and np.isfinite(read[0].command.samples).all()
+
+
 def test_a_first_model_of_a_decay_has_damping_and_spring_per_unit_of_mass():
     read, _ = read_free_motion((recording(decay(linear, 1.0, 12, 1)),))
     choice = choose_structure(read, None, lambda share: None)
