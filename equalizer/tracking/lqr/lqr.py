@@ -11,7 +11,7 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr import lqr_kernel, riccati_kernel
-from equalizer.tracking.lqr.riccati import NO_CURVATURE, Gains, require_terminal_weight
+from equalizer.tracking.lqr.riccati import Gains, backward_gains, require_terminal_weight
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only, require_trajectory
 
 
@@ -39,17 +39,17 @@ class TrackResult:
 
 
 def stored_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatArray | None = None) -> StoredGains:
-    """Gains by the compiled Riccati recursion, `samples` steps. terminal_weight: P_N, (n, n), of the distance from the
-    `final_state` given to `track`. Raises TrackingError where a force has no effect on the cost."""
+    """Gains by the Riccati recursion, `samples` steps; compiled where its rounding is harmless. terminal_weight: P_N,
+    (n, n), of the distance from the `final_state` given to `track`. Raises TrackingError where a force has no effect on
+    the cost."""
     if samples < 1:
         raise TrackingError(f"a horizon has {samples} samples; it needs one or more")
     n, m = problem.order, problem.inputs
     terminal = require_terminal_weight(problem, terminal_weight)
     P, K, H_inverse = terminal.copy(), np.empty((samples, m, n)), np.empty((samples, m, m))
-    failed = riccati_kernel.backward(problem.joined, problem.stage_cost, P, K, H_inverse)
-    if failed:
-        raise TrackingError(NO_CURVATURE.format(step=failed))
-    return StoredGains(problem, Gains(K, H_inverse, P), read_only(terminal))
+    done = riccati_kernel.backward(problem.joined, problem.stage_cost, P, K, H_inverse)
+    gains = Gains(K, H_inverse, P) if done else backward_gains(problem, samples, terminal)
+    return StoredGains(problem, gains, read_only(terminal))
 
 
 def track(

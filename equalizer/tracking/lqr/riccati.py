@@ -1,13 +1,20 @@
-"""Riccati recursion of the linear-quadratic tracker, written plainly. `riccati_kernel` is the compiled one.
+"""Riccati recursion of the linear-quadratic tracker, with a factor S of P = S'S. `riccati_kernel` is the compiled one.
 
 It does not depend on the trajectory: gains of a model, weights and length serve every trajectory of that length.
-Bryson and Ho, Applied Optimal Control, chapter 5, with feedthrough.
+Bryson and Ho, Applied Optimal Control, chapter 5, with feedthrough; as an array algorithm (Kailath, Sayed and Hassibi,
+Linear Estimation, chapter 12): one QR decomposition a step,
+
+    [ R½    0   ]       [ T   W  ]
+    [ Q½ D  Q½ C]  =  U [ 0   S- ]      H = T'T,   K = T⁻¹ W,   P- = S-' S-
+    [ S B   S A ]
+
+so P never gets a negative eigenvalue, not even where the forces can cancel all of the cost.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, solve_discrete_are
+from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only
@@ -21,6 +28,10 @@ NOT_STATIONARY = (
     "there are no stationary gains: what the forces cannot reach must die away by itself, and with a delay or without "
     "feedthrough the force weight must be above zero"
 )
+NEGLIGIBLE = 1e-14
+"""Of the norm of a force's effects: what rounding leaves of an effect that other forces have as well."""
+ROUNDED = 1e-9
+"""Of a weight's largest entry: a negative eigenvalue below this is rounding, as of a solved Riccati equation."""
 STATIONARY = 1e-6
 """Largest change of stationary P over a further step, relative to its largest entry."""
 
@@ -50,21 +61,21 @@ def backward_gains(problem: TrackingProblem, samples: int, terminal_weight: Floa
     Raises TrackingError where a force has no effect on the cost.
     """
     n, m = problem.order, problem.inputs
-    P = require_terminal_weight(problem, terminal_weight)
+    S = _factor(require_terminal_weight(problem, terminal_weight))
     K, H_inverse = np.empty((samples, m, n)), np.empty((samples, m, m))
-    A, B, C, D, Q, R = problem.A, problem.B, problem.C, problem.D, problem.Q, problem.R
+    joined = np.hstack((problem.B, problem.A))
+    stage = np.vstack((_factor(problem.R) @ np.eye(m, m + n), _factor(problem.Q) @ np.hstack((problem.D, problem.C))))
     for k in range(samples - 1, -1, -1):
-        H = R + D.T @ Q @ D + B.T @ P @ B
-        F = D.T @ Q @ C + B.T @ P @ A
-        try:
-            factor = cho_factor((H + H.T) / 2)
-        except LinAlgError as error:
-            raise TrackingError(NO_CURVATURE.format(step=samples - k)) from error
-        K[k] = cho_solve(factor, F)
-        H_inverse[k] = cho_solve(factor, np.eye(m))
-        P = C.T @ Q @ C + A.T @ P @ A - F.T @ K[k]
-        P = (P + P.T) / 2
-    return Gains(K, H_inverse, P)
+        stacked = np.vstack((stage, S @ joined))
+        triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
+        T, S = triangle[:m, :m], triangle[m:, m:]
+        # What is left of a column after the others, against all of it: zero but for rounding = no effect of its own.
+        if not np.all(np.abs(np.diag(T)) > NEGLIGIBLE * np.linalg.norm(stacked[:, :m], axis=0)):
+            raise TrackingError(NO_CURVATURE.format(step=samples - k))
+        K[k] = solve_triangular(T, triangle[:m, m:])
+        inverse = solve_triangular(T, np.eye(m))
+        H_inverse[k] = inverse @ inverse.T
+    return Gains(K, H_inverse, S.T @ S)
 
 
 def stationary_gains(problem: TrackingProblem) -> Gains:
@@ -82,7 +93,7 @@ def stationary_gains(problem: TrackingProblem) -> Gains:
 
 
 def require_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArray | None) -> FloatArray:
-    """P_N, (n, n), symmetric; zeros where None. Raises TrackingError."""
+    """P_N, (n, n), symmetric, no negative eigenvalue; zeros where None. Raises TrackingError."""
     n = problem.order
     if terminal_weight is None:
         return np.zeros((n, n))
@@ -93,4 +104,18 @@ def require_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArra
         or not np.allclose(P, P.T, rtol=1e-9, atol=1e-12 * np.abs(P).max())
     ):
         raise TrackingError(f"terminal_weight must be a symmetric matrix of finite numbers of shape ({n}, {n})")
-    return (P + P.T) / 2
+    P = (P + P.T) / 2
+    lowest = float(np.linalg.eigvalsh(P)[0]) if n else 0.0
+    if lowest < -ROUNDED * float(np.abs(P).max(initial=0.0)):
+        raise TrackingError(f"terminal_weight has the eigenvalue {lowest:g}; none may be negative")
+    return P
+
+
+def _factor(weight: FloatArray) -> FloatArray:
+    """F with F'F = a symmetric weight; eigenvalues below zero, which are rounding, count as zero. Scaled to a unit
+    diagonal first: states of a model have units of their own, and a small weight must not drown beside a large one."""
+    diagonal = np.sqrt(np.maximum(np.diag(weight), 0.0))
+    scale = np.where(diagonal > 0, diagonal, 1.0)
+    values, vectors = np.linalg.eigh(weight / np.outer(scale, scale))
+    factor: FloatArray = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale
+    return factor

@@ -1,4 +1,10 @@
-"""`riccati.backward_gains`, compiled. One file holds all it calls: numba's kept code follows a single file."""
+"""The Riccati recursion with P itself, compiled: quick, and given up where rounding would decide.
+
+P = M[:n, :n] - W'W is a difference of equal numbers where the forces can cancel nearly all of the cost (no force weight
+and feedthrough): rounding may leave a negative eigenvalue, and each further step multiplies that by the square of every
+unstable zero of the model. `riccati.backward_gains`, which carries a factor of P, takes over then.
+One file holds all it calls: numba's kept code follows a single file.
+"""
 
 import numpy as np
 from numba import njit, types
@@ -8,6 +14,7 @@ from equalizer.signals.signal import FloatArray
 _MATRIX = types.Array(types.float64, 2, "C", readonly=True)
 _OUT = types.float64[:, ::1]
 _STACK = types.float64[:, :, ::1]
+HALF_OF_THE_DIGITS = float(np.sqrt(np.finfo(np.float64).eps))
 
 
 @njit(types.boolean(_OUT, types.int64), cache=True, nogil=True)
@@ -64,31 +71,36 @@ def _cost_to_go(joined: FloatArray, stage_cost: FloatArray, P: FloatArray, M: Fl
     M += stage_cost
 
 
-@njit(types.void(_OUT, types.int64, _OUT), cache=True, nogil=True)
-def _remainder(M: FloatArray, n: int, P: FloatArray) -> None:
-    """P = M[:n, :n] - W' W, exactly symmetric."""
+@njit(types.boolean(_OUT, types.int64, _OUT), cache=True, nogil=True)
+def _subtract(M: FloatArray, n: int, P: FloatArray) -> bool:
+    """P = M[:n, :n] - W' W, exactly symmetric. False = a diagonal entry lost more than half of its digits."""
+    kept = True
     for i in range(n):
+        whole = M[i, i]
         for j in range(n, M.shape[0]):
             for c in range(i + 1):
                 M[i, c] -= M[j, i] * M[j, c]
         for c in range(i + 1):
             P[i, c] = M[i, c]
             P[c, i] = M[i, c]
+        kept &= P[i, i] >= HALF_OF_THE_DIGITS * whole
+    return kept
 
 
-@njit(types.int64(_MATRIX, _MATRIX, _OUT, _STACK, _STACK), cache=True, nogil=True)
-def backward(joined: FloatArray, stage_cost: FloatArray, P: FloatArray, K: FloatArray, H_inverse: FloatArray) -> int:
+@njit(types.boolean(_MATRIX, _MATRIX, _OUT, _STACK, _STACK), cache=True, nogil=True)
+def backward(joined: FloatArray, stage_cost: FloatArray, P: FloatArray, K: FloatArray, H_inverse: FloatArray) -> bool:
     """Fills K (N, m, n) and H_inverse (N, m, m) backward from P (n, n), which becomes that of the start.
 
-    joined: [A B], (n, n + m); stage_cost: (n + m, n + m). Returns the step, counted from the end, at which a force has
-    no effect on the cost; 0 = none.
+    joined: [A B], (n, n + m); stage_cost: (n + m, n + m). False = not done: at a step a force has no effect on the
+    cost, or rounding would decide what is left of it.
     """
     n, samples = P.shape[0], K.shape[0]
     M = np.empty_like(stage_cost)
     for k in range(samples - 1, -1, -1):
         _cost_to_go(joined, stage_cost, P, M)
         if not _eliminate(M, n):
-            return int(samples - k)
+            return False
         _solve(M, n, K[k], H_inverse[k])
-        _remainder(M, n, P)
-    return 0
+        if not _subtract(M, n, P):
+            return False
+    return True

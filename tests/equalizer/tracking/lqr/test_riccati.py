@@ -47,14 +47,24 @@ def test_a_delay_without_a_force_weight_is_refused(problem_of, recursion):
         recursion(problem_of(4, 0, 0.0, feedthrough=False), 10)
 
 
-def test_feedthrough_needs_no_force_weight(problem_of):
-    problem = problem_of(4, 0, 0.0)
-    assert np.isfinite(stored_gains(problem, 50).gains.K).all()
+@pytest.mark.parametrize("recursion", [backward_gains, lambda *given: stored_gains(*given).gains])
+@pytest.mark.parametrize("seed", range(12))
+def test_feedthrough_needs_no_force_weight(problem_of, recursion, seed):
+    # What is wanted is reached exactly, so P is zero: any negative eigenvalue left by rounding grows step by step.
+    problem = problem_of(4, seed, 0.0)
+    gains = recursion(problem, 400)
+    assert np.isfinite(gains.K).all()
+    assert np.linalg.eigvalsh(gains.P)[0] >= -1e-12 * np.abs(gains.P).max()
 
 
 def test_a_terminal_weight_of_another_shape_is_refused(problem_of):
     with pytest.raises(TrackingError, match=r"terminal_weight must be .* \(4, 4\)"):
         backward_gains(problem_of(4, 0), 5, np.eye(3))
+
+
+def test_a_terminal_weight_that_rewards_a_distance_is_refused(problem_of):
+    with pytest.raises(TrackingError, match=r"terminal_weight has the eigenvalue -2; none may be negative"):
+        backward_gains(problem_of(2, 0), 5, np.diag([1.0, -2.0]))
 
 
 def test_nor_are_there_stationary_ones(device_model):
