@@ -110,9 +110,13 @@ def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prio
 
     def root(below_db: float) -> float:
         """Signed root of the likelihood ratio: of a quadratic likelihood, a straight line."""
-        # The other numbers begin where a quadratic likelihood would have them.
-        found = maximise(objective, fit.numbers - below_db * along, held=place)
-        return math.sqrt(max(0.0, 2.0 * (float(found.fun) - best)))
+        # The other numbers begin where a quadratic likelihood would have them; where that ends too low to go on, also
+        # where they are at the estimate, for with few answers the likelihood has several tops, and a profile is the
+        # highest of them.
+        height = float(maximise(objective, fit.numbers - below_db * along, held=place).fun)
+        if math.sqrt(max(0.0, 2.0 * (height - best))) >= wanted:
+            height = min(height, float(maximise(objective, fit.numbers - below_db * unit, held=place).fun))
+        return math.sqrt(max(0.0, 2.0 * (height - best)))
 
     near, near_root, far = 0.0, 0.0, 2.0
     while (far_root := root(far)) < wanted:
