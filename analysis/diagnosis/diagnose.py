@@ -14,6 +14,7 @@ from analysis.diagnosis.confirm.confirm_laws import (
 )
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure, choose_fitting_measure, list_fitting_measures
 from analysis.diagnosis.confirm.laws_beside_model import ResultBesideModel, judge_beside_model
+from analysis.diagnosis.data.input_checks import is_too_short_to_name
 from analysis.diagnosis.data.observed_parts import names_of_parts
 from analysis.diagnosis.diagnosis_settings import BALANCE, DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import measure_of
@@ -35,6 +36,8 @@ from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
+TOO_SHORT = "the recordings are so short that other laws would explain them as well"
+
 
 def diagnose(
     recordings: Sequence[Recording],
@@ -50,6 +53,8 @@ def diagnose(
         progress("weighing laws in the force balance", 0.0)
         known = settings.balances
         balances = known if known is not None else _balances(recordings, settings, map_)
+        if is_too_short_to_name(recordings):
+            balances = tuple(balance.without_names(TOO_SHORT) for balance in balances)
         for number, look in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
             progress("fitting the named laws", 0.2 + 0.3 * number)
             context = search_context_of(recordings[0], look, settings, map_)

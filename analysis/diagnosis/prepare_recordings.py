@@ -13,7 +13,7 @@ import numpy as np
 from analysis.diagnosis.data.command_gaps import bridge_gaps
 from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.found_segments import find_segments
-from analysis.diagnosis.data.input_checks import FEW_CYCLES, NothingToDiagnose, require_different, require_something
+from analysis.diagnosis.data.input_checks import require_different, require_something
 from analysis.diagnosis.first_model.plain_form import plain_form
 from analysis.wording import begin_sentence, conjoin
 from equalizer.signals.recording import Recording
@@ -33,8 +33,8 @@ def prepare(
     recordings: Sequence[Recording], names: Sequence[str], plain: bool, short: bool | None = None
 ) -> PreparedRecordings:
     """The prepared recordings. recordings: alike, in the order of names. plain: one motion for each force, as a force
-    balance needs it. short:
-    few cycles are a remark and no refusal; None: as plain. Raises NothingToDiagnose."""
+    balance needs it. short: few cycles or samples are a remark and no refusal; None: as plain. Raises
+    NothingToDiagnose."""
     found = [find_segments(each) for each in recordings]
     told = [(name, text) for name, (_, text) in zip(names, found, strict=True) if text]
     repeats = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in told)
@@ -47,14 +47,8 @@ def prepare(
 
 def comparable(recordings: Sequence[Recording], names: Sequence[str], short: bool) -> PreparedRecordings:
     """The last two steps alone, for recordings in this form, such as a session's trials. Raises NothingToDiagnose."""
-    few: tuple[str, ...] = ()
-    try:
-        require_different(recordings, names)
-        require_something(recordings, names)
-    except NothingToDiagnose as refusal:
-        if not short or not all(FEW_CYCLES in problem for problem in refusal.problems):
-            raise
-        few = tuple(f"{begin_sentence(problem)}." for problem in refusal.problems)
+    require_different(recordings, names)
+    few = tuple(f"{begin_sentence(problem)}." for problem in require_something(recordings, names, short))
     alike = keep_common_signals(recordings)
     moving = _drop_constant_position(alike.recordings)
     return PreparedRecordings(moving.recordings, (*few, *alike.remarks, *moving.remarks))

@@ -78,6 +78,11 @@ class Balance:
     def named(self) -> tuple[JudgedLaw, ...]:
         return tuple(each for each in self.laws if each.named)
 
+    def without_names(self, why_not: str) -> "Balance":
+        """The balance with its named laws left as candidates."""
+        laws = tuple(replace(each, why_not=each.why_not or why_not) for each in self.laws)
+        return replace(self, laws=laws)
+
     def error_of(self, laws: Sequence[int]) -> float:
         """Held-out error with these laws, over the signal's rms. laws: by number in the regression."""
         regression = self.search.regression

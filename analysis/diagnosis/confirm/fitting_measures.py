@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.measured_motion import is_quasi_static, is_read_as_free
-from analysis.diagnosis.data.operating_point import about_operating_point
+from analysis.diagnosis.data.operating_point import about_operating_point, add_to_commands
 from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
 from analysis.diagnosis.errors.fit_score import fit_score
 from analysis.diagnosis.errors.hypothesis import NOTHING
@@ -24,8 +24,8 @@ MENDED = 0.9
 """Times the error that a constant may leave at most to be worth saying; principle: as a named law, `confirm_laws`.
 """
 ABOUT_MEAN = (
-    "The fitted model holds no constants: one was added to the command, with which it keeps the mean position of what "
-    "was fitted to. Weights, offsets of sensor and amplifier, and the point that the device works at are all in it."
+    "The fitted model holds no constants: one was added to the command, with which its mean error on what was fitted "
+    "to is zero. Weights, offsets of sensor and amplifier, and the point that the device works at are all in it."
 )
 
 
@@ -49,15 +49,34 @@ def choose_fitting_measure(
     """The measure that the rule chooses. about_mean: the model was fitted to deviations from the mean, and a constant
     command is added where that lowers the error."""
     look = FittingMeasure(model, measure_of(recordings, model, clean, compared))
-    moved = about_operating_point(recordings, model) if about_mean and not clean else None
-    if moved is None or look.chosen.measure.name != "free simulation":
+    if not about_mean or clean:
+        return look
+    measure = look.chosen.measure
+    moved = None
+    if measure.name == "free simulation":
+        moved = about_operating_point(recordings, model)
+    elif isinstance(measure, PredictedForce):
+        moved = _about_mean_force(recordings, model, measure)
+    if moved is None:
         return look
     other = measure_of(moved, model, clean, compared)
-    if other.measure.name != "free simulation" or _error_over_noise(model, other) > MENDED * _error_over_noise(
+    if other.measure.name != measure.name or _error_over_noise(model, other) > MENDED * _error_over_noise(
         model, look.chosen
     ):
         return look
     return FittingMeasure(model, replace(other, remarks=(*other.remarks, ABOUT_MEAN)))
+
+
+def _about_mean_force(
+    recordings: Sequence[Recording], model: MechanicalModel, measure: PredictedForce
+) -> tuple[Recording, ...]:
+    """The recordings with a constant added to their commands, with which the force that the model needs is right on
+    average over the samples to fit and to choose by."""
+    residuals = measure.residuals(model, ())
+    missed = np.concatenate(
+        [left[record.fit | record.choose] for left, record in zip(residuals, measure.records, strict=True)]
+    )
+    return add_to_commands(recordings, -np.mean(missed, axis=0) * measure.unit)
 
 
 def _error_over_noise(model: MechanicalModel, chosen: Chosen) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judged_law import LEVEL, bootstrap_draws
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import rms_over
+from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import SEALED_SURPRISE
 from equalizer.signals.signal import FloatArray
@@ -54,9 +54,8 @@ def predicts_something(measure: ErrorMeasure, candidate: FittedCandidate) -> boo
     masks = [record.test for record in measure.records]
     if measure.name == "predicted force" or not any(mask.any() for mask in masks):
         return True
-    signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
     left = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit
-    size = rms_over(measure.records, signals, masks)
+    size = signal_rms(measure.records, masks)
     moves = size > SEALED_SURPRISE * measure.noise
     return not moves.any() or bool(np.mean((left[moves] / size[moves]) ** 2) < 1)
 

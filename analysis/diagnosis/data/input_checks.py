@@ -26,8 +26,6 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
-FEW_CYCLES = "cycles of what was commanded, which is too short"
-
 
 class NothingToDiagnose(ValueError):  # noqa: N818 - an answer that a user reads
     """`problems`: one sentence each, without a full stop."""
@@ -56,9 +54,9 @@ def require_alike(
         raise NothingToDiagnose(tuple(problems))
 
 
-def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> None:
-    """Requires a command without gaps and responses that change and depend on it, for long enough. Raises
-    NothingToDiagnose."""
+def require_something(recordings: Sequence[Recording], names: Sequence[str], short: bool = False) -> tuple[str, ...]:
+    """Requires a command without gaps and responses that change and depend on it, for long enough. short: a little too
+    short is a sentence that is returned, and no refusal. Raises NothingToDiagnose."""
     problems = [
         problem for recording, name in zip(recordings, names, strict=True) for problem in _gaps(recording.command, name)
     ]
@@ -68,31 +66,51 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
         for problem in _impossible_values(recording, name)
     ]
     problems += _constant_signals(recordings)
+    few: tuple[str, ...] = ()
     if not problems:
-        known = sum(int(np.isfinite(recording.response.samples).all(axis=1).sum()) for recording in recordings)
-        cycles = sum(_command_cycles(recording) for recording in recordings)
+        known = _answered_samples(recordings)
+        few = tuple(_shortness(recordings))
         if known < LEAST_SAMPLES:
             problems.append(f"{known} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
-        elif known < SHORTEST_SAMPLES and known / recordings[0].sample_rate_hz < SHORTEST_S:
-            problems.append(
-                f"{known} samples, {known / recordings[0].sample_rate_hz:.3g} s, are too short a recording; at least "
-                f"{SHORTEST_S:g} s or {SHORTEST_SAMPLES} samples are needed, one part to fit and one to test"
-            )
+        elif few and not short:
+            problems += few
         elif (fitted := samples_to_fit(recordings)) < LEAST_SAMPLES_TO_FIT:
             problems.append(
                 f"only {fitted} samples of what may be fitted to hold a response, and a position where there is one; "
                 "the rest of it is missing, or has the role of a test"
             )
-        elif cycles < LEAST_CYCLES:
-            needed = f"at least {LEAST_CYCLES:g} are needed, one part to fit and one to test"
-            problems.append(f"the recording holds about {cycles:.2g} {FEW_CYCLES}; {needed}")
-        elif (sure := response_significance(recordings)) is not None and sure < ANSWER_DEVIATIONS:
+        elif not few and (sure := response_significance(recordings)) is not None and sure < ANSWER_DEVIATIONS:
             problems.append(
                 "the responses have nothing to do with the commands: what they share is no more than noise shares with "
                 "anything, so the recording is noise, of another device, or its command was not played"
             )
     if problems:
         raise NothingToDiagnose(tuple(problems))
+    return few
+
+
+def is_too_short_to_name(recordings: Sequence[Recording]) -> bool:
+    """Whether recordings are so short that any law explains them about as well as another."""
+    known = _answered_samples(recordings)
+    return known < SHORTEST_SAMPLES and known / recordings[0].sample_rate_hz < SHORTEST_S
+
+
+def _answered_samples(recordings: Sequence[Recording]) -> int:
+    return sum(int(np.isfinite(recording.response.samples).all(axis=1).sum()) for recording in recordings)
+
+
+def _shortness(recordings: Sequence[Recording]) -> Iterator[str]:
+    if is_too_short_to_name(recordings):
+        known = _answered_samples(recordings)
+        yield (
+            f"{known} samples, {known / recordings[0].sample_rate_hz:.3g} s, are too short a recording to name physics "
+            f"by; at least {SHORTEST_S:g} s or {SHORTEST_SAMPLES} samples are needed, one part to fit and one to test"
+        )
+    elif (cycles := sum(_command_cycles(recording) for recording in recordings)) < LEAST_CYCLES:
+        yield (
+            f"the recording holds about {cycles:.2g} cycles of what was commanded, which is too short; at least "
+            f"{LEAST_CYCLES:g} are needed, one part to fit and one to test"
+        )
 
 
 def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> None:

@@ -28,7 +28,11 @@ def about_operating_point(recordings: Sequence[Recording], model: MechanicalMode
         return None
     gain = model.output @ np.linalg.solve(model.stiffness, model.input)
     pushed, stood = _means(recordings, model.outputs)
-    constant = np.linalg.pinv(gain) @ stood - pushed
+    return add_to_commands(recordings, np.linalg.pinv(gain) @ stood - pushed)
+
+
+def add_to_commands(recordings: Sequence[Recording], constant: FloatArray) -> tuple[Recording, ...]:
+    """The recordings with a constant, (m,), added to every sample of their commands."""
     return tuple(
         replace(each, command=replace(each.command, samples=each.command.samples + constant)) for each in recordings
     )

@@ -7,6 +7,7 @@ import numpy as np
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.types import Mask
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
 
 _TINY = 1e-6
@@ -50,6 +51,25 @@ def fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitSc
             for part in ("fit", "choose", "test")
         )
     )
+
+
+def signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> FloatArray:
+    """(c,): standard deviation of the measured signals over the masked samples of all records, by which errors are
+    normalised. Positions are taken about the mean of each record, for encoders begin anywhere; forces, speeds and
+    accelerations about the mean of all, for of several takes at a steady speed each the mean is what differs.
+    """
+    held = [(record, mask) for record, mask in zip(records, masks, strict=True) if mask.any()]
+    if not held:
+        return np.full(records[0].measured.shape[1], np.nan)
+    signals = (records[0].recording.response, records[0].recording.position)
+    quantities = [word for signal in signals if signal is not None for word in signal.quantities]
+    places = [DERIVATIVE_OF_QUANTITY.get(word) == 0 for word in quantities[: records[0].measured.shape[1]]]
+    whole = np.nanmean(np.concatenate([record.measured[mask] for record, mask in held]), axis=0)
+    moved = [
+        record.measured[mask] - np.where(places, np.nanmean(record.measured[mask], axis=0), whole)
+        for record, mask in held
+    ]
+    return np.asarray(np.sqrt(np.mean(np.concatenate(moved) ** 2, axis=0)))
 
 
 def rms_over(records: tuple[Observed, ...], residuals: tuple[FloatArray, ...], masks: list[Mask]) -> FloatArray:

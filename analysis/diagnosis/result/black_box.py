@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import rms_over
+from analysis.diagnosis.errors.fit_score import signal_rms
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.types import Mask
@@ -119,7 +119,6 @@ def _select_terms(seen: FloatArray, wanted: FloatArray, count: int) -> list[int]
 def _normalised_error(measure: ErrorMeasure, left: FloatArray) -> float:
     """Rms error over the rms signal, root mean square over channels. left: (test samples, c), in units of the
     measure."""
-    signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
-    size = np.maximum(rms_over(measure.records, signals, [record.test for record in measure.records]), _TINY)
+    size = np.maximum(signal_rms(measure.records, [record.test for record in measure.records]), _TINY)
     rms = np.sqrt(np.mean(left**2, axis=0)) * measure.unit / size
     return float(np.sqrt(np.mean(rms**2)))

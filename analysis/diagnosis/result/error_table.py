@@ -7,7 +7,7 @@ import numpy as np
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.document import Errors, Fit
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import rms_over
+from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import SEALED_SURPRISE, STILL_SHARE
@@ -48,8 +48,7 @@ def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -
     masks = [np.logical_or.reduce([getattr(record, part) for part in parts]) for record in measure.records]
     if not any(mask.any() for mask in masks):
         return Errors(None, None, None, None)
-    signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
-    size = np.maximum(rms_over(measure.records, signals, masks), np.finfo(float).tiny)
+    size = np.maximum(signal_rms(measure.records, masks), np.finfo(float).tiny)
 
     def error(candidate: FittedCandidate) -> float | None:
         rms = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit / size

@@ -4,7 +4,7 @@ one."""
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import rms_over
+from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import NO_PREDICTION_ERROR, NO_PREDICTION_SHARE
@@ -38,8 +38,7 @@ def _residual_rms(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
 
 def _signal_rms(measure: ErrorMeasure) -> FloatArray:
     """(c,): rms"""
-    signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
-    return rms_over(measure.records, signals, _decision_samples(measure))
+    return signal_rms(measure.records, _decision_samples(measure))
 
 
 def _decision_samples(measure: ErrorMeasure) -> list[Mask]:

@@ -47,3 +47,17 @@ def test_a_spring_that_hardens_or_softens_is_named_and_not_explained_without_rep
     assert diagnosis.verdict == "partly_explained"
     assert [effect.effect for effect in diagnosis.effects] == ["hardening_stiffness"]
     assert diagnosis.effects[0].parameters["k3"].value == pytest.approx(cubic, rel=0.1)
+
+
+@pytest.mark.parametrize(("seconds", "names"), [(10.0, ["coulomb_friction"]), (1.4, [])], ids=["long", "too short"])
+def test_a_recording_that_is_too_short_to_name_physics_gets_candidates(axes, seconds, names):
+    from analysis.diagnosis.diagnose import TOO_SHORT, diagnose
+    from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+
+    recording = axes.recorded(axes.Physics(coulomb=0.6), SEED, seconds=seconds, rate_hz=1000.0, noise=1e-7)
+    model = widen_tolerance(fit_mechanical_model([recording], name="fitted").model)
+    found = diagnose([recording], model, DiagnosisSettings(fitted=True), map, lambda said, share: None).diagnosis
+    assert [effect.effect for effect in found.effects] == names
+    if not names:
+        assert found.verdict == "unexplained"
+        assert (found.candidates[0].effect, found.candidates[0].why_not) == ("coulomb_friction", TOO_SHORT)

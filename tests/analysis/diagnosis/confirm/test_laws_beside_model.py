@@ -91,19 +91,22 @@ def test_a_random_difference_has_a_gain_interval_around_zero():
     assert found.low < 0 < found.high
 
 
+POSITIONS = SimpleNamespace(response=SimpleNamespace(quantities=("position", "position")), position=None)
+
+
 @pytest.mark.parametrize(
     ("name", "left", "something"),
     [("free simulation", 1.01, False), ("free simulation", 0.9, True), ("predicted force", 1.01, True)],
 )
 def test_a_model_that_leaves_as_much_of_a_motion_as_its_mean_predicts_nothing(name, left, something):
-    record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=3.0 + 2.0 * NOISE)
+    record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=3.0 + 2.0 * NOISE, recording=POSITIONS)
     measure = SimpleNamespace(name=name, records=(record,), unit=np.array([2.0, 2.0]), noise=np.full(2, 0.1))
     assert predicts_something(measure, candidate(left * NOISE)) == something
 
 
 @pytest.mark.parametrize(("left", "idle", "something"), [(0.5, 1e-3, True), (0.5, 0.0, True), (1.5, 1e-3, False)])
 def test_an_idle_channel_does_not_say_whether_a_model_predicts_something(left, idle, something):
-    record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=NOISE * (1.0, idle))
+    record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=NOISE * (1.0, idle), recording=POSITIONS)
     measure = SimpleNamespace(name="free simulation", records=(record,), unit=np.ones(2), noise=np.full(2, 0.01))
     assert predicts_something(measure, candidate(NOISE * (left, 0.02))) == something
 

@@ -125,9 +125,15 @@ def test_a_recording_counts_once():
 
 def test_a_second_is_too_short_where_it_holds_few_samples_and_enough_where_it_holds_many():
     said = refusal(require_something, [recording(samples=500)], ["a"])
-    assert "500 samples, 1 s, are too short a recording; at least 1.5 s or 2000 samples are needed" in said
-    require_something([recording(samples=4000, rate_hz=4000.0)], ["a"])
-    require_something([recording(samples=800)], ["a"])
+    words = "500 samples, 1 s, are too short a recording to name physics by; at least 1.5 s or 2000 samples are needed"
+    assert words in said
+    assert require_something([recording(samples=4000, rate_hz=4000.0)], ["a"]) == ()
+    assert require_something([recording(samples=800)], ["a"]) == ()
+    (told,) = require_something([recording(samples=500)], ["a"], short=True)
+    assert words in told
+    assert "100 samples are too short" in refusal(
+        lambda *given: require_something(*given, short=True), [recording(samples=100)], ["a"]
+    )
 
 
 def test_a_rate_too_slow_for_the_model_is_refused():

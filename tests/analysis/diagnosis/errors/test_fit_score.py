@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.growth import growth_rate, is_unstable_within
-from analysis.diagnosis.errors.fit_score import FitScore, fit_score, rms_over
+from analysis.diagnosis.errors.fit_score import FitScore, fit_score, rms_over, signal_rms
 from equalizer.plant.mechanical_model import MechanicalModel
 
 
@@ -45,6 +45,20 @@ def test_recordings_count_by_their_samples(arena_of):
     masks = [np.ones(len(long), dtype=bool), np.ones(10, dtype=bool)]
     n = len(long)
     assert rms_over((record, cut), (long, short), masks) == pytest.approx(np.sqrt((n + 90) / (n + 10)))
+
+
+@pytest.mark.parametrize(("quantity", "expected"), [("velocity", np.hypot(5.0, 1.0)), ("position", 1.0)])
+def test_takes_at_their_own_speeds_differ_by_their_means_and_encoders_begin_anywhere(arena_of, quantity, expected):
+    (record,) = arena_of().whole.records
+    n, channels = record.measured.shape
+    response = replace(record.recording.response, quantity=quantity)
+    ripple = np.tile(np.where(np.arange(n) % 2, 1.0, -1.0)[:, None], (1, channels))
+    takes = tuple(
+        replace(record, measured=level + ripple, recording=replace(record.recording, response=response, position=None))
+        for level in (5.0, -5.0)
+    )
+    masks = [np.arange(n) < 200 for _ in takes]
+    assert signal_rms(takes, masks) == pytest.approx(np.full(channels, expected))
 
 
 def test_the_worst_channel_and_the_mean_of_all():

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from analysis.diagnosis.confirm.fitting_measures import ABOUT_MEAN, choose_fitting_measure
 from analysis.diagnosis.data.operating_point import about_operating_point
@@ -54,3 +55,15 @@ def test_what_no_spring_holds_and_what_is_no_position_has_no_such_point():
     assert about_operating_point((recording(),), model(stiffness=0.0)) is None
     moving = replace(recording(), response=replace(recording().response, quantity="velocity", unit="m/s"))
     assert about_operating_point((moving,), model("velocity")) is None
+
+
+def test_a_force_balance_is_taken_about_the_mean_force():
+    """Of an imposed motion the offset of the force sensor, say: it is many times what the force changes by."""
+    offset = recording(weight=20.0)
+    look = choose_fitting_measure((offset,), model(), (), "force", about_mean=True)
+    assert ABOUT_MEAN in look.chosen.remarks
+    (left,) = look.chosen.measure.residuals(model(), ())
+    plain = choose_fitting_measure((offset,), model(), (), "force")
+    (before,) = plain.chosen.measure.residuals(model(), ())
+    assert np.abs(np.mean(left * look.chosen.measure.unit)) < 0.01
+    assert np.mean(before * plain.chosen.measure.unit) == pytest.approx(-20.0, rel=0.05)
