@@ -52,8 +52,8 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
     try:
         choice = choose_structure(found.recordings, wanted, on_progress)
     except StructureRefused as refusal:
-        what = "no structure" if wanted is None else f"the structure {wanted}"
-        raise _refusal(f"The recordings do not carry {what}: {refusal}.") from refusal
+        what, verb = ("No structure", "can") if wanted is None else (f"The structure {wanted}", "cannot")
+        raise _refusal(f"{what} {verb} be fitted to these recordings: {refusal}.") from refusal
     origin = {
         **gather_provenance(parents=found.parents).as_dict(),
         "structure": choice.fit.kind,
