@@ -4,13 +4,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import irfft, rfft
+from scipy.interpolate import make_interp_spline
 
 from analysis.diagnosis.contrast.fault import ColumnChange, Fault, Numbers, Undo, Variant, proportional_number
 from analysis.diagnosis.contrast.part import Part
 from equalizer.effects.simulation.sensor_path import filter_one_pole
 from equalizer.effects.simulation.slew_kernel import limit_rate
-from equalizer.signals.band_limited import end_to_end_line, odd_extension
 from equalizer.signals.signal import FloatArray
 
 CommandChange = Callable[[FloatArray, float], FloatArray]
@@ -75,30 +74,42 @@ def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
 
     yield axis.fault("force_gain", [
         Variant((axis.of(lambda u, rate: 2 * u),), lambda s: {"gain": gain(float(s[0]))}, -0.9, 20.0,
-                column_change=lambda x, rate: 2 * x),
+                column_change=lambda x, rate, part: 2 * x),
     ])  # fmt: skip
     drifts = [_gain_drift(axis, begun, lambda s: {"change": gain(float(s[0])) - 1}) for begun in BEGUN]
     yield replace(axis.fault("force_gain_drift", drifts), varies=True, simpler=("force_gain",))
 
 
 def _gain_drift(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
-    def ramp(samples: FloatArray) -> FloatArray:
-        return 1 + np.linspace(begun, 1.0, len(samples))
+    def ramp(part: Part, count: int) -> FloatArray:
+        passed = 1 + drift_course(part, begun)
+        return np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(passed)), passed)[:, None]
 
-    undo = axis.of(lambda u, rate: u * ramp(u))
-    return Variant((undo,), numbers, -0.9, 20.0, column_change=lambda x, rate: x * ramp(x)[:, None])
+    def undo(part: Part) -> Part:
+        command = part.command.copy()
+        command[:, [axis.number]] *= ramp(part, len(command))
+        return replace(part, command=command)
+
+    return Variant((undo,), numbers, -0.9, 20.0, column_change=lambda x, rate, part: x * ramp(part, len(x)))
+
+
+def drift_course(part: Part, begun: float) -> FloatArray:
+    """(n,): a drift to 1 at the end of the file, of which a share `begun` had come before the file began."""
+    return np.asarray(begun + (1 - begun) * part.course)
 
 
 def _delay(axis: _Axis, time_s: float) -> Variant:
-    change: ColumnChange = lambda x, rate: shift_samples(x, -time_s * rate)  # noqa: E731
+    change: ColumnChange = lambda x, rate, part: shift_samples(x, -time_s * rate)  # noqa: E731
     undo = axis.of(lambda u, rate: shift_samples(u[:, None], time_s * rate)[:, 0])
-    return Variant((undo,), proportional_number("delay", time_s), *AROUND, column_change=change)
+    about = lambda size: _delay(axis, size * time_s)  # noqa: E731
+    return Variant((undo,), proportional_number("delay", time_s), *AROUND, column_change=change, about=about)
 
 
 def _lag(axis: _Axis, time_s: float) -> Variant:
     undo = axis.of(lambda u, rate: apply_lag(u, time_s * rate))
-    change: ColumnChange = lambda x, rate: x + time_s * rate * np.gradient(x, axis=0)  # noqa: E731
-    return Variant((undo,), proportional_number("time_constant", time_s), *AROUND, column_change=change)
+    change: ColumnChange = lambda x, rate, part: x + time_s * rate * np.gradient(x, axis=0)  # noqa: E731
+    about = lambda size: _lag(axis, size * time_s)  # noqa: E731
+    return Variant((undo,), proportional_number("time_constant", time_s), *AROUND, column_change=change, about=about)
 
 
 def _saturation(axis: _Axis, limit: float) -> Variant:
@@ -118,13 +129,18 @@ def _follow_with_steps(command: FloatArray, reach: float) -> FloatArray:
 
 def _deadband(axis: _Axis, width: float) -> Variant:
     undo = axis.of(lambda u, rate: np.sign(u) * np.maximum(np.abs(u) - width, 0.0))
-    return Variant((undo,), proportional_number("width", width), *AROUND)
+    about = lambda size: _deadband(axis, size * width)  # noqa: E731
+    return Variant((undo,), proportional_number("width", width), *AROUND, about=about)
 
 
 def delays_to_try(samples: FloatArray, rate_hz: float) -> list[float]:
     """Delays in s on a logarithmic grid, from a tenth of a sample to `LONGEST`."""
     shortest, longest = 0.1 / rate_hz, LONGEST / median_frequency_hz(samples, rate_hz)
-    return [float(time_s) for time_s in np.geomspace(shortest, longest, GRID)] if longest > shortest else []
+    if longest <= shortest:
+        return []
+    # Sizes `AROUND` each must meet those of the next.
+    count = int(np.ceil(np.log(longest / shortest) / np.log(AROUND[1] / AROUND[0]))) + 1
+    return [float(time_s) for time_s in np.geomspace(shortest, longest, max(count, GRID))]
 
 
 def median_frequency_hz(samples: FloatArray, rate_hz: float) -> float:
@@ -134,29 +150,23 @@ def median_frequency_hz(samples: FloatArray, rate_hz: float) -> float:
     return max(line, 1) * rate_hz / len(samples)
 
 
-FINER = 4
-"""Band-limited upsampling before linear interpolation, which alone would be a low pass."""
+SMOOTH = 5
+"""Degree of the splines through samples: of short reach, where a shift of the spectrum's phase rings from the ends on,
+and hardly a low pass, as straight lines would be."""
 
 
 def resample(samples: FloatArray, at: FloatArray) -> FloatArray:
     """Samples (n,) interpolated at times `at` (n,), in samples; held beyond the ends."""
-    line = np.linspace(samples[0], samples[-1], len(samples))
-    bent = samples - line
-    whole = odd_extension(bent[:, None])[:, 0]
-    fine = irfft(rfft(whole), FINER * len(whole))[: FINER * (len(samples) - 1) + 1] * FINER
-    inside = np.clip(at, 0, len(samples) - 1)
-    along = np.interp(inside, np.arange(len(line)), line)
-    return np.asarray(np.interp(FINER * inside, np.arange(len(fine)), fine) + along)
+    spline = make_interp_spline(np.arange(len(samples)), samples, SMOOTH)
+    return np.asarray(spline(np.clip(at, 0, len(samples) - 1)))
 
 
 def shift_samples(samples: FloatArray, by: float) -> FloatArray:
-    """Samples (n, k) delayed by `by` samples, a real number, through the phase of the spectrum (all-pass)."""
-    line = end_to_end_line(samples)
-    whole = odd_extension(samples - line)
-    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(len(whole)) * by)
-    moved = irfft(rfft(whole, axis=0) * turn[:, None], len(whole), axis=0)[: len(samples)]
-    slope = (samples[-1] - samples[0]) / max(len(samples) - 1, 1)
-    return np.asarray(moved + line - slope * by)
+    """Samples (n, k) delayed by `by` samples, a real number; continued beyond both ends as an odd function."""
+    room = int(np.ceil(abs(by))) + SMOOTH
+    wide = np.pad(samples, ((room, room), (0, 0)), mode="reflect", reflect_type="odd")
+    spline = make_interp_spline(np.arange(-room, len(samples) + room), wide, SMOOTH)
+    return np.asarray(spline(np.arange(len(samples)) - by))
 
 
 def apply_lag(samples: FloatArray, constant: float) -> FloatArray:

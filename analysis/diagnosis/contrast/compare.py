@@ -23,19 +23,28 @@ from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
-from analysis.diagnosis.contrast.stream import FOLDS, Stream, rows_with_fault_undone, stream_of
+from analysis.diagnosis.contrast.stream import BLOCKS, Stream, rows_with_fault_undone, stream_of
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-ALL = tuple(range(FOLDS))
-APART = ((0, 1), (2, 3), (4, 5), (0, 1, 2))
+Tried = tuple[Fit, Fault, Variant, list[Pair]]
+"""A variant of a fault with its best size."""
+ALL = tuple(range(BLOCKS))
+SIXTHS, THIRDS = (tuple(tuple(ALL[k : k + size]) for k in ALL[::size]) for size in (BLOCKS // 6, BLOCKS // 3))
+FOLDS = len(SIXTHS)
+"""Parts of each set that are left out in turn."""
+APART = (*THIRDS, ALL[: BLOCKS // 2])
 """Blocks of a set that are compared with its other blocks, thirds and halves, as if they were two recordings."""
 FURTHER = 1.6
 """Times the largest excess between stretches of one set that both together must have. By hand: of seven public devices
 in order, halves of which a fault was named had up to 1.53 times; faults that were named right, 1.75 and more."""
 AS_ONE = 0.05
 """Excess of the error of both sets together over that of each by itself, up to which they are of one device."""
+NEAR = 0.02
+"""Distance from size 1 within which it is not."""
+TURNS = 4
+"""Times at most that a fault whose undoing is not linear is undone anew about the size that was found."""
 LEAST = 0.05
 """Share of the error power of both sets that a fault must gain: a fault that adds a tenth to the error power of one set
 gains that much. Smaller ones are not worth a name."""
@@ -48,7 +57,7 @@ class JudgedFault:
     fault: Fault
     values: dict[str, float]
     spread: dict[str, float]
-    """Standard error of each value, from leaving out blocks of either set: what varies among the clean stretches makes
+    """Standard error of each value, from leaving out sixths of either set: what varies among the clean stretches makes
     a number as uncertain as what varies among the others."""
     errors: FloatArray
     """(blocks,): sums of squares with it undone, of the faulty set, then of the clean one."""
@@ -153,34 +162,50 @@ def _judge_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left:
     plain = fit_sizes(bare, None)
     own = sum(stream.other.count for stream in streams)
     samples = own + sum(stream.clean.count for stream in streams)
-    best: list[tuple[Fit, Fault, Variant, list[Pair]]] = []
+    best: list[Tried] = []
     complete = False
     for fault in faults:
         if not time_left():
             break
-        tried = []
-        for variant in fault.variants:
-            pairs = [
-                Pair(
-                    stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, fault, variant)),
-                    ALL,
-                    tuple(own),
-                )
-                for stream, own in zip(streams, clean, strict=True)
-            ]
-            if all(pair.with_it.sound for pair in pairs):
-                tried.append((fit_sizes(pairs, variant), fault, variant, pairs))
+        tried = [found for variant in fault.variants if (found := _try_variant(bare, streams, fault, variant))]
         if tried:
-            best.append(min(tried, key=lambda each: each[0].error))
+            best.append(_approach(min(tried, key=_error_of), bare, streams))
     else:
         complete = True
-    best.sort(key=lambda each: each[0].error)
+    best.sort(key=_error_of)
     weighed = sorted(
         (_judge_fault(streams, found, plain, samples) for found in best), key=lambda each: float(each.errors.sum())
     )
-    held = sum(held_out_error(kept, np.zeros(0), block) for block, kept in enumerate(_leave_out_blocks(bare)))
+    apart = zip(SIXTHS, _leave_out_blocks(bare), strict=True)
+    held = sum(held_out_error(kept, np.zeros(0), out) for out, kept in apart)
     usual = [max(_excesses_within_a_set(each)) for each in (clean, [pair.with_it.blocks for pair in bare])]
     return Comparison(tuple(weighed), plain.errors, samples, own, held, 0.0, max(usual), usual[0], True, 0.0, complete)
+
+
+def _try_variant(bare: Sequence[Pair], streams: Sequence[Stream], fault: Fault, variant: Variant) -> Tried | None:
+    """None where undoing the fault is ill-conditioned. bare: the pairs with nothing undone."""
+    pairs = [
+        replace(pair, with_it=stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, fault, variant)))
+        for stream, pair in zip(streams, bare, strict=True)
+    ]
+    return (fit_sizes(pairs, variant), fault, variant, pairs) if all(pair.with_it.sound for pair in pairs) else None
+
+
+def _error_of(tried: Tried) -> float:
+    return tried[0].error
+
+
+def _approach(found: Tried, bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
+    """The fault undone about the size that was found, again and again: beside it, the change was only extrapolated."""
+    for _ in range(TURNS):
+        fit, fault, variant, _ = found
+        if variant.about is None or abs(float(fit.sizes[0]) - 1) < NEAR:
+            break
+        again = _try_variant(bare, streams, fault, variant.about(float(fit.sizes[0])))
+        if again is None or _error_of(again) >= _error_of(found):
+            break
+        found = again
+    return found
 
 
 def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
@@ -196,17 +221,13 @@ def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
         yield together / max(apart, 1e-300) - 1
 
 
-def _judge_fault(
-    streams: Sequence[Stream], found: tuple[Fit, Fault, Variant, list[Pair]], plain: Fit, samples: int
-) -> JudgedFault:
+def _judge_fault(streams: Sequence[Stream], found: Tried, plain: Fit, samples: int) -> JudgedFault:
     fit, fault, variant, pairs = found
     values = variant.values(fit.sizes)
     apart = _leave_out_blocks(pairs)
     fits = [fit_sizes(kept, variant) for kept in apart]
     sides = [[variant.values(fit.sizes) for fit in fits], _values_without_clean_blocks(pairs, variant)]
-    held = sum(
-        held_out_error(kept, each.sizes, block) for block, (kept, each) in enumerate(zip(apart, fits, strict=True))
-    )
+    held = sum(held_out_error(kept, each.sizes, out) for out, kept, each in zip(SIXTHS, apart, fits, strict=True))
     spread = {name: float(np.sqrt(sum(_jackknife_variance([other[name] for other in side]) for side in sides)))
               for name in values}  # fmt: skip
     gains = (
@@ -227,9 +248,10 @@ def _judge_fault(
 
 
 def _values_without_clean_blocks(pairs: Sequence[Pair], variant: Variant) -> list[dict[str, float]]:
-    """The fault's values, with each block of the clean set left out in turn."""
+    """The fault's values, with each sixth of the clean set left out in turn."""
     kept = [
-        [replace(pair, without=(*pair.without[:block], *pair.without[block + 1 :])) for pair in pairs] for block in ALL
+        [replace(pair, without=(*pair.without[: out[0]], *pair.without[out[-1] + 1 :])) for pair in pairs]
+        for out in SIXTHS
     ]
     return [variant.values(fit_sizes(each, variant).sizes) for each in kept]
 
@@ -240,8 +262,8 @@ def _jackknife_variance(values: Sequence[float]) -> float:
 
 
 def _leave_out_blocks(pairs: Sequence[Pair]) -> list[list[Pair]]:
-    """The pairs with each block of the faulty set left out in turn."""
-    return [[replace(pair, at=tuple(other for other in ALL if other != block)) for pair in pairs] for block in ALL]
+    """The pairs with each sixth of the faulty set left out in turn."""
+    return [[replace(pair, at=tuple(block for block in ALL if block not in out)) for pair in pairs] for out in SIXTHS]
 
 
 def _gains_within_a_set(

@@ -7,8 +7,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from analysis.diagnosis.balance.judged_law import DRAWS, LEVEL, bootstrap_draws
-from analysis.diagnosis.contrast.compare import LEAST, Comparison, JudgedFault
-from analysis.diagnosis.contrast.stream import FOLDS
+from analysis.diagnosis.contrast.compare import FOLDS, LEAST, Comparison, JudgedFault
 
 BEYOND = 5.0
 """Times the largest gain between stretches of one set that a fault must gain. By hand: of six public
@@ -55,13 +54,19 @@ def decide(found: Comparison, responses: int) -> Decision:
     best = _choose_plainest(sure, found)
     rivals = [law for law in sure if law is not best]
     told_apart_from = [rival for rival in rivals if not _refines(rival, best)]
-    alike = tuple(rival for rival in told_apart_from if _is_inseparable(best, rival, found))
+    inseparable = [rival for rival in told_apart_from if _is_inseparable(best, rival, found)]
+    unsure = [law for law, why in reasons if why and law.gain >= LEAST and not _refines(law, best)]
+    inseparable += [law for law in rivals if _refines(law, best) and _is_sure_to_leave_less(law, best)]
+    alike = (*inseparable, *_unsure_but_as_good(unsure, best, found)[: max(MOST_ALIKE - 1 - len(inseparable), 0)])
+    ahead = [law for law in unsure if law.gain_low > 0 and _behind(law, best) < -_least(best, found)]
     same = SAME.get(best.fault.effect, ()) if responses == 1 or best.fault.effect == "force_offset" else ()
     names = tuple(name for name in dict.fromkeys((*(rival.fault.effect for rival in alike), *same))
                   if name != best.fault.effect)  # fmt: skip
     elsewhere = [rival.fault.axis for rival in alike if rival.fault.effect == best.fault.effect]
     why_not = ""
-    if best.share < MAIN:
+    if ahead:
+        why_not = f"{ahead[0].fault.effect} explains more, and is not sure itself"
+    elif best.share < MAIN:
         why_not = f"it explains {100 * best.share:.0f} % of what sets these recordings apart: the main part is another"
     elif len(names) >= MOST_ALIKE:
         why_not = "these data cannot tell it from " + ", ".join(names)
@@ -70,8 +75,17 @@ def decide(found: Comparison, responses: int) -> Decision:
     behind = tuple((rival, "another explains more of what sets these recordings apart") for rival in rivals)
     if why_not:
         return Decision(None, (), 0.0, ((best, why_not), *behind, *others))
-    left = tuple(item for item in behind if item[0] not in alike)
-    return Decision(best, names, _probability_of_best(best, told_apart_from), (*left, *others))
+    left = tuple(item for item in (*behind, *others) if item[0] not in alike)
+    return Decision(best, names, _probability_of_best(best, told_apart_from), left)
+
+
+def _unsure_but_as_good(unsure: Sequence[JudgedFault], best: JudgedFault, found: Comparison) -> list[JudgedFault]:
+    """Faults that are not sure by themselves and leave as much as the best, which is: what is there may be either."""
+    return [
+        law
+        for law in unsure
+        if law.fault.effect != best.fault.effect and abs(_behind(law, best)) <= _least(best, found)
+    ]
 
 
 def _refines(other: JudgedFault, best: JudgedFault) -> bool:
@@ -112,9 +126,24 @@ def _distance_from_none(weighed: JudgedFault, name: str) -> float:
 def _is_inseparable(best: JudgedFault, other: JudgedFault, found: Comparison) -> bool:
     behind = other.errors - best.errors
     drawn = bootstrap_draws(len(behind))
+    return bool(behind.sum() <= _least(best, found) or np.quantile(behind[drawn].sum(axis=1), LEVEL) <= 0)
+
+
+def _is_sure_to_leave_less(finer: JudgedFault, best: JudgedFault) -> bool:
+    """Whether a fault that holds the best as a special case leaves less, beyond what resampled blocks vary."""
+    ahead = best.errors - finer.errors
+    return bool(np.quantile(ahead[bootstrap_draws(len(ahead))].sum(axis=1), LEVEL) > 0)
+
+
+def _behind(other: JudgedFault, best: JudgedFault) -> float:
+    """What another leaves beyond what the best leaves."""
+    return float((other.errors - best.errors).sum())
+
+
+def _least(best: JudgedFault, found: Comparison) -> float:
+    """What a rival must leave beyond the best to be told from it."""
     left = float(best.errors.sum())
-    least = min(ALMOST * (float(found.plain.sum()) - left), WORSE * left)
-    return bool(behind.sum() <= least or np.quantile(behind[drawn].sum(axis=1), LEVEL) <= 0)
+    return min(ALMOST * (float(found.plain.sum()) - left), WORSE * left)
 
 
 def _probability_of_best(best: JudgedFault, rivals: Sequence[JudgedFault]) -> float:

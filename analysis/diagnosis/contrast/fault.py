@@ -12,8 +12,8 @@ from equalizer.signals.signal import FloatArray
 Undo = Callable[[Part], Part]
 
 
-ColumnChange = Callable[[FloatArray, float], FloatArray]
-"""Maps columns (n, k) that predict a command, at a rate in Hz, to those that predict the faulty command."""
+ColumnChange = Callable[[FloatArray, float, Part], FloatArray]
+"""Maps columns (n, k) of a part that predict a command, at a rate in Hz, to those that predict the faulty command."""
 
 
 Unit = Callable[[int], float]
@@ -41,6 +41,8 @@ class Variant:
     column_change: ColumnChange | None = None
     """How the predicted command changes with the fault, where that is known. Undoing a gain or a lag in the recorded
     command instead would make errors smaller that the fault did not cause."""
+    about: Callable[[float], "Variant"] | None = None
+    """The fault about another size, where undoing it is not linear: that size is its size 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -163,11 +163,11 @@ def _errors(pair: Pair, sizes: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(np.concatenate([with_it, np.array(without)]), 0.0))
 
 
-def held_out_error(pairs: Sequence[Pair], sizes: FloatArray, block: int) -> float:
-    """Sum of squares of a block that was left out, with sizes and base weights of the others."""
+def held_out_error(pairs: Sequence[Pair], sizes: FloatArray, out: Sequence[int]) -> float:
+    """Sum of squares of blocks that were left out, with sizes and base weights of the others."""
     found = 0.0
     for pair in pairs:
         _, spread, joined = _joint_products(pair, sizes)
         at = spread.T @ weights_of(joined)
-        found += max(float(at @ pair.with_it.blocks[block] @ at), 0.0)
+        found += max(float(at @ pair.with_it.part(out) @ at), 0.0)
     return found

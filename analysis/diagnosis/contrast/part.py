@@ -32,6 +32,15 @@ class Part:
     """(n, d)"""
     known: Mask
     """(n,)"""
+    start: int
+    """Its first sample in the file: what drifts or counts time does so between the parts, too."""
+    whole: int
+    """Samples of the file."""
+
+    @property
+    def course(self) -> FloatArray:
+        """(n,): share of the file's time that has passed."""
+        return np.linspace(self.start, self.start + len(self.known) - 1, len(self.known)) / max(self.whole - 1, 1)
 
     @property
     def rate_hz(self) -> float:
@@ -54,15 +63,11 @@ def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
     found: list[Part] = []
     for recording in recordings:
         for start, stop in parts_of(recording):
-            part = _trim(part_of(recording, max(start, len(recording) - MOST_SAMPLES), stop))
-            if part is not None and len(part) >= LEAST_SAMPLES:
-                found.append(_fill_part(part))
+            begin = max(start, len(recording) - MOST_SAMPLES)
+            known = np.flatnonzero(_finite_samples(part_of(recording, begin, stop)))
+            if len(known) and known[-1] - known[0] + 1 >= LEAST_SAMPLES:
+                found.append(_fill_part(recording, begin + int(known[0]), begin + int(known[-1]) + 1))
     return tuple(found)
-
-
-def _trim(part: Recording) -> Recording | None:
-    known = np.flatnonzero(_finite_samples(part))
-    return part_of(part, int(known[0]), int(known[-1]) + 1) if len(known) else None
 
 
 def _finite_samples(part: Recording) -> Mask:
@@ -70,10 +75,17 @@ def _finite_samples(part: Recording) -> Mask:
     return np.asarray(np.isfinite(np.hstack(signals)).all(axis=1), dtype=np.bool_)
 
 
-def _fill_part(part: Recording) -> Part:
+def _fill_part(recording: Recording, start: int, stop: int) -> Part:
+    part = part_of(recording, start, stop)
     position = None if part.position is None else fill_gaps(part.position.samples)
     return Part(
-        part, fill_gaps(part.command.samples), fill_gaps(part.response.samples), position, _finite_samples(part)
+        part,
+        fill_gaps(part.command.samples),
+        fill_gaps(part.response.samples),
+        position,
+        _finite_samples(part),
+        start,
+        len(recording),
     )
 
 

@@ -11,6 +11,7 @@ from analysis.diagnosis.contrast.actuator_faults import (
     BEGUN,
     GRID,
     delays_to_try,
+    drift_course,
     median_frequency_hz,
     resample,
     shift_samples,
@@ -33,6 +34,12 @@ PLAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 """Gaps before the sensor, over the channel's rms."""
 TURNED = 0.05
 """Share of a gap by which a reading must go back to count as a reversal."""
+LATE = (*np.geomspace(0.004, 0.2, GRID // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
+"""How late a clock may be at the end of the file, in periods: beyond the first ones, closer than half a period."""
+HUM = 0.03
+"""Amplitude over the channel's rms for which a hum's change is measured: small, for bases that are not linear."""
+MAINS_HZ, OFF_HZ = (50.0, 60.0), 0.1
+"""Frequencies of the mains, and by how much they, or a logger's clock, are off at most."""
 FASTEST = 0.05
 """Relative rate error of a clock at most."""
 IN_UNITS = ("sensor_offset", "sensor_drift")
@@ -67,6 +74,7 @@ def sensor_faults(number: int, name: str, parts: Sequence[Part]) -> Iterator[Fau
     channel = _Channel((number,), name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
     longest = max(parts, key=lambda part: len(part.response))
     yield from _common_faults(channel, longest, longest.response[:, number])
+    yield channel.fault("mains_hum", [_hum(channel, hz) for hz in _mains_frequencies_hz(longest)])
     shares = [side * share for share in BENT for side in (1.0, -1.0)]
     yield channel.fault("sensor_nonlinearity", [_nonlinearity(channel, share, 3, "cubic") for share in shares])
     yield channel.fault("sensor_asymmetry", [_nonlinearity(channel, share, 2, "square") for share in shares])
@@ -100,10 +108,10 @@ def _common_faults(channel: _Channel, longest: Part, course: FloatArray) -> Iter
     yield replace(channel.fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
     yield channel.fault("logger_offset", [_logger_offset(channel, time_s) for time_s in times])
     yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz) for time_s in times])
-    seconds = len(longest.response) / longest.rate_hz
-    least = 0.02 / median_frequency_hz(course, longest.rate_hz) / seconds
-    rates = [side * float(rate) for rate in least * np.geomspace(0.2, 100.0, GRID) for side in (1.0, -1.0)]
-    clocks = [_clock_drift(channel, rate) for rate in rates if abs(rate) < FASTEST]
+    period = longest.rate_hz / median_frequency_hz(course, longest.rate_hz)
+    rates = [side * late * period / longest.whole for late in LATE for side in (1.0, -1.0)]
+    runs_on = (True, False) if longest.start > 0 else (True,)
+    clocks = [_clock_drift(channel, rate, on) for rate in rates if abs(rate) < FASTEST for on in runs_on]
     yield replace(channel.fault("clock_drift", clocks), varies=True)
 
 
@@ -140,7 +148,9 @@ def _cross_axis_sensitivity(channel: _Channel, other: int) -> Fault:
 
 def _gain(channel: _Channel, gain: float) -> Variant:
     undo = channel.of(lambda y, rate: y / gain)
-    return Variant((undo,), lambda s: {"gain": 1 / (1 + float(s[0]) * (1 / gain - 1))}, *AROUND, lambda step: gain)
+    of_size: Callable[[float], float] = lambda size: 1 / (1 + size * (1 / gain - 1))  # noqa: E731
+    about = lambda size: _gain(channel, of_size(size))  # noqa: E731
+    return Variant((undo,), lambda s: {"gain": of_size(float(s[0]))}, *AROUND, lambda step: gain, about=about)
 
 
 def _offset(channel: _Channel, shift: float) -> Variant:
@@ -148,16 +158,22 @@ def _offset(channel: _Channel, shift: float) -> Variant:
 
 
 def _drift(channel: _Channel, total: float, begun: float) -> Variant:
-    undo = channel.of(lambda y, rate: y - total * np.linspace(begun, 1.0, len(y)))
+    def undo(part: Part) -> Part:
+        response = part.response.copy()
+        response[:, list(channel.numbers)] -= total * drift_course(part, begun)[:, None]
+        return replace(part, response=response)
+
     return Variant((undo,), proportional_number("total", total), *WIDELY)
 
 
 def _logger_offset(channel: _Channel, time_s: float) -> Variant:
-    return Variant(
-        (channel.of(lambda y, rate: shift_samples(y[:, None], -time_s * rate)[:, 0]),),
-        proportional_number("offset", time_s),
-        *AROUND,
-    )
+    def undo(part: Part) -> Part:
+        late = time_s * part.rate_hz
+        undone = channel.of(lambda y, rate: shift_samples(y[:, None], -late)[:, 0])(part)
+        return replace(undone, known=part.known & (np.arange(len(part.known)) < len(part.known) - late))
+
+    about = lambda size: _logger_offset(channel, size * time_s)  # noqa: E731
+    return Variant((undo,), proportional_number("offset", time_s), *AROUND, about=about)
 
 
 def _lag(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
@@ -165,7 +181,8 @@ def _lag(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
     kept = float(np.exp(-1 / (time_s * rate_hz)))
     undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1], y[:-1]])) / (1 - kept))
     numbers: Numbers = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
-    return Variant((undo,), numbers, *AROUND, lambda step: _mean_gain(kept, step))
+    about = lambda size: _lag(channel, size * time_s, rate_hz)  # noqa: E731
+    return Variant((undo,), numbers, *AROUND, lambda step: _mean_gain(kept, step), about=about)
 
 
 def _mean_gain(kept: float, step: int) -> float:
@@ -178,7 +195,8 @@ def _mean_gain(kept: float, step: int) -> float:
 def _nonlinearity(channel: _Channel, share: float, power: int, number: str) -> Variant:
     top = channel.top
     undo = channel.of(lambda y, rate: _invert_power_law(y / top, share, power) * top)
-    return Variant((undo,), proportional_number(number, share / top ** (power - 1)), *WIDELY)
+    about = lambda size: _nonlinearity(channel, size * share, power, number)  # noqa: E731
+    return Variant((undo,), proportional_number(number, share / top ** (power - 1)), *WIDELY, about=about)
 
 
 def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
@@ -190,10 +208,42 @@ def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
     return np.asarray(np.clip(x, -3.0, 3.0))
 
 
-def _clock_drift(channel: _Channel, late: float) -> Variant:
-    """Readings taken at t (1 + late), resampled to t."""
-    undo = channel.of(lambda y, rate: resample(y, np.arange(len(y)) / (1 + late)))
-    return Variant((undo,), proportional_number("ppm", 1e6 * late), *AROUND)
+def _clock_drift(channel: _Channel, late: float, runs_on: bool) -> Variant:
+    """Readings taken at t (1 + late), resampled to t. runs_on: t counts from the begin of the file, else of each
+    part."""
+
+    def undo(part: Part) -> Part:
+        before = part.start if runs_on else 0
+        at = (before + np.arange(len(part.response))) / (1 + late) - before
+        undone = channel.of(lambda y, rate: resample(y, at))(part)
+        return replace(undone, known=part.known & (at >= 0) & (at <= len(at) - 1))
+
+    about = lambda size: _clock_drift(channel, size * late, runs_on)  # noqa: E731
+    return Variant((undo,), proportional_number("ppm", 1e6 * late), *AROUND, about=about)
+
+
+def _mains_frequencies_hz(longest: Part) -> list[float]:
+    """Frequencies to try: half a line of the file's spectrum apart, about those of the mains that were sampled."""
+    line_hz = longest.rate_hz / longest.whole
+    near = np.arange(-OFF_HZ, OFF_HZ + 0.25 * line_hz, max(0.5 * line_hz, OFF_HZ / 8)) if line_hz < OFF_HZ else [0.0]
+    return [mains + float(off) for mains in MAINS_HZ if 2.5 * mains <= longest.rate_hz for off in near]
+
+
+def _hum(channel: _Channel, frequency_hz: float) -> Variant:
+    """A sine and a cosine, whose phase runs on through the file."""
+    unit = HUM * channel.rms
+
+    def of(wave: Callable[[FloatArray], FloatArray]) -> Undo:
+        def undo(part: Part) -> Part:
+            response = part.response.copy()
+            time_s = (part.start + np.arange(len(response))) / part.rate_hz
+            response[:, list(channel.numbers)] -= unit * wave(2 * np.pi * frequency_hz * time_s)[:, None]
+            return replace(part, response=response)
+
+        return undo
+
+    numbers: Numbers = lambda s: {"amplitude": unit * float(np.hypot(*s)), "frequency": frequency_hz}  # noqa: E731
+    return Variant((of(np.sin), of(np.cos)), numbers)
 
 
 ROTATIONS = (

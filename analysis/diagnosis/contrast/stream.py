@@ -18,8 +18,9 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 Base = ForceBase | AutoregressiveBase | SensorBase
-FOLDS = 6
-"""Blocks of each set."""
+BLOCKS = 24
+"""Blocks of each set: a fault that acts in a small part of a recording, such as a stop that is hit twice, must be in
+several of them, or most resampled blocks would lack it."""
 MEMORY = 8
 """Order of the autoregressive model that whitens the errors."""
 
@@ -34,10 +35,21 @@ class Side:
     masks: tuple[Mask, ...]
     scale: float
     """Rms of the whitened error of a base fitted to this set alone."""
+    white: FloatArray
+    """(valid samples, 1 + columns): the rows, whitened and scaled."""
 
     @property
     def count(self) -> int:
         return sum(int(mask.sum()) for mask in self.masks)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Undone:
+    """Rows with a fault of size 1 undone."""
+
+    rows: tuple[FloatArray, ...]
+    lost: tuple[Mask, ...] | None = None
+    """Rows of which undoing leaves nothing known: readings that were taken before the part began, for instance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,21 +64,29 @@ class Stream:
     columns: FloatArray
     """(1 + columns,): rms of each."""
 
-    def grams(self, side: Side, changed: Sequence[Sequence[FloatArray]]) -> "Grams":
+    def grams(self, side: Side, changed: Sequence[Undone]) -> Grams:
         """Products of a side's rows and of their changes by undone faults; see `Grams`."""
-        moved = [_changed_columns(each, side.rows) for each in changed]
-        wide = [
-            np.hstack([part, *(each[number][:, at] - part[:, at] for each, at in zip(changed, moved, strict=True))])
-            for number, part in enumerate(side.rows)
-        ]
-        scale = np.concatenate([self.columns, *(self.columns[at] for at in moved)]) * side.scale
-        white = np.concatenate([apply_filter(self.colour, part) for part in wide]) / scale
-        kept = white[np.concatenate(side.masks)]
+        moved = [_changed_columns(each.rows, side.rows) for each in changed]
+        kept = np.hstack([side.white, *(self._changes(side, *each) for each in zip(changed, moved, strict=True))])
         return Grams(
-            np.array([block.T @ block for block in np.array_split(kept, FOLDS)]),
+            np.array([block.T @ block for block in np.array_split(kept, BLOCKS)]),
             tuple(moved),
             len(self.columns),
         )
+
+    def _changes(self, side: Side, undone: Undone, at: Places) -> FloatArray:
+        """(valid samples, k): the changes of the columns `at`, whitened; to 0 where nothing is left."""
+        differences = [part[:, at] - plain[:, at] for part, plain in zip(undone.rows, side.rows, strict=True)]
+        found = _whiten(self.colour, differences, side.masks) / (self.columns[at] * side.scale)
+        if undone.lost is not None:
+            lost = np.concatenate([gone[mask] for gone, mask in zip(undone.lost, side.masks, strict=True)])
+            found[lost] = -side.white[lost][:, at]
+        return np.asarray(found)
+
+
+def _whiten(colour: FloatArray, rows: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
+    """(valid samples, k): rows of all parts through the whitening filter."""
+    return np.concatenate([apply_filter(colour, part)[mask] for part, mask in zip(rows, masks, strict=True)])
 
 
 def apply_filter(steps: FloatArray, samples: FloatArray) -> FloatArray:
@@ -88,10 +108,11 @@ def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Strea
     columns = np.where(columns > 0, columns, 1.0)
     courses = [_residuals(rows[side], masks[side], columns) for side in (0, 1)]
     colour = _whitening_filter([*courses[0], *courses[1]], [*masks[0], *masks[1]])
-    sides = [
-        Side(tuple(parts), rows[side], masks[side], _white_error(rows[side], masks[side], columns, colour))
-        for side, parts in enumerate((clean, other))
-    ]
+    sides = []
+    for parts, own, kept in zip((clean, other), rows, masks, strict=True):
+        white = _whiten(colour, own, kept) / columns
+        scale = _white_error(white)
+        sides.append(Side(tuple(parts), own, kept, scale, white / scale))
     return Stream(base, sides[0], sides[1], colour, columns)
 
 
@@ -101,10 +122,9 @@ def _residuals(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: Float
     return [part @ (weights / columns) * columns[0] for part in rows]
 
 
-def _white_error(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: FloatArray, colour: FloatArray) -> float:
-    """Rms of the whitened error of a base fitted to these rows alone, over the rms of what is predicted."""
-    white = np.vstack([apply_filter(colour, part)[mask] for part, mask in zip(rows, masks, strict=True)])
-    gram = (white / columns).T @ (white / columns) / len(white)
+def _white_error(white: FloatArray) -> float:
+    """Rms error of a base fitted to these whitened rows alone, over the rms of what is predicted."""
+    gram = white.T @ white / len(white)
     weights = weights_of(gram)
     return max(float(np.sqrt(max(float(weights @ gram @ weights), 0.0))), 1e-9)
 
@@ -118,21 +138,35 @@ def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> Fl
     return np.asarray(np.concatenate([[1.0], -np.asarray(solve_toeplitz(power[:-1], power[1:]))]))
 
 
-def rows_with_fault_undone(stream: Stream, side: Side, fault: Fault, variant: Variant) -> list[tuple[FloatArray, ...]]:
+def rows_with_fault_undone(stream: Stream, side: Side, fault: Fault, variant: Variant) -> list[Undone]:
     """Rows with a fault of size 1 undone, one set of rows per size of the variant."""
     found = []
     tells = fault.place == (made := _source_of(stream.base))[0] and fault.site in (made[1], EVERY)
     if tells and variant.column_change is not None and isinstance(stream.base, ForceBase):
         rate_hz = stream.base.rate_hz
-        return [tuple(np.hstack([part[:, :1], variant.column_change(part[:, 1:], rate_hz)]) for part in side.rows)]
+        changed = (
+            variant.column_change(rows[:, 1:], rate_hz, part) for rows, part in zip(side.rows, side.parts, strict=True)
+        )
+        return [Undone(tuple(np.hstack([rows[:, :1], more]) for rows, more in zip(side.rows, changed, strict=True)))]
     for undo in variant.undo:
         undone = tuple(undo(part) for part in side.parts)
         still = all(a.response is b.response for a, b in zip(undone, side.parts, strict=True))
         rows = stream.base.rows(undone, side.rows if still else None)
         unit = variant.unit(_step_of(stream.base)) if tells else 1.0
+        lost = None
+        if any(a.known is not b.known for a, b in zip(undone, side.parts, strict=True)):
+            lost = _lost_rows(stream.base, undone)
+            left = sum(int((mask & ~gone).sum()) for mask, gone in zip(side.masks, lost, strict=True))
+            unit *= float(np.sqrt(side.count / max(left, 1)))  # The others stand for them.
         unit *= _spread_ratio(side, rows) if tells and fault.place == "actuator" else 1.0
-        found.append(rows if unit == 1.0 else tuple(unit * part for part in rows))
+        found.append(Undone(rows if unit == 1.0 else tuple(unit * part for part in rows), lost))
     return found
+
+
+def _lost_rows(base: Base, undone: Sequence[Part]) -> tuple[Mask, ...]:
+    """Rows that what is unknown reaches, also through the filters that differentiate, and that whiten the errors."""
+    reach = np.ones(4 * MEMORY + 1)
+    return tuple(np.convolve(~valid, reach, "same") > 0 for valid in base.valid_samples(undone))
 
 
 def _step_of(base: Base) -> int:

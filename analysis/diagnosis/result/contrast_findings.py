@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.contrast.compare import AS_ONE, Comparison, JudgedFault
 from analysis.diagnosis.contrast.decide import BOUND, Decision
 from analysis.diagnosis.contrast.fault import Fault
-from analysis.diagnosis.contrast.stream import FOLDS
+from analysis.diagnosis.contrast.stream import BLOCKS
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
 from analysis.diagnosis.effect_words import unit_of
 from analysis.diagnosis.reference.compare_with_reference import Contrast
@@ -73,7 +73,7 @@ def _with_comparison(
     candidates = tuple(_candidate(law, why, recording) for law, why in decided.others)
     verdict: Verdict = "partly_explained" if named else "no_mismatch" if found.excess <= AS_ONE else "unexplained"
     fit = Fit(
-        _errors(found, found.plain[:FOLDS].sum(), (found.plain if best is None else best.errors)[:FOLDS].sum()),
+        _errors(found, found.plain[:BLOCKS].sum(), (found.plain if best is None else best.errors)[:BLOCKS].sum()),
         _errors(found, found.held_out, found.held_out if best is None else best.held_out),
     )
     error = "predicted force" if found.by_force else f"windows of {found.step_s:.6f} s"
