@@ -36,10 +36,6 @@ TURNED = 0.05
 """Share of a gap by which a reading must go back to count as a reversal."""
 LATE = (*np.geomspace(0.004, 0.2, GRID // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
 """How late a clock may be at the end of the file, in periods: beyond the first ones, closer than half a period."""
-HUM = 0.03
-"""Amplitude over the channel's rms for which a hum's change is measured: small, for bases that are not linear."""
-MAINS_HZ, OFF_HZ = (50.0, 60.0), 0.1
-"""Frequencies of the mains, and by how much they, or a logger's clock, are off at most."""
 FASTEST = 0.05
 """Relative rate error of a clock at most."""
 IN_UNITS = ("sensor_offset", "sensor_drift")
@@ -74,7 +70,6 @@ def sensor_faults(number: int, name: str, parts: Sequence[Part]) -> Iterator[Fau
     channel = _Channel((number,), name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
     longest = max(parts, key=lambda part: len(part.response))
     yield from _common_faults(channel, longest, longest.response[:, number])
-    yield channel.fault("mains_hum", [_hum(channel, hz) for hz in _mains_frequencies_hz(longest)])
     shares = [side * share for share in BENT for side in (1.0, -1.0)]
     yield channel.fault("sensor_nonlinearity", [_nonlinearity(channel, share, 3, "cubic") for share in shares])
     yield channel.fault("sensor_asymmetry", [_nonlinearity(channel, share, 2, "square") for share in shares])
@@ -220,30 +215,6 @@ def _clock_drift(channel: _Channel, late: float, runs_on: bool) -> Variant:
 
     about = lambda size: _clock_drift(channel, size * late, runs_on)  # noqa: E731
     return Variant((undo,), proportional_number("ppm", 1e6 * late), *AROUND, about=about)
-
-
-def _mains_frequencies_hz(longest: Part) -> list[float]:
-    """Frequencies to try: half a line of the file's spectrum apart, about those of the mains that were sampled."""
-    line_hz = longest.rate_hz / longest.whole
-    near = np.arange(-OFF_HZ, OFF_HZ + 0.25 * line_hz, max(0.5 * line_hz, OFF_HZ / 8)) if line_hz < OFF_HZ else [0.0]
-    return [mains + float(off) for mains in MAINS_HZ if 2.5 * mains <= longest.rate_hz for off in near]
-
-
-def _hum(channel: _Channel, frequency_hz: float) -> Variant:
-    """A sine and a cosine, whose phase runs on through the file."""
-    unit = HUM * channel.rms
-
-    def of(wave: Callable[[FloatArray], FloatArray]) -> Undo:
-        def undo(part: Part) -> Part:
-            response = part.response.copy()
-            time_s = (part.start + np.arange(len(response))) / part.rate_hz
-            response[:, list(channel.numbers)] -= unit * wave(2 * np.pi * frequency_hz * time_s)[:, None]
-            return replace(part, response=response)
-
-        return undo
-
-    numbers: Numbers = lambda s: {"amplitude": unit * float(np.hypot(*s)), "frequency": frequency_hz}  # noqa: E731
-    return Variant((of(np.sin), of(np.cos)), numbers)
 
 
 ROTATIONS = (

@@ -1,0 +1,59 @@
+"""What the ends of parts weigh, and which faults make a class."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.contrast.bases import bases_of
+from analysis.diagnosis.contrast.decide import decide
+from analysis.diagnosis.contrast.part import split_into_parts
+from analysis.diagnosis.contrast.stream import REACH, Stream, Undone, stream_of
+
+
+@pytest.fixture(scope="module")
+def stream(rig) -> Stream:
+    clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
+    return stream_of(bases_of(clean, other)[0][0], clean, other)
+
+
+def test_the_ends_of_a_part_and_what_lies_beside_a_gap_do_not_count(rig):
+    clean = split_into_parts([rig.recording(1)])
+    gap = np.arange(rig.COUNT) == 2500
+    with_gap = replace(clean[0], known=clean[0].known & ~gap)
+    (mask,) = stream_of(bases_of(clean, ())[0][0], (with_gap,), clean).clean.masks
+    assert len(mask) == rig.COUNT
+    assert not mask[:REACH].any() and not mask[-REACH:].any()
+    assert not mask[2500 - REACH : 2501 + REACH].any()
+    assert mask[2500 - 2 * REACH] and mask[2500 + 2 * REACH]
+
+
+def test_what_undoing_a_fault_loses_stays_as_it_was(stream):
+    rows = tuple(np.zeros_like(part) for part in stream.other.rows)
+    half = tuple(np.arange(len(part)) < len(part) // 2 for part in rows)
+    blocks = stream.grams(stream.other, [Undone(rows, half)]).undo_sizes(np.ones(1))
+    plain = stream.grams(stream.other, []).blocks
+    assert np.allclose(blocks[:8], plain[:8])
+    assert np.abs(blocks[-8:]).max() < 1e-3 * np.abs(plain[-8:]).max()
+
+
+@pytest.mark.parametrize(("times", "belongs"), [((0.99, 0.99), True), ((0.85, 1.15), False)])
+def test_a_law_that_holds_the_named_one_is_of_its_class_where_it_leaves_less_everywhere(rig, times, belongs):
+    found = rig.contrast("coulomb_friction", 0.6).comparison
+    assert found is not None
+    best = decide(found, 1).named
+    assert best is not None and best.fault.effect == "coulomb_friction"
+    fault = replace(best.fault, effect="asymmetric_friction", simpler=("coulomb_friction",))
+    finer = replace(best, fault=fault, errors=best.errors * np.resize(times, len(best.errors)))
+    answer = decide(replace(found, faults=(finer, best)), 1)
+    assert answer.named is best
+    assert ("asymmetric_friction" in answer.alike) == belongs
+
+
+def test_what_is_as_good_but_not_sure_itself_is_of_the_class(rig):
+    found = rig.contrast("coulomb_friction", 0.6).comparison
+    assert found is not None
+    best = decide(found, 1).named
+    assert best is not None
+    other = replace(best, fault=replace(best.fault, effect="cogging"), gain_low=-0.1, errors=1.001 * best.errors)
+    assert "cogging" in decide(replace(found, faults=(best, other)), 1).alike
