@@ -110,8 +110,9 @@ class Comparison:
         return self.excess > max(AS_ONE, FURTHER * self.usual)
 
     def differ_but_for(self, fault: JudgedFault) -> bool:
-        """The same with the fault undone in the faulty set: one that comes and goes sets its stretches apart, too."""
-        return self.excess > max(AS_ONE, FURTHER * max(self.usual_clean, fault.apart))
+        """The same with the fault undone in the faulty set: one that comes and goes sets its stretches apart, too. And
+        one that no base takes up makes all of that set's errors larger, so that it shows in its gain alone."""
+        return max(self.excess, fault.gain) > max(AS_ONE, FURTHER * max(self.usual_clean, fault.apart))
 
 
 def compare(

@@ -84,7 +84,7 @@ def _unsure_but_as_good(unsure: Sequence[JudgedFault], best: JudgedFault, found:
     return [
         law
         for law in unsure
-        if law.fault.effect != best.fault.effect and abs(_behind(law, best)) <= _least(best, found)
+        if law.fault.effect != best.fault.effect and law.gain_low > 0 and abs(_behind(law, best)) <= _least(best, found)
     ]
 
 

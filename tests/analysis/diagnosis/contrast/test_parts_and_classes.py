@@ -55,5 +55,24 @@ def test_what_is_as_good_but_not_sure_itself_is_of_the_class(rig):
     assert found is not None
     best = decide(found, 1).named
     assert best is not None
-    other = replace(best, fault=replace(best.fault, effect="cogging"), gain_low=-0.1, errors=1.001 * best.errors)
-    assert "cogging" in decide(replace(found, faults=(best, other)), 1).alike
+    none = {name: 0.0 for name in best.values}
+    for low, belongs in ((0.05, True), (-0.05, False)):
+        other = replace(
+            best,
+            fault=replace(best.fault, effect="cogging"),
+            values=none,
+            gain_low=low,
+            errors=1.001 * best.errors,
+        )
+        assert ("cogging" in decide(replace(found, faults=(best, other)), 1).alike) == belongs
+
+
+def test_a_fault_that_makes_all_errors_of_its_set_larger_shows_in_its_gain(rig):
+    found = rig.contrast("coulomb_friction", 0.6).comparison
+    assert found is not None
+    best = found.faults[0]
+    assert best.gain > 0.2 > 1.6 * best.apart
+    swallowed = replace(found, samples=int(found.plain.sum()))
+    assert not swallowed.differ
+    assert swallowed.differ_but_for(best)
+    assert not swallowed.differ_but_for(replace(best, gain=0.01))
