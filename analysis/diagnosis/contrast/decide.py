@@ -104,10 +104,10 @@ def _choose_plainest(sure: Sequence[JudgedFault], found: Comparison) -> JudgedFa
 
 def _why_not(weighed: JudgedFault, differ: bool) -> str:
     """differ: whether the sets do by more than stretches of one. Where they do not, a fault must gain in all blocks
-    alike."""
+    alike, which what changes in the course of a recording does not."""
     if weighed.gain < LEAST or weighed.gain_low <= 0:
         return "its gain is not larger than what varies between stretches"
-    steady = weighed.gain_low >= STEADY * weighed.gain
+    steady = weighed.gain_low >= STEADY * weighed.gain and not weighed.fault.varies
     if not differ and not steady:
         return "stretches of one set differ as much as the sets do"
     if weighed.gain <= BEYOND * weighed.usual:

@@ -76,3 +76,13 @@ def test_a_fault_that_makes_all_errors_of_its_set_larger_shows_in_its_gain(rig):
     assert not swallowed.differ
     assert swallowed.differ_but_for(best)
     assert not swallowed.differ_but_for(replace(best, gain=0.01))
+
+
+@pytest.mark.parametrize(("varies", "named"), [(False, True), (True, False)])
+def test_what_changes_in_the_course_of_a_recording_does_not_count_for_gaining_everywhere(rig, varies, named):
+    found = rig.contrast("coulomb_friction", 0.6).comparison
+    assert found is not None
+    best = found.faults[0]
+    alike = replace(best, fault=replace(best.fault, varies=varies), apart=10.0, gain_low=0.9 * best.gain)
+    assert not found.differ_but_for(alike)
+    assert (decide(replace(found, faults=(alike,)), 1).named is not None) == named
