@@ -111,8 +111,8 @@ class Comparison:
 
     def differ_but_for(self, fault: JudgedFault) -> bool:
         """The same with the fault undone in the faulty set: one that comes and goes sets its stretches apart, too. And
-        one that no base takes up makes all of that set's errors larger, so that it shows in its gain alone."""
-        return max(self.excess, fault.gain) > max(AS_ONE, FURTHER * max(self.usual_clean, fault.apart))
+        one that no base takes up makes all of that set's errors larger, so that it shows in its sure gain alone."""
+        return max(self.excess, fault.gain_low) > max(AS_ONE, FURTHER * max(self.usual_clean, fault.apart))
 
 
 def compare(
