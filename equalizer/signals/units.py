@@ -4,6 +4,8 @@ import math
 import re
 from dataclasses import dataclass
 
+from equalizer.signals.unit_spellings import nearest_unit, respell
+
 Dimension = tuple[int, ...]
 """Exponents of kg, m, s, A, K, rad. The angle counts, or N m and N m/rad could not be told apart."""
 
@@ -48,7 +50,11 @@ _FIXED: dict[str, Unit] = {
     "%": Unit("1", 1e-2, (0, 0, 0, 0, 0, 0)),
     "kg": Unit("kg", 1.0, (1, 0, 0, 0, 0, 0)),
     "min": Unit("s", 60.0, (0, 0, 1, 0, 0, 0)),
+    "h": Unit("s", 3600.0, (0, 0, 1, 0, 0, 0)),
     "deg": Unit("rad", math.pi / 180, (0, 0, 0, 0, 0, 1)),
+    "mdeg": Unit("rad", math.pi / 180e3, (0, 0, 0, 0, 0, 1)),
+    "arcmin": Unit("rad", math.pi / 10800, (0, 0, 0, 0, 0, 1)),
+    "arcsec": Unit("rad", math.pi / 648000, (0, 0, 0, 0, 0, 1)),
     "rev": Unit("rad", 2 * math.pi, (0, 0, 0, 0, 0, 1)),
     "turn": Unit("rad", 2 * math.pi, (0, 0, 0, 0, 0, 1)),
     "rpm": Unit("rad/s", 2 * math.pi / 60, (0, 0, -1, 0, 0, 1)),
@@ -60,8 +66,12 @@ _FIXED: dict[str, Unit] = {
     "lbf": Unit("N", _POUND_FORCE, _FORCE),
     "ozf": Unit("N", _POUND_FORCE / 16, _FORCE),
     "kgf": Unit("N", 9.80665, _FORCE),
+    "gf": Unit("N", 9.80665e-3, _FORCE),
+    "daN": Unit("N", 10.0, _FORCE),
     "psi": Unit("Pa", _POUND_FORCE / _INCH**2, _PREFIXABLE["Pa"]),
     "bar": Unit("Pa", 1e5, _PREFIXABLE["Pa"]),
+    "mbar": Unit("Pa", 1e2, _PREFIXABLE["Pa"]),
+    "hPa": Unit("Pa", 1e2, _PREFIXABLE["Pa"]),
     "degC": Unit("K", 1.0, _PREFIXABLE["K"], 273.15),
     "degF": Unit("K", 5 / 9, _PREFIXABLE["K"], 459.67 * 5 / 9),
     "Nm": Unit("N m", 1.0, _TORQUE),
@@ -73,8 +83,8 @@ _FIXED: dict[str, Unit] = {
     "count": Unit("1", 1.0, (0,) * 6),
 }
 KNOWN_UNITS = (
-    "deg", "g", "rpm", "rev", "turn", "min", "%", "in", "ft", "lbf", "ozf", "kgf", "lb", "oz", "psi", "bar",
-    "degC", "degF", "Nm", "mNm", "Ncm", "Nmm", "kNm", "counts",
+    "deg", "mdeg", "arcmin", "arcsec", "g", "rpm", "rev", "turn", "min", "h", "%", "in", "ft", "lbf", "ozf", "kgf",
+    "gf", "daN", "lb", "oz", "psi", "bar", "mbar", "hPa", "degC", "degF", "Nm", "mNm", "Ncm", "Nmm", "kNm", "counts",
 )  # fmt: skip
 """Accepted beside SI; `g` is standard gravity, never a gram; `lb` and `oz` are masses, `lbf` and `ozf` forces; `counts`
 are plain numbers of unknown scale."""
@@ -102,7 +112,7 @@ QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
 UNSTATED = "1"
 """Taken where a file states no unit: its numbers stay as they are."""
 
-_NOT_ASCII = {"²": "^2", "³": "^3", "⁻": "^-", "¹": "1", "µ": "u", "μ": "u", "°": "deg", "·": " ", "-": " ", "Ω": "ohm"}
+_SYMBOLS = frozenset(_FIXED) | {prefix + base for prefix in ("", *_PREFIXES) for base in _PREFIXABLE}
 
 
 def parse_unit(text: str) -> Unit:
@@ -128,10 +138,17 @@ def check_quantity(quantity: str, unit: Unit) -> None:
     (unit 1) may be any."""
     fitting = QUANTITY_UNITS.get(quantity)
     if fitting and unit.si not in (*fitting, UNSTATED):
-        hint = "; as a force write lbf, ozf or kgf" if quantity == "force" and unit.si == "kg" else ""
         raise UnknownUnitError(
-            f"the quantity '{quantity}' cannot be in {unit.si}; it is in {' or '.join(fitting)}{hint}"
+            f"the quantity '{quantity}' cannot be in {unit.si}; it is in {' or '.join(fitting)}"
+            f"{force_hint(quantity, unit)}"
         )
+
+
+def force_hint(quantity: str, unit: Unit) -> str:
+    """What to write for a force that is stated as a mass, or in grams; empty for others."""
+    if quantity not in ("force", "torque") or unit.si not in ("kg", "m/s^2"):
+        return ""
+    return "; as a force write lbf, ozf or kgf" if unit.si == "kg" else "; grams as a force are written gf"
 
 
 def quantity_of(si: str) -> str:
@@ -192,20 +209,32 @@ def _unknown_unit_error(text: str, why: str = "") -> UnknownUnitError:
 
 
 def _suggest_unit(text: str) -> str:
+    near = suggest_unit(text)
+    return f" (did you mean '{near}'?)" if near else ""
+
+
+def suggest_unit(text: str) -> str:
+    """The nearest unit for one that is not known; empty where nothing is near."""
     plain = plain_unit(text)
-    return f" (did you mean '{plain}'?)" if plain != text else ""
+    if plain != text:
+        return plain
+    near = nearest_unit(text, _SYMBOLS)
+    return near if near != text and _is_known(near) else ""
 
 
 def plain_unit(text: str) -> str:
-    """In ASCII as it is written here (`m/s^2` for `m/s²`), where that is a unit; else the text itself."""
-    plain = "".join(_NOT_ASCII.get(letter, letter) for letter in text).replace("**", "^").strip()
-    plain = re.sub(r"(?<=[a-zA-Z])(-?[2-9])", r"^\1", plain)
+    """As it is written here (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`), where that is a unit; else the text
+    itself."""
+    plain = respell(text, _SYMBOLS)
+    return plain if plain != text and _is_known(plain) else text
+
+
+def _is_known(text: str) -> bool:
     try:
-        if plain != text:
-            parse_unit(plain)
+        parse_unit(text)
     except UnknownUnitError:
-        return text
-    return plain
+        return False
+    return True
 
 
 _PREFERRED: dict[Dimension, str] = {}

@@ -1,0 +1,107 @@
+"""Other spellings of units, as files of others use them: `RPM`, `m/sec2`, `°/s`, `kgf·cm`, `oz-in`, `A (peak)`.
+
+A spelling is rewritten, never interpreted: what is not listed stays as it is.
+"""
+
+import re
+import unicodedata
+from collections.abc import Collection
+from difflib import get_close_matches
+
+_LETTERS = {
+    "º": "°", "˚": "°", "μ": "u", "µ": "u", "°": "deg", "Ω": "ohm", "·": " ", "•": " ", "∙": " ", "⋅": " ", "×": " ",
+    "*": " ", "−": "-", "–": "-",
+}  # fmt: skip
+_WORDS = {
+    "s": "sec secs sek second seconds",
+    "ms": "msec msecs millisec millisecond milliseconds",
+    "us": "usec usecs microsec microsecond microseconds",
+    "ns": "nsec nanosecond nanoseconds",
+    "min": "mins minute minutes",
+    "h": "hr hrs hour hours",
+    "Hz": "hz hertz",
+    "kHz": "khz",
+    "deg": "degs degree degrees",
+    "rad": "rads radian radians",
+    "rev": "revs revolution revolutions rot",
+    "turn": "turns",
+    "rpm": "revpm upm",
+    "m": "meter meters metre metres",
+    "cm": "centimeter centimeters centimetre centimetres",
+    "mm": "millimeter millimeters millimetre millimetres",
+    "um": "micron microns micrometer micrometers micrometre micrometres",
+    "in": "inch inches",
+    "ft": "foot feet",
+    "N": "newton newtons",
+    "kN": "kilonewton kilonewtons",
+    "lbf": "lbsf",
+    "lb": "lbs",
+    "kgf": "kp",
+    "V": "volt volts",
+    "mV": "millivolt millivolts",
+    "A": "amp amps ampere amperes",
+    "mA": "milliamp milliamps milliampere milliamperes",
+    "ohm": "ohms",
+    "Pa": "pascal pascals",
+    "%": "percent pct",
+    "counts": "cts tick ticks pulse pulses lsb",
+    "degC": "celsius",
+    "degF": "fahrenheit",
+}
+_SPELLED = {word: unit for unit, words in _WORDS.items() for word in words.split()} | {
+    unit.lower(): unit for unit in _WORDS if len(unit) > 2
+}
+_WHOLE = {
+    "dps": "deg/s", "mps": "m/s", "mps2": "m/s^2", "r/min": "rpm", "U/min": "rpm", "deg C": "degC", "deg F": "degF",
+    "deg. C": "degC", "degree C": "degC", "degrees C": "degC", "% RH": "%", "%RH": "%", "%rh": "%",
+    "ozin": "ozf in", "inoz": "ozf in", "lbin": "lbf in", "inlb": "lbf in", "lbft": "lbf ft", "ftlb": "lbf ft",
+    "lbfin": "lbf in", "lbfft": "lbf ft", "ozfin": "ozf in", "kgfcm": "kgf cm", "kgcm": "kgf cm", "gfcm": "gf cm",
+    "gcm": "gf cm", "N_m": "N m",
+}  # fmt: skip
+_TORQUES = {
+    "oz in": "ozf in", "in oz": "ozf in", "lb in": "lbf in", "in lb": "lbf in", "lb ft": "lbf ft", "ft lb": "lbf ft",
+    "kg cm": "kgf cm", "g cm": "gf cm",
+}  # fmt: skip
+"""A weight on a lever: a mass times a length is no signal, and its square (`oz in^2`) is an inertia."""
+_OFTEN_MEANT = {"pound": "lbf", "pounds": "lbf", "gram": "gf", "grams": "gf", "gs": "g", "c": "degC", "f": "degF"}
+"""Suggested only: pounds and grams are masses too."""
+_PEAK = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.IGNORECASE)
+
+
+def respell(text: str, known: Collection[str]) -> str:
+    """In the spelling of this project; `known` are its symbols, which stay as they are."""
+    plain = text.strip()
+    if match := _PEAK.fullmatch(plain):
+        return match["unit"]
+    plain = _in_ascii(unicodedata.normalize("NFKC", _in_ascii(plain.replace("**", "^").replace("⁻", "-"))))
+    plain = re.sub(r"\s*/\s*", "/", plain.strip().rstrip("."))
+    plain = re.sub(r"(?<=[A-Za-z])(-[1-9]|[2-9])(?![A-Za-z0-9])", r"^\1", plain)
+    plain = _WHOLE.get(plain, plain)
+    plain = re.sub(r"(?<=[A-Za-z0-9])[.-](?=[A-Za-z])", " ", plain)
+    plain = re.sub(r"[A-Za-z]+", lambda word: _respell_symbol(word[0], known), plain)
+    return _TORQUES.get(plain, plain)
+
+
+def nearest_unit(text: str, known: Collection[str]) -> str:
+    """The unit with each unknown symbol replaced by the nearest known one; empty where one has none."""
+    plain = respell(text, known)
+    near = {word: _nearest(word, known) for word in re.findall(r"[A-Za-z%]+", plain)}
+    return re.sub(r"[A-Za-z%]+", lambda word: near[word[0]], plain) if all(near.values()) else ""
+
+
+def _in_ascii(text: str) -> str:
+    return "".join(_LETTERS.get(letter, letter) for letter in text)
+
+
+def _respell_symbol(word: str, known: Collection[str]) -> str:
+    """Of two letters the case tells units apart (`mS`, `MM`)."""
+    return word if word in known else _SPELLED.get(word.lower() if len(word) > 2 else word, word)
+
+
+def _nearest(word: str, known: Collection[str]) -> str:
+    if word in known:
+        return word
+    by_size = sorted(known, key=lambda symbol: (len(symbol), symbol.islower()))  # `mm` for `MM`, not `Mm`
+    spelled = {**_SPELLED, **{symbol.lower(): symbol for symbol in by_size}, **_OFTEN_MEANT}
+    close = get_close_matches(word.lower(), spelled, n=1, cutoff=0.75)
+    return spelled[close[0]] if close else ""

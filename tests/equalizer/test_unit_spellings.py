@@ -1,0 +1,53 @@
+"""Spellings of units in files of others: known ones are understood, unknown ones keep their name."""
+
+import pytest
+
+from equalizer.signals.units import KNOWN_UNITS, UnknownUnitError, parse_unit, plain_unit, suggest_unit
+
+
+@pytest.mark.parametrize(
+    ("spelled", "unit"),
+    [
+        ("gf", "gf"), ("RPM", "rpm"), ("Rpm", "rpm"), ("U/min", "rpm"), ("r/min", "rpm"), ("dps", "deg/s"),
+        ("deg/s", "deg/s"), ("°/s", "deg/s"), ("º/s", "deg/s"), ("°/s²", "deg/s^2"), ("degrees/second", "deg/s"),
+        ("rad/sec", "rad/s"), ("rad/sec2", "rad/s^2"), ("rad/sec^2", "rad/s^2"), ("m/sec2", "m/s^2"),
+        ("m/s²", "m/s^2"), ("m/s2", "m/s^2"), ("m/s**2", "m/s^2"), ("m·s⁻²", "m s^-2"), ("m / s", "m/s"),
+        ("m.s-2", "m s^-2"), ("μm", "um"), ("µm", "um"), ("micron", "um"), ("inch", "in"), ("kgf·cm", "kgf cm"),
+        ("kgf.cm", "kgf cm"), ("kgf-cm", "kgf cm"), ("kg-cm", "kgf cm"), ("oz-in", "ozf in"), ("ozf-in", "ozf in"),
+        ("lbf-in", "lbf in"), ("lb-ft", "lbf ft"), ("ft-lb", "lbf ft"), ("N·m", "N m"), ("N⋅m", "N m"),
+        ("N-m", "N m"), ("N.m", "N m"), ("Newtons", "N"), ("lbs", "lb"), ("msec", "ms"), ("Sec", "s"), ("mm/sek", "mm/s"), ("Upm", "rpm"),
+        ("Volts", "V"), ("amps", "A"), ("A (peak)", "A"), ("Arms", "A"), ("° C", "deg C"), ("°C", "degC"),
+        ("㎜", "mm"), ("㎏", "kg"), ("%", "%"),
+    ],
+)  # fmt: skip
+def test_a_spelling_of_others_is_understood(spelled, unit):
+    expected = {"deg C": "degC"}.get(unit, unit)
+    assert plain_unit(spelled) == expected
+    assert parse_unit(plain_unit(spelled)) == parse_unit(expected)
+
+
+@pytest.mark.parametrize("unit", [*KNOWN_UNITS, "N m", "m/s^2", "mN", "MN", "mS", "kg m^2", "oz in^2"])
+def test_what_is_written_here_stays(unit):
+    assert plain_unit(unit) == unit
+
+
+@pytest.mark.parametrize(
+    ("unknown", "near"),
+    [
+        ("MM", "mm"), ("Mpa", "MPa"), ("newt", "N"), ("pound", "lbf"), ("grams", "gf"), ("mm/secnd", "mm/s"),
+        ("furlong", ""), ("a.u.", ""), ("V/N/furlong", ""),
+    ],
+)  # fmt: skip
+def test_an_unknown_unit_is_refused_with_the_nearest_known(unknown, near):
+    assert plain_unit(unknown) == unknown
+    assert suggest_unit(unknown) == near
+    with pytest.raises(UnknownUnitError) as refused:
+        parse_unit(unknown)
+    assert f"'{unknown}' is not a unit known here" in str(refused.value)
+    assert (f"(did you mean '{near}'?)" in str(refused.value)) == bool(near)
+
+
+def test_a_gram_force_is_a_thousandth_of_a_kilopond():
+    assert parse_unit("gf").factor == pytest.approx(parse_unit("kgf").factor / 1000)
+    assert parse_unit(plain_unit("kgf·cm")).factor == pytest.approx(9.80665 / 100)
+    assert parse_unit(plain_unit("oz-in")).factor == pytest.approx(0.0070615518142260)
