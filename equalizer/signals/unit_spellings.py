@@ -101,7 +101,8 @@ def _respell_symbol(word: str, known: Collection[str]) -> str:
 def _nearest(word: str, known: Collection[str]) -> str:
     if word in known:
         return word
-    by_size = sorted(known, key=lambda symbol: (len(symbol), symbol.islower()))  # `mm` for `MM`, not `Mm`
+    by_size = sorted(known, key=lambda symbol: (len(symbol), symbol.islower(), symbol[0] == word[0], symbol))
+    # The last of a spelling counts: `mm` for `MM`, not `Mm`; `MPa` for `Mpa`.
     spelled = {**_SPELLED, **{symbol.lower(): symbol for symbol in by_size}, **_OFTEN_MEANT}
     close = get_close_matches(word.lower(), spelled, n=1, cutoff=0.75)
     return spelled[close[0]] if close else ""

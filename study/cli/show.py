@@ -31,10 +31,13 @@ def show(
 ) -> None:
     """Facts, thresholds, warnings and staircases of a session; verdict, effects and fit of a diagnosis; or channels,
     segments and facts of a recording."""
-    from study.importing.arrays.arrays import ARRAYS, TABLES
+    from study.importing.arrays.arrays import FOREIGN
+    from study.importing.arrays.json_arrays import is_own_document
     from study.store.disk.hdf5_file import is_hdf5
 
-    if Path(what).is_file() and (is_hdf5(Path(what)) or Path(what).suffix.lower() in (*TABLES, *ARRAYS)):
+    path = Path(what)
+    foreign = path.is_file() and path.suffix.lower() in FOREIGN and not is_own_document(path)
+    if foreign or (path.is_file() and is_hdf5(path)):
         _show_recording(Path(what), as_json)
         return
     document = Path(what) / "diagnosis.json" if (Path(what) / "diagnosis.json").is_file() else Path(what)

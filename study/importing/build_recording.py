@@ -15,6 +15,7 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit, quantity_of
 from study.importing.alignment import Logger, align_signals
 from study.importing.arrays.arrays import Arrays, read_arrays
+from study.importing.doubled_rows import without_doubled_rows
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.namespace import of_file
 from study.importing.map_format.import_map import ChannelMap, ComputedMap, ImportMap
@@ -103,16 +104,19 @@ class _Counter:
 def _part(wanted: ImportMap, files: PartFiles, said: ImportNotes, counter: _Counter, budget: Budget) -> _Part:
     read: dict[Path, Arrays] = {}
     loggers = []
+    notes: list[str] = []
     for clock in wanted.clock:
         path = files.by_clock[clock.name]
         read[path] = read.get(path) or read_arrays(path, wanted.csv)
-        names = of_file(read[path], {**wanted.let, **files.part.let}, files.part.prefix, budget)
+        every = of_file(read[path], {**wanted.let, **files.part.let}, files.part.prefix, budget)
+        names, doubled = without_doubled_rows(clock, every)
+        notes += [doubled] if doubled else []
         loggers.append(Logger(clock, names, time_base(clock, names)))
 
     def say(sentence: str) -> None:
         said.add(files.label, sentence)
 
-    for note in dict.fromkeys(note for arrays in read.values() for note in arrays.notes):
+    for note in dict.fromkeys((*(note for arrays in read.values() for note in arrays.notes), *notes)):
         say(note)
     ready = align_signals(tuple(loggers), say)
     signals = part_signals(wanted, files.part, ready, say, counter.step)

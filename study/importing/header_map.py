@@ -5,9 +5,10 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
+from study.importing.arrays.array_groups import groups_in
 from study.importing.arrays.arrays import Arrays
 from study.importing.imposed_roles import IMPOSED, NOT_IMPOSED, turn_imposed
-from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap
+from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap, PartMap
 from study.importing.map_format.signal_words import (
     ParsedName,
     may_be_imposed,
@@ -15,19 +16,25 @@ from study.importing.map_format.signal_words import (
     open_roles,
     plain_names,
     roles_of,
+    unit_at_end,
 )
-from study.importing.surplus_arrays import CLOCK_WORDS, surplus_arrays
+from study.importing.surplus_arrays import CLOCK_WORDS, LEAST_SAMPLES, surplus_arrays
 
-_TIME = re.compile(rf"({'|'.join(sorted(CLOCK_WORDS))})(_?(s|ms|us))?", re.IGNORECASE)
+_TIME = re.compile(
+    rf"((elapsed|running|test|total|relative|absolute|system|sample)[ _]?)?({'|'.join(sorted(CLOCK_WORDS))}|time stamp)"
+    r"(_?(s|ms|us))?",
+    re.IGNORECASE,
+)
 
 
 def header_map(arrays: Arrays) -> ImportMap | None:
     """The map; None if the header does not identify every column, or does not distinguish commands from responses."""
     if header_problems(arrays):
         return None
-    times, rest = _columns(arrays)
+    table, prefixes = _table(arrays)
+    times, rest = _columns(table)
     clock = ClockMap(time=times[0].header, time_unit=times[0].unit)
-    roles = turn_imposed(rest, arrays.by_name, roles_of(rest) or ())
+    roles = turn_imposed(rest, table.by_name, roles_of(rest) or ())
     channels = tuple(
         ChannelMap(
             role=role,
@@ -39,18 +46,41 @@ def header_map(arrays: Arrays) -> ImportMap | None:
         for column, role, name in zip(rest, roles, plain_names(rest), strict=True)
         if role
     )
-    return ImportMap(channel=channels, device="unknown", title=arrays.path.stem, clock=(clock,))
+    parts = tuple(PartMap(prefix=prefix) for prefix in prefixes)
+    return ImportMap(channel=channels, device="unknown", title=arrays.path.stem, clock=(clock,), part=parts)
 
 
-def direction_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
+def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
+    """Sentences about what was taken from the header, what was left out, and what names leave open."""
+    table, _ = _table(arrays)
+    told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
+    left_out = [f"Left out: '{name}' {why}." for name, why in surplus_arrays(table).items()]
+    left_out += [f"Left out: '{name}' is no column." for name, array in arrays.by_name.items() if not array.ndim]
+    return (f"Taken from the header: {told}.", *left_out, *_direction_notes(table, wanted))
+
+
+def _direction_notes(table: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     """A sentence where names leave open whether the force or the motion was commanded."""
-    _, rest = _columns(arrays)
+    _, rest = _columns(table)
     told = {channel.value: channel.role for channel in wanted.channel}
     forces = [told[column.header] for column in rest if column.quantity in ("force", "torque")]
     more_forces = forces.count("command") > list(told.values()).count("response")
     if not may_be_imposed(rest) and not more_forces:
         return ()
     return (f"{IMPOSED if 'response' in forces else NOT_IMPOSED}.",)
+
+
+def _table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
+    """The columns, without single numbers and texts; of several tables that are alike, as sheets of a workbook, those
+    of the first, and the prefix of each."""
+    columns = {name: array for name, array in arrays.by_name.items() if array.ndim}
+    groups = groups_in(columns, LEAST_SAMPLES)
+    members = len(groups.prefixes) * len(groups.names)
+    if members != len(columns) or not all(prefix.endswith("/") for prefix in groups.prefixes):
+        return Arrays(arrays.path, columns, arrays.clocks), ()
+    first = {name: columns[full] for name, full in groups.names.items()}
+    clocks = tuple(name for name, full in groups.names.items() if full in arrays.clocks)
+    return Arrays(arrays.path, first, clocks), groups.prefixes
 
 
 def header_problems(arrays: Arrays) -> tuple[str, ...]:
@@ -61,11 +91,12 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
             f"'{name}' is {array.item()}" for name, array in others if array.dtype.kind == "O" and array.item()
         )
         return (f"it holds no arrays of numbers{f' ({kinds})' if kinds else ''}",)
-    if len({array.shape for array in arrays.by_name.values()}) != 1:
+    table, _ = _table(arrays)
+    if len({array.shape for array in table.by_name.values()}) != 1:
         return ("its arrays have several lengths",)
-    if next(iter(arrays.by_name.values())).ndim != 1:
+    if next(iter(table.by_name.values())).ndim != 1:
         return ("its arrays are no single columns",)
-    times, rest = _columns(arrays)
+    times, rest = _columns(table)
     twice = [name for name, count in Counter(column.name for column in rest).items() if count > 1]
     return (
         *_open_time(times, rest),
@@ -88,7 +119,7 @@ def _columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
 
 
 def _is_time(column: ParsedName) -> bool:
-    return bool(_TIME.fullmatch(column.name))
+    return bool(_TIME.fullmatch(column.name) or _TIME.fullmatch(unit_at_end(column.name)[0]))
 
 
 def _open_time(times: Sequence[ParsedName], rest: Sequence[ParsedName]) -> Iterator[str]:

@@ -1,5 +1,6 @@
 """Arrays that a proposed map leaves out: those without any number, and further columns of the same time."""
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -15,6 +16,10 @@ CLOCK_WORDS = {
     "t", "time", "timestamp", "timestamps", "datetime", "zeit", "zeitstempel", "temps", "tiempo", "tempo",
     "tout", "date",
 }  # fmt: skip
+_INDEX = re.compile(
+    r"column1|#|unnamed: 0|(index|idx|i|n|nr|no|number|row|record|sample|scan|point)[ _.]?(nr|no|number|#)?\.?",
+    re.IGNORECASE,
+)
 _USUAL_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
 _EVEN = 0.02
 SAME_CLOCK = 0.5
@@ -24,7 +29,12 @@ SAME_CLOCK = 0.5
 def surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
     """Why arrays are left out, by name."""
     empty = {name: "holds no numbers at all" for name, array in arrays.by_name.items() if _is_empty(array)}
-    return empty | {name: f"is the same time as '{other}'" for name, other in equal_clocks(arrays).items()}
+    empty |= {
+        name: "holds no numbers" for name, array in arrays.by_name.items() if array.dtype.kind in "SU" and array.ndim
+    }
+    timed = any(name in arrays.clocks or is_growing_time(name, array) for name, array in arrays.by_name.items())
+    numbered = {name: "numbers the rows" for name, array in arrays.by_name.items() if timed and _is_index(name, array)}
+    return empty | numbered | {name: f"is the same time as '{other}'" for name, other in equal_clocks(arrays).items()}
 
 
 @np.errstate(all="ignore")
@@ -46,6 +56,13 @@ def name_words(name: str) -> set[str]:
 
 def _is_empty(array: Array) -> bool:
     return array.dtype.kind == "f" and array.size >= LEAST_SAMPLES and bool(np.isnan(array).all())
+
+
+@np.errstate(all="ignore")
+def _is_index(name: str, array: Array) -> bool:
+    """Whether an array is unnamed or called a number of rows, and counts them."""
+    plain = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
+    return plain and bool(_INDEX.fullmatch(name)) and bool((np.diff(array.astype(float)) == 1).all())
 
 
 def equal_clocks(arrays: Arrays) -> Mapping[str, str]:

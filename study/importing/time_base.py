@@ -141,7 +141,7 @@ def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
         return (
             f"stands still at sample {first}, at {stamps_s[first]:.9g} s; where the sampling was even and only the "
             f"stamps are coarse, state the rate in place of `time` in the map's [[clock]], as in "
-            f"rate_hz = {rate_hz:.4g}"
+            f"rate_hz = {rate_hz:.4g}; where a sample was logged twice with other values, take one of both out"
         )
     ahead = np.flatnonzero(np.abs(steps_s - _HOUR_S) < 10 * float(np.median(steps_s)))
     if len(ahead) == 1 and float(np.median(steps_s)) < _HOUR_S / 1000:

@@ -15,9 +15,9 @@ from equalizer.signals.units import KNOWN_UNITS, UnknownUnitError, parse_unit, p
         ("m.s-2", "m s^-2"), ("μm", "um"), ("µm", "um"), ("micron", "um"), ("inch", "in"), ("kgf·cm", "kgf cm"),
         ("kgf.cm", "kgf cm"), ("kgf-cm", "kgf cm"), ("kg-cm", "kgf cm"), ("oz-in", "ozf in"), ("ozf-in", "ozf in"),
         ("lbf-in", "lbf in"), ("lb-ft", "lbf ft"), ("ft-lb", "lbf ft"), ("N·m", "N m"), ("N⋅m", "N m"),
-        ("N-m", "N m"), ("N.m", "N m"), ("Newtons", "N"), ("lbs", "lb"), ("msec", "ms"), ("Sec", "s"), ("mm/sek", "mm/s"), ("Upm", "rpm"),
+        ("N-m", "N m"), ("N.m", "N m"), ("Newtons", "N"), ("lbs", "lb"), ("msec", "ms"), ("Sec", "s"),
         ("Volts", "V"), ("amps", "A"), ("A (peak)", "A"), ("Arms", "A"), ("° C", "deg C"), ("°C", "degC"),
-        ("㎜", "mm"), ("㎏", "kg"), ("%", "%"),
+        ("㎜", "mm"), ("Upm", "rpm"), ("mm/sek", "mm/s"), ("㎏", "kg"), ("%", "%"),
     ],
 )  # fmt: skip
 def test_a_spelling_of_others_is_understood(spelled, unit):

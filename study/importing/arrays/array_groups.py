@@ -1,5 +1,6 @@
 """Detect several runs in one file by common name prefixes, as in `run1__u, run1__y, run2__u, run2__y`."""
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -30,8 +31,12 @@ def groups_in(arrays: Mapping[str, npt.NDArray[Any]], least: int) -> Groups:
 def _group_arrays(names: Sequence[str], long_ones: Sequence[str], separator: str) -> Groups:
     members: dict[str, list[str]] = {}
     for name in names:
-        before, between, after = name.rpartition(separator) if separator == "/" else name.partition(separator)
-        if before and after and (separator not in _LOOSE or any(letter.isdigit() for letter in before)):
+        before, between, after = _split(name, separator)
+        if (
+            before.strip() == before != ""
+            and after
+            and (separator not in _LOOSE or any(letter.isdigit() for letter in before))
+        ):
             members.setdefault(before + between, []).append(after)
     alike = Counter(tuple(sorted(rest)) for rest in members.values())
     usual, count = alike.most_common(1)[0] if alike else ((), 0)
@@ -43,3 +48,10 @@ def _group_arrays(names: Sequence[str], long_ones: Sequence[str], separator: str
     if count < 2 or len(prefixes) < 2:
         return Groups((), {})
     return Groups(tuple(prefixes), {name: prefixes[0] + name for name in members[prefixes[0]]})
+
+
+def _split(name: str, separator: str) -> tuple[str, str, str]:
+    """At the last stroke, else at the first separator; what stands in brackets is a unit."""
+    plain, bracket, unit = re.match(r"([^\[(]*)([\[(]?)(.*)", name, re.DOTALL).groups()  # type: ignore[union-attr]
+    before, between, after = plain.rpartition(separator) if separator == "/" else plain.partition(separator)
+    return before, between, after + bracket + unit if between else ""

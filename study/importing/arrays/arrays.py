@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from study.importing.arrays.csv_arrays import Table, read_csv_arrays, timed_arrays
+from study.importing.arrays.json_arrays import read_json_arrays
 from study.importing.arrays.mat_arrays import read_mat5_arrays
 from study.importing.arrays.stored_arrays import read_hdf5_arrays, read_npz_arrays
+from study.importing.arrays.workbook_arrays import read_workbook_arrays
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 from study.regular_file import open_regular
@@ -18,9 +20,12 @@ from study.store.disk.file_errors import DAMAGED, CannotReadError, UnusableFileE
 from study.store.disk.hdf5_file import is_hdf5
 
 Array = npt.NDArray[Any]
-KINDS = ".csv, .txt, .tsv, .dat (tables), .npz, .npy, .mat, .h5 and .hdf5"
+KINDS = ".csv, .txt, .tsv, .dat (tables), .xlsx, .xlsm, .json, .jsonl, .ndjson, .npz, .npy, .mat, .h5 and .hdf5"
 TABLES = (".csv", ".txt", ".tsv", ".dat")
-ARRAYS = (".npz", ".npy", ".mat")
+WORKBOOKS = (".xlsx", ".xlsm")
+RECORDS = (".json", ".jsonl", ".ndjson")
+FOREIGN = (*TABLES, *WORKBOOKS, *RECORDS, ".npz", ".npy", ".mat")
+"""Kinds of files that are never recordings of ours."""
 
 _CHECK = "Check the file; nothing else can be read from it."
 
@@ -61,6 +66,8 @@ def read_arrays(path: Path, table: CsvMap) -> Arrays:
 def _read(path: Path, table: CsvMap) -> Table:
     if path.suffix.lower() in TABLES:
         return read_csv_arrays(path, table)
+    if path.suffix.lower() in WORKBOOKS:
+        return read_workbook_arrays(path, table)
     return timed_arrays(_read_stored(path))
 
 
@@ -68,8 +75,12 @@ def _read_stored(path: Path) -> dict[str, Array]:
     match path.suffix.lower():
         case ".npz" | ".npy":
             return read_npz_arrays(path)
+        case ".json" | ".jsonl" | ".ndjson":
+            return read_json_arrays(path)
         case ".mat":
             return read_hdf5_arrays(path, transposed=True) if is_hdf5(path) else read_mat5_arrays(path)
         case ".h5" | ".hdf5":
             return read_hdf5_arrays(path, transposed=False)
+        case ".xls" | ".ods" | ".xlsb":
+            raise ValueError("it is a workbook of another kind; save it as .xlsx, or the sheet as .csv")
     raise ValueError(f"its kind is not known here; known are {KINDS}")

@@ -3,7 +3,7 @@
 import io
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.table_layout import EMPTY, Line, TableLayout, find_layout, is_comment, split_row
+from study.importing.arrays.table_cells import EMPTY, Line, holds_number, is_comment, split_row
+from study.importing.arrays.table_layout import TableLayout, find_layout
 from study.importing.arrays.table_text import read_text
 from study.importing.arrays.time_stamps import STAMP_WORDS, is_stamp, join_stamps, read_stamps
 from study.importing.map_format.import_map import CsvMap
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 MOST_ROWS = 20_000_000
 """Five hours at 1 kHz."""
 MOST_COLUMNS = 10_000
+_THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
+_NO_THOUSANDS = "write numbers without signs between thousands"
 _MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
 
 
@@ -38,7 +41,13 @@ class Table:
 def read_csv_arrays(path: Path, settings: CsvMap) -> Table:
     """Empty fields are missing samples. Raises CannotReadError; ValueError with line and column of a problem."""
     whole = read_text(path, settings.encoding)
-    layout = find_layout(_lines(whole.text, settings), settings)
+    made = read_lines(_lines(whole.text, settings), settings)
+    return replace(made, notes=(*made.notes, *filter(None, (whole.note,))))
+
+
+def read_lines(lines: list[Line], settings: CsvMap) -> Table:
+    """Of a table's lines that are not empty. Raises ValueError with line and column of a problem."""
+    layout = find_layout(lines, settings)
     if not layout.body:
         raise ValueError("it has a header, but no rows below it")
     if len(layout.names) > MOST_COLUMNS:
@@ -48,17 +57,20 @@ def read_csv_arrays(path: Path, settings: CsvMap) -> Table:
     body = [line for line in layout.body if not is_comment(line[1])]
     _require_equal_rows(body, layout)
     text = "\n".join(line for _, line in body)
+    words = {name for place, name in enumerate(layout.names) if place in layout.texts}
     first = next((fields for _, line in body if all(fields := split_row(line, layout.delimiter))), [])
-    dated = [name for name, field in zip(layout.names, first, strict=False) if is_stamp(field)]
-    numbers = {name: str if name in dated else np.float64 for name in layout.names}
+    dated = {name for name, field in zip(layout.names, first, strict=False) if is_stamp(field)}
+    kinds = {name: str if name in dated | words else np.float64 for name in layout.names}
+    wanted = [name for name in layout.names if name not in words]
     try:
-        found = _read(text, layout, {"dtype": numbers, "na_values": _MISSING})
+        found = _read(text, layout, {"dtype": kinds, "na_values": _MISSING})
     except ValueError:
-        words = _read(text, layout, {"dtype": str})  # slower, and it tells which field is wrong
-        made = _table({name: words[name] for name in layout.names}, body, layout)
-    else:
-        made = _table({name: found[name] for name in layout.names}, body, layout)
-    return replace(made, notes=(*made.notes, *filter(None, (whole.note,))))
+        found = _read(text, layout, {"dtype": str})  # slower, and it tells which field is wrong
+    made = _table({name: found[name] for name in wanted}, body, layout)
+    for name in words:
+        _require_words(found[name], name, body, layout)
+    left_out = tuple(f"Left out: '{name}' holds words, not numbers." for name in layout.names if name in words)
+    return replace(made, notes=(*made.notes, *left_out))
 
 
 def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
@@ -67,16 +79,34 @@ def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: Ta
     for name, column in columns.items():
         if column.dtype == np.float64:
             numbers[name] = column.to_numpy()
-        elif (found := read_stamps(column.mask(column.str.strip().str.lower().isin(EMPTY)))) is not None:
+        elif (found := read_stamps(column.mask(_is_missing(column)))) is not None:
             stamps[name] = found
         else:
             numbers[name] = _numbers(column, name, body, layout)
     joined = join_stamps(stamps)
-    in_seconds = {name: f"{unit_in(name)[0]} [s]" for name in joined}
+    in_seconds = {name: _seconds_name(name, columns) for name in joined}
     every = numbers | {name: stamp.seconds - stamp.seconds[0] for name, stamp in joined.items()}
     notes = tuple(f"{name}: read as seconds since {stamp.first}." for name, stamp in joined.items())
     by_name = {in_seconds.get(name, name): every[name] for name in columns if name in every}
     return Table(by_name, tuple(in_seconds.values()), notes)
+
+
+def _seconds_name(name: str, others: Iterable[str]) -> str:
+    """Of a column of stamps that becomes one of seconds."""
+    plain = unit_in(name)[0]
+    return f"{plain} [s]" if f"{plain} [s]" not in others else f"{plain} stamp [s]"
+
+
+def _require_words(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> None:
+    """Raises ValueError where a column that was taken for words holds a number."""
+    numbers = column.fillna("").map(lambda field: holds_number([field.strip()], layout.decimal)).to_numpy()
+    if numbers.any():
+        number = body[int(np.argmax(numbers))][0]
+        raise ValueError(f"line {number}: column '{name}' holds words elsewhere; empty fields are missing samples")
+
+
+def _is_missing(column: "pd.Series[str]") -> "pd.Series[bool]":
+    return column.str.strip().str.lower().isin(EMPTY)
 
 
 def timed_arrays(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
@@ -84,7 +114,7 @@ def timed_arrays(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
     found, clocks, notes = {}, [], []
     for name, array in stored.items():
         dated = _seconds(array)
-        key = name if dated is None else f"{unit_in(name)[0]} [s]"
+        key = name if dated is None else _seconds_name(name, stored)
         found[key] = array if dated is None else dated[0]
         if dated is not None:
             clocks.append(key)
@@ -124,9 +154,24 @@ def _lines(text: str, settings: CsvMap) -> list[Line]:
 def _require_equal_rows(body: list[Line], layout: TableLayout) -> None:
     delimiter, columns = layout.delimiter, len(layout.names)
     for number, line in body:
-        count = len(split_row(line, delimiter)) if '"' in line or delimiter == " " else line.count(delimiter) + 1
+        if '"' in line:
+            count = len(split_row(line, delimiter))
+        else:
+            count = len(line.split()) if delimiter == " " else line.count(delimiter) + 1
         if count != columns:
-            raise ValueError(f"line {number} has {count} fields, but there are {columns} columns")
+            problem = f"line {number} has {count} fields, but there are {columns} columns"
+            raise ValueError(f"{problem}; {_mend_row(number, line, body, delimiter)}")
+
+
+def _mend_row(number: int, line: str, body: list[Line], delimiter: str) -> str:
+    """What to do about a row of another width."""
+    if any(_THOUSANDS.fullmatch(field.strip()) for field in re.split(r"[;\t|]", line)):
+        return _NO_THOUSANDS
+    if delimiter == " " and body[0][0] == number:
+        return "where blanks delimit, put names that hold some in quotes"
+    if body[0][0] == number:
+        return "where what stands above is no header, skip_lines and names under [csv] in the map say so"
+    return "take that line out, or fill it up"
 
 
 def _read(text: str, layout: TableLayout, how: dict[str, Any]) -> "pd.DataFrame":
@@ -163,5 +208,6 @@ def _numbers(column: "pd.Series[str]", name: str, body: list[Line], layout: Tabl
         comma = layout.decimal == "." and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", text.strip())
         hint = '; where the decimal sign is a comma, the map says decimal = "," under [csv]' if comma else ""
         dated = f"; {STAMP_WORDS}" if re.search(r"\d[-/:]\d", text) else ""
-        raise ValueError(f"line {number}, column '{name}': '{text}' is not a number{hint}{dated}")
+        thousands = f"; {_NO_THOUSANDS}" if _THOUSANDS.fullmatch(text.strip()) else ""
+        raise ValueError(f"line {number}, column '{name}': '{text}' is not a number{hint}{dated}{thousands}")
     return np.asarray(values, dtype=np.float64)

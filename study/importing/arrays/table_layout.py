@@ -4,27 +4,29 @@ Seen from the numbers upwards, since they are what all tables have in common: th
 units with the header above; what stands higher is remarks.
 """
 
-import csv
 import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from equalizer.signals.units import UnknownUnitError, parse_unit, plain_unit
+from equalizer.signals.units import parse_unit, plain_unit
+from study.importing.arrays.table_cells import (
+    COMMENTS,
+    EMPTY,
+    Line,
+    first_numbers,
+    holds_number,
+    is_comment,
+    is_number,
+    is_unit,
+    split_row,
+)
+from study.importing.arrays.table_marks import TableMarks, find_marks
 from study.importing.arrays.time_stamps import is_stamp
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.signal_words import name_signal
 
-Line = tuple[int, str]
-"""Number in the file, from 1, and text."""
-
-EMPTY = ("", "nan", "na", "n/a", "null", "-", "none")
-COMMENTS = ("#", "%")
-_DELIMITERS = (",", ";", "\t", "|", " ")
 _UNITLESS = (*EMPTY, "1")
-_SAMPLED = 32
-"""Rows that delimiter and decimal sign are tried on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,8 @@ class TableLayout:
     names: tuple[str, ...]
     """With the unit in brackets where a row of units states it."""
     body: Sequence[Line]
+    texts: frozenset[int] = frozenset()
+    """Columns that hold words, by their place."""
 
 
 def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
@@ -41,110 +45,54 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
     rows = [line for line in lines if not is_comment(line[1])]
     if not rows:
         raise ValueError("it holds no lines")
-    delimiter, decimal = _marks(rows, settings)
-    begin = _first_numbers(rows, delimiter, decimal)
+    marks = find_marks(rows, settings)
+    begin = first_numbers(rows, marks.delimiter, marks.decimal, marks.texts)
+    above = [] if begin is None else _rows_above(lines, rows, begin, marks.delimiter)
+    if begin is not None and marks.delimiter != " ":
+        least = max([len(settings.names), *map(_width, above[-2:])])
+        rows = [*rows[:begin], *_without_empty_ends(rows[begin:], marks.delimiter, least)]
     if begin is None or settings.names:
-        first = split_row(rows[0][1], delimiter)
-        names = settings.names or tuple(_name_columns(first))
-        if begin is None or any(_holds_number(split_row(text, delimiter), decimal) for _, text in rows[:begin]):
-            begin = 0 if all(is_number(field, decimal) for field in first) else 1
-        return TableLayout(delimiter, decimal, names, rows[begin:])
-    fields = split_row(rows[begin][1], delimiter)
+        return _with_given_names(rows, begin, marks, settings)
+    fields = split_row(rows[begin][1], marks.delimiter)
     width = len(fields)
-    above = [_name_date(row, fields) for row in _rows_above(lines, rows, begin, delimiter)]
-    header, units = _header_and_units(above, width, decimal)
-    if header is None:
-        if begin == 0:
-            return TableLayout(delimiter, decimal, tuple(f"column{k + 1}" for k in range(width)), rows)
-        return TableLayout(delimiter, decimal, tuple(_name_columns(split_row(rows[0][1], delimiter))), rows[1:])
-    return TableLayout(delimiter, decimal, tuple(_with_units(_name_columns(header), units)), rows[begin:])
+    named = [_fit_header(row, fields, marks.delimiter) for row in above]
+    header, units = _header_and_units(named, width, marks.decimal)
+    if header is not None:
+        names = _with_units(_name_columns(header), units)
+    elif begin == 0 or (len(above[-1]) == 1 < width and all(len(row) != width for row in above)):  # remarks
+        names = [f"column{k + 1}" for k in range(width)]
+    else:
+        begin = _first_header(rows[:begin], width, marks) + 1
+        names = _name_columns(split_row(rows[begin - 1][1], marks.delimiter))
+    return TableLayout(marks.delimiter, marks.decimal, tuple(names), rows[begin:], marks.texts)
 
 
-def is_comment(line: str) -> bool:
-    return line.lstrip().startswith(COMMENTS)
+def _with_given_names(rows: Sequence[Line], begin: int | None, marks: TableMarks, settings: CsvMap) -> TableLayout:
+    """Of a table whose map names its columns, or that has no row of numbers: its header is as wide as its last row."""
+    width = len(split_row(rows[-1][1], marks.delimiter))
+    wide = [place for place, (_, text) in enumerate(rows) if len(split_row(text, marks.delimiter)) == width]
+    rows = rows[0 if settings.names else wide[0] :]
+    first = split_row(rows[0][1], marks.delimiter)
+    names = settings.names or tuple(_name_columns(first))
+    if begin is None or any(holds_number(split_row(text, marks.delimiter), marks.decimal) for _, text in rows[:begin]):
+        begin = 0 if all(is_number(field, marks.decimal) for field in first) else 1
+    return TableLayout(marks.delimiter, marks.decimal, names, rows[begin:], marks.texts)
 
 
-def split_row(line: str, delimiter: str) -> list[str]:
-    if not line:
-        return []
-    if delimiter == " " and '"' not in line:
-        return re.split(r"\s+(?![\[(])", line.strip())  # `force [N]` is one field
-    try:
-        fields = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
-    except csv.Error:  # the reader takes no field above 131 072 letters, as a long line of another delimiter is
-        fields = line.split(delimiter)
-    return [field.strip() for field in fields]
+def _without_empty_ends(body: Sequence[Line], delimiter: str, least: int) -> Sequence[Line]:
+    """Without the delimiters with which all rows end, as far as at least so many columns are left."""
+    surplus = len(split_row(body[0][1], delimiter)) - max(least, 1)
+    blanks = f" \t{delimiter}"
+    for _, text in body:
+        if surplus < 1:
+            return body
+        surplus = min(surplus, text.count(delimiter, len(text.rstrip(blanks))))
+    return [(number, text.rsplit(delimiter, surplus)[0]) for number, text in body]
 
 
-def is_number(field: str, decimal: str) -> bool:
-    """Or an empty field. With a decimal comma a point is none: it would separate thousands."""
-    try:
-        float(field.replace(".", " ").replace(",", ".") if decimal == "," else field)
-    except ValueError:
-        return field.lower() in EMPTY
-    return True
-
-
-def _all_numbers(fields: Sequence[str], decimal: str) -> bool:
-    """Or dates and clock times beside a number."""
-    plain = [field for field in fields if not is_stamp(field)]
-    return all(is_number(field, decimal) for field in plain) and any(field.lower() not in EMPTY for field in plain)
-
-
-def _first_numbers(rows: Sequence[Line], delimiter: str, decimal: str) -> int | None:
-    """Index of the first row of numbers, or of the first of the rows directly above it that miss every number."""
-    split = (split_row(text, delimiter) for _, text in rows)
-    begin, width = next(((k, len(row)) for k, row in enumerate(split) if _all_numbers(row, decimal)), (None, 0))
-    while begin:
-        above = split_row(rows[begin - 1][1], delimiter)
-        if len(above) != width or any(field.lower() not in EMPTY and not is_stamp(field) for field in above):
-            break
-        begin -= 1
-    return begin
-
-
-def _marks(rows: Sequence[Line], settings: CsvMap) -> tuple[str, str]:
-    """Delimiter and decimal sign by which there are as many columns as the map names; or by which most rows are
-    numbers: of several, those that split the line above them alike, then those with the most columns. Where none do,
-    what splits the first row most often. Raises ValueError where a comma may be either sign."""
-    sample = rows[:: max(len(rows) // _SAMPLED, 1)]
-    best, found = (False, 0, False, 0), None
-    for decimal in (settings.decimal,) if settings.decimal else (".", ","):
-        for delimiter in (settings.delimiter,) if settings.delimiter else _DELIMITERS:
-            if delimiter == decimal:
-                continue
-            read = [fields for _, text in sample if _all_numbers(fields := split_row(text, delimiter), decimal)]
-            if not read:
-                continue
-            columns = Counter(map(len, read)).most_common(1)[0][0]
-            begin = _first_numbers(rows, delimiter, decimal)
-            header = rows[begin - 1][1] if begin else ""
-            # A comma in the header speaks for commas that delimit: `t,u,` above `0,1` is no single decimal column.
-            alike = len(split_row(header, delimiter)) == columns and not (decimal == "," and "," in header)
-            rank = (columns == len(settings.names), len(read), alike, columns)
-            if rank > best:
-                best, found = rank, (delimiter, decimal)
-    if found and found[1] == "," and not settings.decimal:
-        _require_decimals(sample, found[0])
-    return found or (settings.delimiter or _most_frequent(rows[0][1], settings.decimal), settings.decimal or ".")
-
-
-def _require_decimals(sample: Sequence[Line], delimiter: str) -> None:
-    """Raises ValueError where each comma in a number may as well separate thousands, as in 1,250 but not in 0,250."""
-    read = [(number, split_row(text, delimiter)) for number, text in sample]
-    with_comma = [(number, field) for number, row in read if _all_numbers(row, ",") for field in row if "," in field]
-    if with_comma and all(re.fullmatch(r"[-+]?[1-9]\d{0,2},\d{3}", field) for _, field in with_comma):
-        number, field = with_comma[0]
-        raise ValueError(
-            f"line {number}: the comma in '{field}' may separate thousands; where the decimal sign is a comma, "
-            'the map says decimal = "," under [csv]'
-        )
-
-
-def _most_frequent(line: str, decimal: str) -> str:
-    counts = {mark: line.count(mark) for mark in _DELIMITERS if mark not in (decimal, " ")}
-    best = max(counts, key=lambda mark: counts[mark])
-    return best if counts[best] else " "
+def _width(fields: Sequence[str]) -> int:
+    """Without empty fields at the end."""
+    return max((place for place, field in enumerate(fields, start=1) if field), default=0)
 
 
 def _strip_comment(line: str) -> str:
@@ -162,10 +110,24 @@ def _rows_above(lines: Sequence[Line], rows: Sequence[Line], begin: int, delimit
     return plain + [fields for fields in comments if len(fields) == len(plain[-1]) and _are_units(fields)][-1:]
 
 
-def _name_date(header: list[str], fields: Sequence[str]) -> list[str]:
-    """A header that has one name for a date and the clock time behind it, where blanks delimit, gets a second."""
+def _first_header(above: Sequence[Line], width: int, marks: TableMarks) -> int:
+    """The first row above the numbers that is as wide and holds none; else the first."""
+    split = [split_row(text, marks.delimiter) for _, text in above]
+    words = [len(row) == width and not holds_number(row, marks.decimal) and not _are_units(row) for row in split]
+    return words.index(True) if True in words else 0
+
+
+def _fit_header(header: list[str], fields: Sequence[str], delimiter: str) -> list[str]:
+    """As wide as a row of numbers, where empty fields at its end are too many; where names hold the delimiter, but
+    each ends with its unit in brackets; or where it has one name for a date and the clock time behind it."""
+    width = len(fields)
+    if len(header) > width and not any(header[width:]):
+        return header[:width]
+    bracketed = re.findall(r"[^\[\]()]+[\[(][^\[\]()]*[\])]", f"{delimiter} ".join(header))
+    if len(header) > width == len(bracketed):
+        return [" ".join(name.strip(f" {delimiter}").split()) for name in bracketed]
     at = next((k for k, pair in enumerate(pairwise(fields)) if all(map(is_stamp, pair))), None)
-    return header if at is None or len(header) != len(fields) - 1 else [*header[:at], "date", *header[at:]]
+    return header if at is None or len(header) != width - 1 else [*header[:at], "date", *header[at:]]
 
 
 def _header_and_units(
@@ -176,31 +138,19 @@ def _header_and_units(
     last = words[-1] if words else None
     before = words[-2] if len(words) > 1 else None
     if last and len(words) > 1 and _are_units(last):  # units below what is no header do not become the header
-        return (before, last) if before and not _holds_number(before, decimal) else (None, None)
-    return (None if last is None or _holds_number(last, decimal) else last), None
-
-
-def _holds_number(fields: Sequence[str], decimal: str) -> bool:
-    return any(field.lower() not in EMPTY and is_number(field, decimal) for field in fields)
+        return (before, last) if before and not holds_number(before, decimal) else (None, None)
+    return (None if last is None or holds_number(last, decimal) else last), None
 
 
 def _are_units(fields: Sequence[str]) -> bool:
     """Each a known unit, in brackets or not, or nothing; or all that say something in brackets."""
     said = [field for field in fields if field.lower() not in _UNITLESS]
-    return bool(said) and (all(map(_is_unit, said)) or all(_bare(field) != field for field in said))
+    return bool(said) and (all(is_unit(_bare(field)) for field in said) or all(_bare(field) != field for field in said))
 
 
 def _bare(field: str) -> str:
     match = re.fullmatch(r"[\[(]\s*(.*?)\s*[\])]", field)
     return match[1] if match else field
-
-
-def _is_unit(field: str) -> bool:
-    try:
-        parse_unit(plain_unit(_bare(field)))
-    except UnknownUnitError:
-        return False
-    return True
 
 
 def _name_columns(header: Sequence[str]) -> list[str]:
@@ -217,7 +167,7 @@ def _with_units(header: Sequence[str], units: Sequence[str] | None) -> list[str]
         if unit.lower() in _UNITLESS:
             found.append(name)
             continue
-        if said.unit and said.sure and _is_unit(unit) and parse_unit(said.unit) != parse_unit(unit):
+        if said.unit and said.sure and is_unit(unit) and parse_unit(said.unit) != parse_unit(unit):
             raise ValueError(f"its header says {said.unit} in '{name}', and its row of units says {unit}")
         found.append(name if said.unit == unit else f"{name} [{unit}]")
     return found

@@ -29,6 +29,9 @@ class CsvMap:
             description='Of the text, as "gb18030", "shift_jis", "cp1251". Default: UTF-8, UTF-16, or what it shows.'
         ),
     ] = ""
+    sheet: Annotated[
+        str, Field(description="The only sheet of a workbook to be read. Default: all that hold rows of numbers.")
+    ] = ""
     names: Annotated[
         tuple[str, ...], Field(description="Names of the columns of a table without a header. Default: none.")
     ] = ()

@@ -6,10 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from equalizer.signals.units import UnknownUnitError, check_quantity, parse_unit, plain_unit, quantity_of
+from equalizer.signals.units import (
+    UnknownUnitError,
+    check_quantity,
+    force_hint,
+    parse_unit,
+    plain_unit,
+    quantity_of,
+    suggest_unit,
+)
 from study.importing.map_format.import_map import SignalRole
 
-_BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]\s*")
+_BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+(?:\([^\[\]()]*\))?)[\])]\s*")
+_SAID_BEHIND = re.compile(r"(?<=\w)(?:\s*/\s*|\s*,\s+|\s+in\s+)(?=\S)")
+"""`force / N`, `force, N`, `Kraft in N`: as standards and testing machines write it."""
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _WORDS = {
     "force": ("force", "load", "thrust"),
@@ -80,7 +90,7 @@ def plain_names(columns: Sequence[ParsedName]) -> list[str]:
 
 
 def _without_unit(column: ParsedName) -> str:
-    before, unit = _unit_at_end(column.name)
+    before, unit = unit_at_end(column.name)
     return before if unit and unit == column.unit and not column.doubt else column.name
 
 
@@ -99,11 +109,11 @@ def name_signal(header: str) -> ParsedName:
     words = [_QUANTITY[part.lower()] for part in _WORD.findall(name) if part.lower() in _QUANTITY]
     words += [FOREIGN_WORDS[foreign]] if FOREIGN_WORDS.get(foreign, "time") != "time" else []
     word = words[-1] if words else ""  # the last says it: a load angle is an angle
-    told = unit or _unit_at_end(name)[1]
+    told = unit or unit_at_end(name)[1]
     try:
         known = parse_unit(told)
     except UnknownUnitError:
-        return ParsedName(header, name, "", word, f"'{unit}' is not a unit known here" if unit else "")
+        return ParsedName(header, name, "", word, _unknown(unit) if unit else "")
     by_unit = "time" if known.si == "s" else quantity_of(known.si)
     if not word:
         doubt = "" if unit else f"whether {told} is its unit is not sure, for no word says what it is"
@@ -111,8 +121,14 @@ def name_signal(header: str) -> ParsedName:
     try:
         check_quantity(word, known)
     except UnknownUnitError:
-        return ParsedName(header, name, told, by_unit, f"its name says {word}, its unit, {told}, says {by_unit}")
+        doubt = f"its name says {word}, its unit, {told}, says {by_unit}{force_hint(word, known)}"
+        return ParsedName(header, name, told, by_unit, doubt)
     return ParsedName(header, name, told, word, "")
+
+
+def _unknown(unit: str) -> str:
+    near = suggest_unit(unit)
+    return f"'{unit}' is not a unit known here" + (f" (did you mean '{near}'?)" if near else "")
 
 
 def roles_of(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
@@ -189,18 +205,25 @@ def _by_quantity(columns: Sequence[ParsedName]) -> dict[str, SignalRole]:
     return by_quantity
 
 
-def _unit_at_end(name: str) -> tuple[str, str]:
-    """Name and unit suffix as in `displacement_mm`, `omega_rad_s`, `a_mps2` (longest suffix that is a unit); the
-    whole name and empty if there is none."""
+def unit_at_end(name: str) -> tuple[str, str]:
+    """Name and unit at its end as in `displacement_mm`, `omega_rad_s`, `a_mps2`, `force / N` (the longest that is a
+    unit); the whole name and empty if there is none."""
     parts = name.split("_")
-    for first in range(1, len(parts)):
-        text = "_".join(parts[first:])
-        text = re.sub(r"mps2$", "m/s^2", text)
-        text = _WRITTEN_TOGETHER.get(text, text.replace("_per_", "/").replace("_", "/"))
-        text = re.sub(r"(?<=[a-z])2$", "^2", text)
+    ends = [("_".join(parts[:first]), _joined(parts[first:])) for first in range(1, len(parts))]
+    ends += [(name[: mark.start()], name[mark.end() :]) for mark in _SAID_BEHIND.finditer(name)]
+    for before, text in ends:
+        unit = plain_unit(text)
         try:
-            parse_unit(text)
+            parse_unit(unit)
         except UnknownUnitError:
             continue
-        return ("_".join(parts[:first]), text) if text != "1" else (name, "")
+        return (before, unit) if unit != "1" else (name, "")
     return name, ""
+
+
+def _joined(parts: Sequence[str]) -> str:
+    """A unit whose signs are written as underscores."""
+    text = "_".join(parts)
+    text = re.sub(r"mps2$", "m/s^2", text)
+    text = _WRITTEN_TOGETHER.get(text, text.replace("_per_", "/").replace("_", "/"))
+    return re.sub(r"(?<=[a-z])2$", "^2", text)

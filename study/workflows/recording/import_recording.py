@@ -12,7 +12,7 @@ from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import direction_notes, header_map, header_problems
+from study.importing.header_map import header_map, header_notes, header_problems
 from study.importing.map_format.import_map import CsvMap, ImportMap
 from study.importing.map_format.map_errors import (
     NOTHING_WRITTEN,
@@ -22,7 +22,6 @@ from study.importing.map_format.map_errors import (
 )
 from study.importing.map_library import NO_DATA, MapFile, find_map, map_by_header, map_of_files, read_map
 from study.importing.map_skeleton import map_skeleton
-from study.importing.surplus_arrays import surplus_arrays
 from study.store.disk.hdf5_file import format_of, is_hdf5
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import read_recording, write_recording
@@ -163,7 +162,5 @@ def _with_header(wanted: ImportMap, arrays: Arrays, files: Sequence[Path], on_pr
         if not isinstance(refused.__cause__, ImportProblemError):
             raise
         raise MapNeededError(files[0].name, refused.happened, map_skeleton(arrays)) from refused
-    left_out = tuple(f"Left out: '{name}' {why}." for name, why in surplus_arrays(arrays).items())
-    told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
-    notes = (f"Taken from the header: {told}.", *left_out, *direction_notes(arrays, wanted), *built.notes)
+    notes = (*header_notes(arrays, wanted), *built.notes)
     return Foreign(built.recording, tuple(files), "header", "", notes)

@@ -13,11 +13,11 @@ def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
     if path.is_file() and is_hdf5(path) and format_of(path):
         return read_recording(path), ()
     # Here, for the import takes longer to load than a recording of ours to read.
-    from study.importing.arrays.arrays import ARRAYS, TABLES
+    from study.importing.arrays.arrays import FOREIGN
     from study.importing.map_format.map_errors import MapNeededError
     from study.workflows.recording.import_recording import read_foreign
 
-    if path.suffix.lower() not in (*TABLES, *ARRAYS) and not (path.is_file() and is_hdf5(path)):
+    if path.suffix.lower() not in FOREIGN and not (path.is_file() and is_hdf5(path)):
         return read_recording(path), ()
     try:
         found = read_foreign((path,), None)

@@ -16,7 +16,7 @@ from tests.recording_maps import N, U, Y, built, map_text, refusal
         (lambda t: t.__setitem__(7, t[6]),
          "Clock 'clock': t stands still at sample 7, at 6 s; where the sampling was even "
          "and only the stamps are coarse, state the rate in place of `time` in the map's [[clock]], as in "
-         "rate_hz = 1."),
+         "rate_hz = 1; where a sample was logged twice with other values, take one of both out."),
     ],
 )  # fmt: skip
 def test_time_that_is_none_is_refused(files, spoil, sentence):

@@ -65,13 +65,21 @@ def test_a_column_of_whole_numbers_is_not_split_at_its_commas(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", ["Rig 3\ntime,force\n0,1\n1,2\n2,4", "t,u,\n0,1\n1,2\n2,4", "t [ms],u [counts, raw]\n0,1\n1,2\n2,4"]
+    ("text", "names"),
+    [
+        ("Rig 3\ntime,force\n0,1\n1,2\n2,4", ["time", "force"]),
+        ("t,u,\n0,1\n1,2\n2,4", ["t", "u"]),
+        ("Rig 3\n0,1\n1,2\n2,4", ["column1", "column2"]),
+        ("Rig three, by hand\n0,1\n1,2\n2,4", ["Rig three", "by hand"]),
+        ("t [ms],u [counts, raw]\n0,1\n1,2\n2,4", ["t [ms]", "u [counts, raw]"]),
+        ("t,u,v\n0,1\n1,2\n2,4", None),
+    ],
 )
-def test_two_columns_of_whole_numbers_are_not_read_as_decimals(tmp_path, text):
+def test_two_columns_of_whole_numbers_are_not_read_as_decimals(tmp_path, text, names):
     found = read(tmp_path, text, CsvMap(names=("t", "u"))).by_name
     np.testing.assert_array_equal([found["t"], found["u"]], [[0, 1, 2], [1, 2, 4]])
-    if text.startswith("Rig"):
-        assert list(read(tmp_path, text).by_name) == ["time", "force"]
+    if names:
+        assert list(read(tmp_path, text).by_name) == names
     else:
         with pytest.raises(ImportRefusedError, match="2 fields, but there are 3 columns"):
             read(tmp_path, text)

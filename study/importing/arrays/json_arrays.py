@@ -1,0 +1,136 @@
+"""Read arrays from JSON: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [...], "u": [...]}`), and lines of
+records; inside an object they are named by it (`run1/u`), unless it is the only one."""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from study.importing.arrays.table_cells import is_empty, is_number
+from study.regular_file import open_regular, read_regular
+from study.store.disk.strict_json import load_json
+
+Array = npt.NDArray[Any]
+JSON_BYTES = 2**26
+"""Largest JSON file: parsed, it takes some twenty times its bytes."""
+_OURS = "hapteq"
+_OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
+_LOOKED_AT = 4096
+_UNIT_KEYS = ("unit", "units")
+
+
+def read_json_arrays(path: Path) -> dict[str, Array]:
+    """Raises OSError; ValueError with what is wrong."""
+    try:
+        text = read_regular(path, JSON_BYTES).decode("utf-8-sig")
+    except UnicodeDecodeError as problem:
+        raise ValueError(f"it is no UTF-8 text (byte {problem.start}), as JSON is; save it as UTF-8") from problem
+    document = _parse(text)
+    if isinstance(document, dict) and str(document.get("format", "")).startswith(_OURS):
+        raise ValueError(f"it is a document of ours ({document['format']}), and holds no recording")
+    found = dict(_arrays(document, ()))
+    parents = {place[:-1] for place, array in found.items() if array.size > 1}
+    alone = parents.pop() if len(parents) == 1 else ()
+    return {
+        "/".join(place[len(alone) :] if place[: len(alone)] == alone else place): array
+        for place, array in found.items()
+    }
+
+
+def is_own_document(path: Path) -> bool:
+    """Whether a JSON file says near its beginning that it is one of ours."""
+    with open_regular(path) as file:
+        return _OWN_FORMAT.search(file.read(_LOOKED_AT)) is not None
+
+
+def _parse(text: str) -> Any:
+    try:
+        return load_json(text, with_nan=True)
+    except ValueError as whole:
+        lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip()]
+        if len(lines) < 2:
+            raise ValueError(f"this is no JSON: {whole}") from whole
+        try:
+            records = [_record(number, line) for number, line in lines]
+        except ValueError as problem:
+            raise ValueError(f"this is neither JSON ({whole}) nor lines of it ({problem})") from problem
+        return records
+
+
+def _record(number: int, line: str) -> Any:
+    try:
+        found = load_json(line, with_nan=True)
+    except ValueError as problem:
+        raise ValueError(f"line {number}: {problem}") from problem
+    if not isinstance(found, dict):
+        raise ValueError(f"line {number} is no record in braces")
+    return found
+
+
+def _arrays(value: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
+    """Arrays with the keys that lead to them."""
+    match value:
+        case dict():
+            yield from _of_object(value, place)
+        case []:
+            return
+        case [dict(), *_] if all(isinstance(record, dict) for record in value):
+            yield from (((*place, key), _array(column)) for key, column in _columns(value).items())
+        case _:
+            yield place or ("data",), _array(value)
+
+
+def _of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
+    """Of `{"unit": "N", "values": [...]}` one array, with its unit in brackets."""
+    units = [value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)]
+    lists = [entry for entry in value.values() if isinstance(entry, list)]
+    if place and len(units) == 1 and len(lists) == 1:
+        yield (*place[:-1], f"{place[-1]} [{units[0]}]"), _array(lists[0])
+        return
+    for key, entry in value.items():
+        yield from _arrays(entry, (*place, key))
+
+
+def _columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
+    """A column for each key of any record, missing where a record does not have it; objects inside a record one level
+    deep, as `imu.x`."""
+    flat = [dict(_fields(record)) for record in records]
+    keys = dict.fromkeys(key for record in flat for key in record)
+    return {key: [record.get(key) for record in flat] for key in keys}
+
+
+def _fields(record: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    for key, value in record.items():
+        if isinstance(value, dict):
+            yield from ((f"{key}.{inner}", entry) for inner, entry in value.items())
+        else:
+            yield key, value
+
+
+def _array(value: Any) -> Array:
+    """Numbers, missing where there is none; texts, which may be dates, where any entry is no number; else an object
+    that stands for what holds no numbers."""
+    if isinstance(value, list) and value and all(_is_scalar(entry) for entry in value):
+        if all(isinstance(entry, str) or entry is None for entry in value):
+            return _of_texts(["" if entry is None else entry.strip() for entry in value])
+        if all(not isinstance(entry, str) or is_empty(entry) for entry in value):
+            return np.array([np.nan if entry is None or isinstance(entry, str) else float(entry) for entry in value])
+        return np.array([str(entry) for entry in value])
+    try:
+        found = np.asarray(value)
+    except ValueError:  # lists of several lengths
+        return np.array(None, dtype=object)
+    return found if found.dtype.kind in "fiub" else np.array(None, dtype=object)
+
+
+def _of_texts(texts: list[str]) -> Array:
+    if all(is_number(text, ".") for text in texts):
+        return np.array([np.nan if is_empty(text) else float(text) for text in texts])
+    return np.array(texts)
+
+
+def _is_scalar(entry: Any) -> bool:
+    return entry is None or isinstance(entry, bool | int | float | str)

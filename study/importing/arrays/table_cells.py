@@ -1,0 +1,92 @@
+"""Cells of a table: rows split into fields, and what is a number in them."""
+
+import csv
+import re
+from collections.abc import Collection, Sequence
+
+from equalizer.signals.units import UnknownUnitError, parse_unit, plain_unit
+from study.importing.arrays.time_stamps import is_stamp
+
+Line = tuple[int, str]
+"""Number in the file, from 1, and text."""
+
+NOT_AVAILABLE = "#n/a"
+EMPTY = (
+    "", "nan", "-nan", "na", "n/a", "n.a.", NOT_AVAILABLE, "null", "none", "-", "--", "---", "1.#qnan", "-1.#qnan",
+    "1.#ind", "-1.#ind", "nan(ind)", "-nan(ind)",
+)  # fmt: skip
+COMMENTS = ("#", "%")
+_LIKE_A_NUMBER = re.compile(r"[-+]?[.,]?\d[\d.,:/' \u00a0\u202f-]*(?:[dDeE][-+]?\d+)?(?P<rest>.*)")
+_BRACKETED = re.compile(r"[\[(].*[\])]")
+
+
+def is_comment(line: str) -> bool:
+    begin = line.lstrip()
+    return begin.startswith(COMMENTS) and not begin.lower().startswith(NOT_AVAILABLE)
+
+
+def split_row(line: str, delimiter: str) -> list[str]:
+    if not line:
+        return []
+    if delimiter == " " and '"' not in line:
+        if all(map(_BRACKETED.fullmatch, words := line.split())):
+            return words
+        return re.split(r"\s+(?![\[(])", line.strip())  # `force [N]` is one field
+    try:
+        fields = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    except csv.Error:  # the reader takes no field above 131 072 letters, as a long line of another delimiter is
+        fields = line.split(delimiter)
+    return [field.strip() for field in fields]
+
+
+def is_number(field: str, decimal: str) -> bool:
+    """Or an empty field. With a decimal comma a point is none: it would separate thousands."""
+    try:
+        float(field.replace(".", " ").replace(",", ".") if decimal == "," else field)
+    except ValueError:
+        return field.lower() in EMPTY
+    return True
+
+
+def is_empty(field: str) -> bool:
+    return field.lower() in EMPTY
+
+
+def is_text(field: str) -> bool:
+    """Whether a field is words, or a digit with letters (`3a`), not a number in a spelling that is not understood
+    (`1.234,5`, `12:30`, `3 mm`) nor several in one field."""
+    like = _LIKE_A_NUMBER.fullmatch(field)
+    number = like is not None and (not re.fullmatch(r"\w+", like["rest"]) or is_unit(like["rest"]))
+    return not number and not is_stamp(field) and not is_number(field, ".")
+
+
+def is_unit(text: str) -> bool:
+    """Whether it is a unit in a known spelling."""
+    try:
+        parse_unit(plain_unit(text))
+    except UnknownUnitError:
+        return False
+    return True
+
+
+def are_numbers(fields: Sequence[str], decimal: str, texts: Collection[int] = ()) -> bool:
+    """Or dates and clock times beside a number; texts: columns that hold words, which do not count."""
+    plain = [field for place, field in enumerate(fields) if place not in texts and not is_stamp(field)]
+    return all(is_number(field, decimal) for field in plain) and not all(map(is_empty, plain))
+
+
+def holds_number(fields: Sequence[str], decimal: str) -> bool:
+    return any(not is_empty(field) and is_number(field, decimal) for field in fields)
+
+
+def first_numbers(rows: Sequence[Line], delimiter: str, decimal: str, texts: Collection[int] = ()) -> int | None:
+    """Index of the first row of numbers, or of the first of the rows directly above it that miss every number."""
+    split = (split_row(text, delimiter) for _, text in rows)
+    found = next(((k, len(row)) for k, row in enumerate(split) if are_numbers(row, decimal, texts)), None)
+    begin, width = found or (None, 0)
+    while begin:
+        above = split_row(rows[begin - 1][1], delimiter)
+        if len(above) != width or not all(is_empty(field) or is_stamp(field) for field in above):
+            break
+        begin -= 1
+    return begin

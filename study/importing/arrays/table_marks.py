@@ -1,0 +1,125 @@
+"""Delimiter and decimal sign of a table, and its columns of words, by which its rows are numbers."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from study.importing.arrays.table_cells import (
+    Line,
+    are_numbers,
+    first_numbers,
+    holds_number,
+    is_empty,
+    is_text,
+    split_row,
+)
+from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.signal_words import name_signal
+
+_DELIMITERS = (",", ";", "\t", "|", " ")
+_SAMPLED = 32
+"""Rows that delimiter and decimal sign are tried on."""
+
+
+@dataclass(frozen=True, slots=True)
+class TableMarks:
+    delimiter: str
+    decimal: str
+    texts: frozenset[int] = frozenset()
+    """Columns that hold words, by their place."""
+
+
+def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
+    """Delimiter and decimal sign by which there are as many columns as the map names; or by which most rows are
+    numbers: of several, those that split the line above them alike, then those with the most columns. Where more are,
+    those by which the most columns are numbers beside columns of words; else what splits the rows alike.
+    Raises ValueError where a comma may be either sign."""
+    sample = rows[:: max(len(rows) // _SAMPLED, 1)]
+    best, found = (False, 0, False, 0), None
+    for delimiter, decimal in _pairs(sample, settings):
+        read = _rows_of_numbers(sample, TableMarks(delimiter, decimal))
+        if not read:
+            continue
+        columns = Counter(map(len, read)).most_common(1)[0][0]
+        begin = first_numbers(rows, delimiter, decimal)
+        header = rows[begin - 1][1] if begin else ""
+        alike = len(split_row(header, delimiter)) == columns and not _is_no_name(header, decimal, columns)
+        rank = (columns == len(settings.names), len(read), alike, columns)
+        if rank > best:
+            best, found = rank, TableMarks(delimiter, decimal)
+    beside = _beside_words(sample, settings)
+    if beside and len(_rows_of_numbers(sample, beside)) > best[1]:
+        found = beside
+    if found and found.decimal == "," and not settings.decimal:
+        _require_decimals(sample, found)
+    delimiter = settings.delimiter or _likely_delimiter(sample, settings.decimal)
+    return found or TableMarks(delimiter, settings.decimal or ".")
+
+
+def _rows_of_numbers(sample: Sequence[Line], marks: TableMarks) -> list[list[str]]:
+    split = (split_row(text, marks.delimiter) for _, text in sample)
+    return [fields for fields in split if are_numbers(fields, marks.decimal, marks.texts)]
+
+
+def _pairs(sample: Sequence[Line], settings: CsvMap) -> Iterator[tuple[str, str]]:
+    """Delimiter and decimal sign that may be; both a comma where fields are quoted."""
+    quoted = any('"' in text for _, text in sample)
+    for decimal in (settings.decimal,) if settings.decimal else (".", ","):
+        for delimiter in (settings.delimiter,) if settings.delimiter else _DELIMITERS:
+            if delimiter != decimal or quoted:
+                yield delimiter, decimal
+
+
+def _is_no_name(header: str, decimal: str, columns: int) -> bool:
+    """Whether the line above rows with a decimal comma speaks for commas that delimit: one with a comma (`t,u,` above
+    `0,1`), or a remark of several words (`Rig 3`) above what would be a single column."""
+    if decimal != ",":
+        return False
+    said = name_signal(header)
+    remark = columns == 1 and len(header.split()) > 1 and not said.unit and not said.quantity
+    return ("," in header and '"' not in header) or remark
+
+
+def _beside_words(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None:
+    """By the lower half of the rows, which is below any header."""
+    best, found = 0, None
+    for delimiter, decimal in _pairs(sample, settings):
+        rows = [split_row(text, delimiter) for _, text in sample[len(sample) // 2 :]]
+        columns = list(zip(*rows, strict=True)) if len({len(row) for row in rows}) == 1 else []
+        texts = frozenset(place for place, fields in enumerate(columns) if any(map(is_text, fields)))
+        words = all(is_text(field) or is_empty(field) for place in texts for field in columns[place])
+        if words and rows and all(are_numbers(row, decimal, texts) for row in rows):
+            numbers = sum(holds_number(fields, decimal) for fields in columns)
+            if numbers > best:
+                best, found = numbers, TableMarks(delimiter, decimal, texts)
+    return found
+
+
+def _require_decimals(sample: Sequence[Line], marks: TableMarks) -> None:
+    """Raises ValueError where each comma in a number may as well separate thousands, as in 1,250 but not in 0,250."""
+    read = [(number, split_row(text, marks.delimiter)) for number, text in sample]
+    with_comma = [
+        (number, field)
+        for number, row in read
+        if are_numbers(row, ",", marks.texts)
+        for place, field in enumerate(row)
+        if "," in field and place not in marks.texts
+    ]
+    if with_comma and all(re.fullmatch(r"[-+]?[1-9]\d{0,2},\d{3}", field) for _, field in with_comma):
+        number, field = with_comma[0]
+        raise ValueError(
+            f"line {number}: the comma in '{field}' may separate thousands; where the decimal sign is a comma, "
+            'the map says decimal = "," under [csv]'
+        )
+
+
+def _likely_delimiter(sample: Sequence[Line], decimal: str) -> str:
+    """That which splits the most rows of the lower half alike, into the most fields: for the error to be precise."""
+    lower = [text for _, text in sample[len(sample) // 2 :]]
+
+    def alike(mark: str) -> tuple[int, int]:
+        width, rows = Counter(len(split_row(text, mark)) for text in lower).most_common(1)[0]
+        return (rows, width) if width > 1 else (0, 1)
+
+    return max((mark for mark in _DELIMITERS if mark != decimal), key=alike)

@@ -1,0 +1,121 @@
+"""Read the sheets of a workbook (.xlsx) as tables: their cells are written as lines, and read as those of a text file.
+
+A sheet that holds no rows of numbers is left out. Of several others each is named (`Run 1/force [N]`), as a part.
+"""
+
+import io
+import warnings
+import zipfile
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from datetime import date, datetime, time, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from study.importing.arrays.csv_arrays import MOST_ROWS, Table, read_lines
+from study.importing.arrays.table_cells import Line
+from study.importing.map_format.import_map import CsvMap
+from study.regular_file import read_regular
+from study.store.disk.declared_size import SizeLimit
+
+if TYPE_CHECKING:
+    from openpyxl import Workbook
+
+_BEGIN_OF_OLD = b"\xd0\xcf\x11\xe0"
+_DELIMITER = "\t"
+
+
+def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
+    """Raises OSError; ValueError with the sheet and what is wrong in it."""
+    book = _open(read_regular(path))
+    try:
+        sheets = {sheet.title: list(_rows(sheet)) for sheet in book.worksheets if settings.sheet in ("", sheet.title)}
+    finally:
+        book.close()
+    if not sheets:
+        raise ValueError(f"it has no sheet '{settings.sheet}'; there are {', '.join(book.sheetnames) or 'none'}")
+    wanted = {name: rows for name, rows in sheets.items() if any(_is_of_numbers(cells) for _, cells in rows)}
+    if not wanted:
+        raise ValueError("no sheet of it holds rows of numbers")
+    tables = {name: _table(name, rows, settings) for name, rows in wanted.items()}
+    left_out = tuple(f"Left out: the sheet '{name}' holds no rows of numbers." for name in sheets if name not in wanted)
+    if len(tables) == 1:
+        (only,) = tables.values()
+        return replace(only, notes=(*left_out, *only.notes))
+    return Table(
+        {f"{name}/{key}": array for name, table in tables.items() for key, array in table.by_name.items()},
+        tuple(f"{name}/{key}" for name, table in tables.items() for key in table.clocks),
+        (*left_out, *(f"{name}: {note}" for name, table in tables.items() for note in table.notes)),
+    )
+
+
+def _open(data: bytes) -> "Workbook":
+    # Imported where workbooks are read: it takes longer than all that is done with other files.
+    from openpyxl import load_workbook
+
+    if data.startswith(_BEGIN_OF_OLD):
+        raise ValueError("it is of the old kind (.xls), or locked with a password: save it as .xlsx, without password")
+    limit = SizeLimit(len(data))
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        for member in archive.infolist():
+            limit.take(member.filename, member.file_size)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # on styles and on extensions of cells, which are no numbers
+        return load_workbook(io.BytesIO(data), read_only=True, data_only=True)
+
+
+def _rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
+    """Rows that hold something, with their numbers."""
+    sheet.reset_dimensions()  # some programs state fewer rows than they write
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for number, cells in enumerate(sheet.iter_rows(values_only=True), start=1):
+            if number > MOST_ROWS:
+                raise ValueError(f"it has more than {MOST_ROWS} rows; save it as .npz or .h5")
+            if any(cell is not None for cell in cells):
+                yield number, cells
+
+
+def _is_of_numbers(cells: Sequence[Any]) -> bool:
+    """Two numbers or more, or nothing else: a name with its value is a setting."""
+    filled = [cell for cell in cells if cell is not None]
+    numbers = [cell for cell in filled if isinstance(cell, int | float)]
+    return len(numbers) > 1 or (bool(numbers) and len(numbers) == len(filled))
+
+
+def _table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: CsvMap) -> Table:
+    width = max(_width(cells) for _, cells in rows)
+    try:
+        return read_lines(
+            [_line(number, cells, width) for number, cells in rows], replace(settings, delimiter=_DELIMITER)
+        )
+    except ValueError as problem:
+        said = "" if settings.sheet else "; to read another sheet alone, the map names it: sheet = ... under [csv]"
+        raise ValueError(f"sheet '{name}', {problem}{said}") from problem
+
+
+def _width(cells: Sequence[Any]) -> int:
+    return max((place for place, cell in enumerate(cells, start=1) if cell is not None), default=0)
+
+
+def _line(number: int, cells: Sequence[Any], width: int) -> Line:
+    fields = [_field(cell) for cell in cells[:width]]
+    return number, _DELIMITER.join([*fields, *[""] * (width - len(fields))])
+
+
+def _field(cell: Any) -> str:
+    match cell:
+        case None:
+            return ""
+        case bool():
+            return str(int(cell))
+        case int() | float():
+            return repr(cell)
+        case datetime():
+            return cell.isoformat(" ")
+        case date() | time():
+            return cell.isoformat()
+        case timedelta():
+            minutes, seconds = divmod(cell.total_seconds(), 60)
+            return f"{int(minutes // 60)}:{int(minutes % 60):02d}:{seconds:09.6f}"
+    return " ".join(str(cell).replace('"', "").split())

@@ -1,0 +1,104 @@
+"""Records, columns and lines of JSON become arrays."""
+
+import json
+
+import numpy as np
+import pytest
+
+from study.importing.arrays.arrays import read_arrays
+from study.importing.arrays.json_arrays import is_own_document
+from study.importing.header_map import header_map
+from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.map_errors import ImportRefusedError
+
+TIME, FORCE = [0.0, 0.1, 0.2], [1, None, 2.5]
+RECORDS = [{"t": t, "u": u} for t, u in zip(TIME, FORCE, strict=True)]
+
+
+def read(tmp_path, content, name="a.json"):
+    (tmp_path / name).write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
+    return read_arrays(tmp_path / name, CsvMap())
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        RECORDS,
+        {"t": TIME, "u": FORCE},
+        {"data": RECORDS},
+        {"meta": {"rig": "3", "rate_hz": 10}, "data": {"t": TIME, "u": FORCE}},
+        "\n".join(map(json.dumps, RECORDS)),
+        "\n".join(map(json.dumps, RECORDS)) + "\n\n",
+        "\ufeff" + json.dumps(RECORDS),
+        [{"t": 0.0, "u": 1}, {"t": 0.1}, {"t": 0.2, "u": 2.5}],
+        [{"t": str(t), "u": "NaN" if u is None else str(u)} for t, u in zip(TIME, FORCE, strict=True)],
+        json.dumps(RECORDS).replace("null", "NaN"),
+    ],
+)
+def test_records_columns_and_lines_are_the_same_table(tmp_path, content):
+    found = {name: array for name, array in read(tmp_path, content).by_name.items() if array.ndim}
+    assert list(found) == ["t", "u"]
+    np.testing.assert_array_equal(found["t"], TIME)
+    np.testing.assert_array_equal(found["u"], [1, np.nan, 2.5])
+
+
+@pytest.mark.parametrize("name", ["a.jsonl", "a.ndjson", "a.json"])
+def test_lines_may_have_any_of_the_usual_endings(tmp_path, name):
+    assert list(read(tmp_path, "\n".join(map(json.dumps, RECORDS)), name).by_name) == ["t", "u"]
+
+
+def test_objects_inside_are_named_by_their_place(tmp_path):
+    assert list(read(tmp_path, [{"t": 0, "imu": {"x": 1, "y": 2}}, {"t": 1, "imu": {"x": 1, "y": 2}}]).by_name) == [
+        "t", "imu.x", "imu.y",
+    ]  # fmt: skip
+    runs = {"run1": {"t": TIME, "u": FORCE}, "run2": {"t": TIME, "u": FORCE}}
+    assert list(read(tmp_path, runs).by_name) == ["run1/t", "run1/u", "run2/t", "run2/u"]
+
+
+def test_units_beside_values_need_no_map(tmp_path):
+    values = list(range(20))
+    found = read(
+        tmp_path,
+        {
+            "time": {"unit": "ms", "values": values},
+            "force": {"unit": "N", "values": values},
+            "speed": {"unit": "rad/sec", "values": values},
+        },
+    )
+    assert list(found.by_name) == ["time [ms]", "force [N]", "speed [rad/sec]"]
+    wanted = header_map(found)
+    assert wanted is not None
+    assert [(channel.role, channel.unit) for channel in wanted.channel] == [("command", "N"), ("response", "rad/s")]
+
+
+def test_dates_become_seconds(tmp_path):
+    found = read(tmp_path, [{"when": f"2026-05-04T12:00:0{k}Z", "u": k} for k in range(5)])
+    assert found.clocks == ("when [s]",)
+    np.testing.assert_array_equal(found.by_name["when [s]"], range(5))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("", "no JSON"),
+        ("{", "no JSON"),
+        ('{"t": 1}\n{"t": }', "line 2"),
+        ('{"t": 1}\n[2]\n', "line 2 is no record in braces"),
+        ('{"t": 1e999}', "larger than any"),
+        ("[" * 100 + "]" * 100, "nested"),
+        ("[]", "no arrays"),
+        ("{}", "no arrays"),
+        ({"format": "hapteq.diagnosis/1"}, "a document of ours"),
+    ],
+)
+def test_what_cannot_be_read_is_refused_in_words(tmp_path, content, said):
+    with pytest.raises(ImportRefusedError) as refused:
+        read(tmp_path, content)
+    assert said in str(refused.value.happened)
+
+
+def test_a_document_of_ours_is_told_from_a_table(tmp_path):
+    (tmp_path / "a.json").write_text(json.dumps(RECORDS))
+    (tmp_path / "d.json").write_text(json.dumps({"format": "hapteq-diagnosis", "version": 1}))
+    assert not is_own_document(tmp_path / "a.json")
+    assert is_own_document(tmp_path / "d.json")

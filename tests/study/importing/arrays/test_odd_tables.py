@@ -1,0 +1,113 @@
+"""Tables as loggers really write them: delimiters at line ends, words beside numbers, cells that say "nothing"."""
+
+import numpy as np
+import pytest
+
+from study.importing.arrays.arrays import read_arrays
+from study.importing.header_map import header_map, header_problems
+from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.map_errors import ImportRefusedError
+
+VALUES = [[0.0, 1.5], [1.0, 2.5], [2.0, -3.5]]
+
+
+def read(tmp_path, text, settings=CsvMap()):  # noqa: B008
+    (tmp_path / "a.csv").write_text(text)
+    return read_arrays(tmp_path / "a.csv", settings)
+
+
+def table(delimiter, end, head_end="", decimal="."):
+    rows = [delimiter.join(str(value).replace(".", decimal) for value in row) + end for row in VALUES]
+    return "\n".join([delimiter.join(("t", "u")) + head_end, *rows]) + "\n"
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", "|"])
+@pytest.mark.parametrize("ends", [("{}", ""), ("{}", "{}"), ("{}{}{}", "{}{}{}"), ("{} ", "{} "), ("{}{}", "{}")])
+def test_delimiters_at_the_end_of_lines_are_no_columns(tmp_path, delimiter, ends):
+    body, head = (end.replace("{}", delimiter) for end in ends)
+    found = read(tmp_path, table(delimiter, body, head)).by_name
+    assert list(found) == ["t", "u"]
+    np.testing.assert_array_equal(np.stack(list(found.values()), axis=1), VALUES)
+
+
+def test_decimal_commas_with_a_delimiter_at_line_ends(tmp_path):
+    found = read(tmp_path, table(";", ";", decimal=",")).by_name
+    np.testing.assert_array_equal(np.stack(list(found.values()), axis=1), VALUES)
+
+
+def test_a_last_column_that_is_named_but_empty_stays(tmp_path):
+    found = read(tmp_path, "t,u,v\n0,1.5,\n1,2.5,\n2,-3.5,\n").by_name
+    assert list(found) == ["t", "u", "v"]
+    assert np.isnan(found["v"]).all()
+
+
+@pytest.mark.parametrize(
+    "empty", ["", "NaN", "-nan", "N/A", "#N/A", "n.a.", "null", "None", "--", "1.#QNAN", "-1.#IND"]
+)
+def test_a_cell_that_says_nothing_is_a_missing_sample(tmp_path, empty):
+    found = read(tmp_path, f"t,u\n0,1.5\n1,{empty}\n2,-3.5\n").by_name
+    np.testing.assert_array_equal(found["u"], [1.5, np.nan, -3.5])
+
+
+@pytest.mark.parametrize("words", [("ok", "ok", "late"), ("Rig 3", "Rig 3", "Rig 3"), ("3a", "3b", "3c")])
+def test_a_column_of_words_is_left_out_with_a_note(tmp_path, words):
+    rows = "\n".join(f"{t},{word},{u}" for (t, u), word in zip(VALUES, words, strict=True))
+    found = read(tmp_path, f"t,state,u\n{rows}\n")
+    assert list(found.by_name) == ["t", "u"]
+    assert found.notes == ("Left out: 'state' holds words, not numbers.",)
+
+
+@pytest.mark.parametrize("cell", ["1.234,5", "12:3", "3 mm", "1 2", "5%"])
+def test_a_number_that_is_not_understood_is_no_word(tmp_path, cell):
+    rows = "\n".join(f"{t},{u},{cell}" for t, u in VALUES).replace("1.234,5", '"1.234,5"')
+    with pytest.raises(ImportRefusedError, match="is not a number"):
+        read(tmp_path, f"t,u,v\n{rows}\n")
+
+
+def test_a_number_in_a_column_of_words_is_refused(tmp_path):
+    with pytest.raises(ImportRefusedError, match="Line 3: column 'state' holds words elsewhere"):
+        read(tmp_path, "t,state,u\n0,ok,1\n1,5,2\n2,ok,3\n3,ok,4\n4,ok,5\n5,ok,6\n")
+
+
+@pytest.mark.parametrize("text", ["t;u\n0;1.234,5\n1;2,5\n", "t;u\n0;1'234.5\n1;2.5\n", "t\tu\n0\t1 234.5\n1\t2.5\n"])
+def test_signs_between_thousands_are_refused_with_what_mends_them(tmp_path, text):
+    with pytest.raises(ImportRefusedError, match="write numbers without signs between thousands"):
+        read(tmp_path, text)
+
+
+ROWS = "\n".join(f"{k / 100},{k % 3},{k % 5}" for k in range(20))
+
+
+@pytest.mark.parametrize(
+    ("header", "units"),
+    [
+        ("time [sec],force [gf],accel [m/sec2]", ("s", "gf", "m/s^2")),
+        ("Time (msec),Torque (kgf·cm),Speed (RPM)", ("ms", "kgf cm", "rpm")),
+        ("time / s,torque / oz-in,angle / °", ("s", "ozf in", "deg")),
+        ('"time, s","force, lbf","speed, in/sec"', ("s", "lbf", "in/s")),
+        ("time in s,force in use / N,speed in m / s", ("s", "N", "m/s")),
+        ("Elapsed Time (s),Load (N),Displacement (μm)", ("s", "N", "um")),
+        ("index,time [s],force [N],angle [deg]", None),
+    ],
+)
+def test_headers_of_strangers_need_no_map(tmp_path, header, units):
+    rows = ROWS if units else "\n".join(f"{k},{row}" for k, row in enumerate(ROWS.splitlines()))
+    wanted = header_map(read(tmp_path, f"{header}\n{rows}\n"))
+    assert wanted is not None
+    found = (wanted.clock[0].time_unit, *(channel.unit for channel in wanted.channel))
+    assert found == (units or ("s", "N", "deg"))
+
+
+@pytest.mark.parametrize(
+    ("column", "said"),
+    [
+        ("force [Newt]", "'Newt' is not a unit known here (did you mean 'N'?)"),
+        ("force [pound]", "'pound' is not a unit known here (did you mean 'lbf'?)"),
+        ("force [g]", "grams as a force are written gf"),
+        ("force [kg]", "as a force write lbf, ozf or kgf"),
+        ("force [furlong]", "'furlong' is not a unit known here"),
+    ],
+)
+def test_a_unit_that_is_unclear_is_refused_by_name(tmp_path, column, said):
+    found = header_problems(read(tmp_path, f"time [s],{column},angle [deg]\n{ROWS}\n"))
+    assert any(said in problem for problem in found)

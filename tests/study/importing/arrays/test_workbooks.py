@@ -1,0 +1,131 @@
+"""Sheets of a workbook are read as tables."""
+
+import zipfile
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+from openpyxl import Workbook
+
+from study.importing.arrays.arrays import read_arrays
+from study.importing.build_recording import build_recording
+from study.importing.header_map import header_map
+from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.map_errors import ImportRefusedError
+
+NAMES = ["time [s]", "force [N]", "travel [mm]"]
+NOON = datetime(2026, 5, 4, 12)  # noqa: DTZ001 cells of a workbook have no time zone
+ROWS = [(k / 10, k % 3 - 1.5, 7 * k) for k in range(20)]
+
+
+@pytest.fixture
+def book(tmp_path):
+    def write(**sheets):
+        whole = Workbook()
+        whole.remove(whole.active)
+        for name, rows in sheets.items():
+            sheet = whole.create_sheet(name)
+            for row in rows:
+                sheet.append(row)
+        whole.save(tmp_path / "a.xlsx")
+        return tmp_path / "a.xlsx"
+
+    return write
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        [NAMES],
+        [["time", "force", "travel"], ["s", "N", "mm"]],
+        [["Rig 3"], ["date", NOON], ["rate", 10], [], NAMES],
+        [["Rig 3, by hand", None, None], ["time", "force", "travel"], ["[s]", "[N]", "[mm]"], []],
+    ],
+)
+def test_the_header_of_a_sheet_may_be_anywhere(book, above):
+    found = read_arrays(book(Sheet1=[*above, *ROWS]), CsvMap()).by_name
+    assert list(found) == NAMES
+    np.testing.assert_array_equal(np.stack(list(found.values()), axis=1), ROWS)
+
+
+def test_a_sheet_that_begins_further_in_and_misses_cells_is_read(book):
+    rows = [[None, *row] for row in ROWS]
+    rows[4][2] = rows[7][3] = None
+    found = read_arrays(book(Data=[[], [], [None, *NAMES], *rows]), CsvMap()).by_name
+    values = [found[name] for name in NAMES]
+    assert np.argwhere(np.isnan(values)).tolist() == [[1, 4], [2, 7]]
+    wanted = np.array(ROWS).T
+    np.testing.assert_array_equal(np.where(np.isnan(values), wanted, values), wanted)
+
+
+def test_sheets_that_are_alike_are_parts_and_one_without_numbers_is_left_out(book):
+    second = [(time, force, travel + 1) for time, force, travel in ROWS]
+    arrays = read_arrays(book(About=[["made", "by hand"]], Run1=[NAMES, *ROWS], Run2=[NAMES, *second]), CsvMap())
+    wanted = header_map(arrays)
+    assert wanted is not None
+    made = build_recording(wanted, [arrays.path])
+    assert arrays.notes == ("Left out: the sheet 'About' holds no rows of numbers.",)
+    assert [part["prefix"] for part in made.recording.meta["parts"]] == ["Run1/", "Run2/"]
+    expected = [row[2] / 1000 for row in (*ROWS, *second)]
+    np.testing.assert_allclose(made.recording.response.samples[:, 0], expected)
+
+
+def test_the_map_may_name_the_only_sheet(book):
+    path = book(Run1=[NAMES, *ROWS], Other=[["t", "u"], (0, 5), (1, 6)])
+    assert list(read_arrays(path, CsvMap(sheet="Run1")).by_name) == NAMES
+    assert list(read_arrays(path, CsvMap()).by_name) == [f"Run1/{name}" for name in NAMES] + ["Other/t", "Other/u"]
+    with pytest.raises(ImportRefusedError, match="no sheet 'Run9'; there are Run1, Other"):
+        read_arrays(path, CsvMap(sheet="Run9"))
+
+
+@pytest.mark.parametrize("step", [timedelta(milliseconds=250), timedelta(seconds=1)])
+def test_dates_become_seconds(book, step):
+    rows = [(NOON + k * step, force, travel) for k, (_, force, travel) in enumerate(ROWS)]
+    found = read_arrays(book(Data=[["when", "force [N]", "travel [mm]"], *rows]), CsvMap())
+    assert found.clocks == ("when [s]",)
+    np.testing.assert_allclose(found.by_name["when [s]"], np.arange(20) * step.total_seconds(), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ([["a", "b"], ["only", "words"]], "No sheet of it holds rows of numbers"),
+        ([], "No sheet of it holds rows of numbers"),
+        ([NAMES, *ROWS[:9], ("0,9", "x", 1), *ROWS[10:]], "heet 'Data', line 11, column"),
+        ([["t", "t"], (0, 1), (1, 2)], "its header names 't' twice"),
+    ],
+)
+def test_what_cannot_be_read_is_said_with_its_sheet(book, rows, said):
+    with pytest.raises(ImportRefusedError) as refused:
+        read_arrays(book(Data=rows), CsvMap())
+    assert said in refused.value.happened
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut off", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", b"t,u\n0,1\n"])
+def test_what_is_no_workbook_is_refused(tmp_path, content):
+    (tmp_path / "a.xlsx").write_bytes(content)
+    with pytest.raises(ImportRefusedError) as refused:
+        read_arrays(tmp_path / "a.xlsx", CsvMap())
+    assert ("password" in refused.value.happened) == content.startswith(b"\xd0")
+
+
+@pytest.mark.parametrize("cut", [40, 400, 2000])
+def test_a_damaged_workbook_is_a_named_error(book, cut):
+    path = book(Data=[NAMES, *ROWS])
+    path.write_bytes(path.read_bytes()[:-cut])
+    with pytest.raises(ImportRefusedError):
+        read_arrays(path, CsvMap())
+
+
+@pytest.mark.parametrize("member", ["xl/workbook.xml", "xl/worksheets/sheet1.xml", "[Content_Types].xml"])
+def test_a_workbook_with_a_broken_member_is_a_named_error(book, tmp_path, member):
+    path = book(Data=[NAMES, *ROWS])
+    for content in (None, b"<broken", b"<a/>"):
+        with zipfile.ZipFile(path) as whole, zipfile.ZipFile(tmp_path / "b.xlsx", "w") as spoiled:
+            for name in whole.namelist():
+                if name != member:
+                    spoiled.writestr(name, whole.read(name))
+                elif content is not None:
+                    spoiled.writestr(name, content)
+        with pytest.raises(ImportRefusedError):
+            read_arrays(tmp_path / "b.xlsx", CsvMap())
