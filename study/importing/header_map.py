@@ -17,8 +17,9 @@ from study.importing.map_format.signal_words import (
     plain_names,
     roles_of,
     unit_at_end,
+    unit_in,
 )
-from study.importing.surplus_arrays import CLOCK_WORDS, LEAST_SAMPLES, surplus_arrays
+from study.importing.surplus_arrays import CLOCK_WORDS, LEAST_SAMPLES, rates_in, surplus_arrays
 
 _TIME = re.compile(
     rf"((elapsed|running|test|total|relative|absolute|system|sample)[ _]?)?({'|'.join(sorted(CLOCK_WORDS))}|time stamp)"
@@ -33,7 +34,7 @@ def header_map(arrays: Arrays) -> ImportMap | None:
         return None
     table, prefixes = _table(arrays)
     times, rest = _columns(table)
-    clock = ClockMap(time=times[0].header, time_unit=times[0].unit)
+    clock = ClockMap(time=times[0].header, time_unit=times[0].unit) if times else ClockMap(rate=_rates(arrays)[0])
     roles = turn_imposed(rest, table.by_name, roles_of(rest) or ())
     channels = tuple(
         ChannelMap(
@@ -55,7 +56,8 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     table, _ = _table(arrays)
     told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
     left_out = [f"Left out: '{name}' {why}." for name, why in surplus_arrays(table).items()]
-    left_out += [f"Left out: '{name}' is no column." for name, array in arrays.by_name.items() if not array.ndim]
+    others = [name for name, array in arrays.by_name.items() if not array.ndim and name != wanted.clock[0].rate]
+    left_out += [f"Left out: '{name}' is no column." for name in others]
     return (f"Taken from the header: {told}.", *left_out, *_direction_notes(table, wanted))
 
 
@@ -76,7 +78,7 @@ def _table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
     columns = {name: array for name, array in arrays.by_name.items() if array.ndim}
     groups = groups_in(columns, LEAST_SAMPLES)
     members = len(groups.prefixes) * len(groups.names)
-    if members != len(columns) or not all(prefix.endswith("/") for prefix in groups.prefixes):
+    if members != len(columns) or not all(prefix.endswith(("/", "__")) for prefix in groups.prefixes):
         return Arrays(arrays.path, columns, arrays.clocks), ()
     first = {name: columns[full] for name, full in groups.names.items()}
     clocks = tuple(name for name, full in groups.names.items() if full in arrays.clocks)
@@ -99,7 +101,7 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
     times, rest = _columns(table)
     twice = [name for name, count in Counter(column.name for column in rest).items() if count > 1]
     return (
-        *_open_time(times, rest),
+        *_open_time(times, rest, _rates(arrays)),
         *(f"'{column.header}': {column.doubt}" for column in rest if column.doubt),
         *(f"nothing says {what}" for what in open_roles([column for column in rest if not _is_time(column)])),
         *(f"several columns are called '{name}'" for name in twice),
@@ -122,11 +124,18 @@ def _is_time(column: ParsedName) -> bool:
     return bool(_TIME.fullmatch(column.name) or _TIME.fullmatch(unit_at_end(column.name)[0]))
 
 
-def _open_time(times: Sequence[ParsedName], rest: Sequence[ParsedName]) -> Iterator[str]:
+def _rates(arrays: Arrays) -> list[str]:
+    """Single numbers that are a sample rate in hertz."""
+    return [name for name in rates_in(arrays) if "Hz" in (unit_in(name)[1], unit_at_end(name)[1])]
+
+
+def _open_time(times: Sequence[ParsedName], rest: Sequence[ParsedName], rates: Sequence[str]) -> Iterator[str]:
     bare = [column.header for column in rest if _is_time(column)]
     if len(times) > 1:
         yield f"which of {' and '.join(repr(column.header) for column in times)} is the time is open"
     elif bare:
         yield f"'{bare[0]}' does not say in which unit the time is (as in '{bare[0]} [s]')"
-    elif not times:
-        yield "no column is the time (as in 'time [s]')"
+    elif len(rates) > 1:
+        yield f"which of {' and '.join(map(repr, rates))} is the sample rate is open"
+    elif not times and not rates:
+        yield "no column is the time (as in 'time [s]'), and no number is the sample rate (as in 'rate_Hz')"

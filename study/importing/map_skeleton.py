@@ -14,13 +14,12 @@ from study.importing.surplus_arrays import (
     LEAST_SAMPLES,
     equal_clocks,
     is_growing_time,
-    name_words,
+    rates_in,
     surplus_arrays,
     time_in_table,
 )
 
 _FORCES = ("force", "torque")
-_RATE_WORDS = {"fs", "rate", "samplerate"}
 _TIME_UNITS = ("s", "ms", "us", "min")
 
 
@@ -146,7 +145,7 @@ def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
     if clocks:
         return
     yield "\n[[clock]]"
-    rates = [name for name, array in arrays.by_name.items() if array.size == 1 and name_words(name) & _RATE_WORDS]
+    rates = rates_in(arrays)
     yield f"rate = {json.dumps(rates[0])}           # in hertz" if rates else "# rate_hz = 1000, or unknown = true"
 
 

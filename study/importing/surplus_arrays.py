@@ -20,6 +20,7 @@ _INDEX = re.compile(
     r"column1|#|unnamed: 0|(index|idx|i|n|nr|no|number|row|record|sample|scan|point)[ _.]?(nr|no|number|#)?\.?",
     re.IGNORECASE,
 )
+RATE_WORDS = {"fs", "rate", "samplerate", "sampling"}
 _USUAL_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
 _EVEN = 0.02
 SAME_CLOCK = 0.5
@@ -52,6 +53,11 @@ def name_words(name: str) -> set[str]:
     """Words of a name without its unit, in small letters."""
     plain = unit_in(name)[0].lower()
     return set("".join(letter if letter.isalnum() else " " for letter in plain).split())
+
+
+def rates_in(arrays: Arrays) -> tuple[str, ...]:
+    """Single numbers that are called a sample rate."""
+    return tuple(name for name, array in arrays.by_name.items() if array.size == 1 and name_words(name) & RATE_WORDS)
 
 
 def _is_empty(array: Array) -> bool:

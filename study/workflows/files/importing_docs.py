@@ -141,6 +141,7 @@ cannot be understood is refused by name, and then nothing is written. `hapteq va
   Of a force and a displacement alone, neither called a command, the displacement is the command where it follows ramps
   or sines and the force does not, as on a testing machine; else the force. Either is said, with the way to turn it.
   The map that is proposed also takes `cmd`, `u` beside `y`, and `ref` or `target` (a helper) for what they say.
+* **Rate**: where no column is the time, a single number in hertz (`fs_Hz`, `rate [Hz]`) is the sample rate.
 * **Time** runs along the only dimension of a channel. Of a table of arrays take a row (`y[0]`) or column (`y[:, 0]`).
   Signals that carry their own time, as tables of [time, value] and as Simulink stores them (`force.time`,
   `force.signals.values`, several as `scope.signals.1.values`), get a `[[clock]]` each in the map that is proposed;

@@ -11,6 +11,9 @@ from study.importing.map_skeleton import map_skeleton
 from study.store.disk.file_errors import UnusableFileError
 
 
+NO_TIME = "no column is the time (as in 'time [s]'), and no number is the sample rate (as in 'rate_Hz')"
+
+
 def arrays(tmp_path, header):
     path = tmp_path / "a.csv"
     rows = np.column_stack([np.arange(20) / 100, *[np.ones(20)] * (header.count(","))])
@@ -105,7 +108,7 @@ def test_a_header_that_leaves_something_open_is_not_guessed_at(tmp_path, header)
     [
         ("time [s],position [furlong],force [N]", ["'position [furlong]': 'furlong' is not a unit known here"]),
         ("time,current,angle", ["'time' does not say in which unit the time is (as in 'time [s]')"]),
-        ("displacement_mm,force_N", ["no column is the time (as in 'time [s]')"]),
+        ("displacement_mm,force_N", [NO_TIME]),
         ("time [s],current [A],voltage [V],speed [rpm]",
          ["nothing says whether 'current [A]' is the command", "nothing says whether 'voltage [V]' is the command"]),
         ("time [s],force [N],knob,ax [g]", ["nothing says what 'knob' is"]),
@@ -227,3 +230,31 @@ def test_roles_are_proposed_where_names_say_them(tmp_path, names, roles):
     text = map_skeleton(Arrays(tmp_path / "a.npz", runs(*names)))
     found = [line.split('"')[1] for line in text.splitlines() if line.startswith("role = ")]
     assert found == roles
+
+
+def test_a_number_in_hertz_is_the_rate_of_an_archive_and_its_runs_are_parts(tmp_path):
+    count = 400
+    runs = {
+        f"run{run}__{name}": np.full(count, float(run)) for run in (1, 2) for name in ("force_N", "displacement_mm")
+    }
+    np.savez(tmp_path / "a.npz", fs_Hz=250.0, **runs)
+    read = read_arrays(tmp_path / "a.npz", CsvMap())
+    built = build_recording(header_map(read), [tmp_path / "a.npz"], lambda share: None)
+    recording = built.recording
+    assert recording.sample_rate_hz == 250.0
+    assert len(recording) == 2 * count
+    assert recording.command.samples[[0, -1], 0].tolist() == [1.0, 2.0]
+    assert recording.response.samples[-1, 0] == pytest.approx(2e-3)
+
+
+@pytest.mark.parametrize(
+    ("beside", "problem"),
+    [
+        ({"fs": 250.0}, "no number is the sample rate (as in 'rate_Hz')"),
+        ({"fs_Hz": 250.0, "rate_Hz": 500.0}, "which of 'fs_Hz' and 'rate_Hz' is the sample rate is open"),
+    ],
+    ids=["without a unit", "two"],
+)
+def test_a_rate_without_a_unit_is_not_guessed_and_of_two_none_is_chosen(tmp_path, beside, problem):
+    np.savez(tmp_path / "a.npz", force_N=np.ones(400), displacement_mm=np.ones(400), **beside)
+    assert any(problem in said for said in header_problems(read_arrays(tmp_path / "a.npz", CsvMap())))
