@@ -10,7 +10,6 @@ from study.importing.map_format.signal_words import name_signal, propose_roles, 
 from study.importing.map_skeleton import map_skeleton
 from study.store.disk.file_errors import UnusableFileError
 
-
 NO_TIME = "no column is the time (as in 'time [s]'), and no number is the sample rate (as in 'rate_Hz')"
 
 
