@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from study.importing.arrays.table_cells import EMPTY, Line, holds_number, is_comment, split_row
 from study.importing.arrays.table_layout import TableLayout, find_layout
+from study.importing.arrays.table_marks import NO_THOUSANDS
 from study.importing.arrays.table_text import read_text
 from study.importing.arrays.time_stamps import STAMP_WORDS, is_stamp, join_stamps, read_stamps
 from study.importing.map_format.import_map import CsvMap
@@ -25,7 +26,6 @@ MOST_ROWS = 20_000_000
 """Five hours at 1 kHz."""
 MOST_COLUMNS = 10_000
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
-_NO_THOUSANDS = "write numbers without signs between thousands"
 _MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
 
 
@@ -70,7 +70,7 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
     for name in words:
         _require_words(found[name], name, body, layout)
     left_out = tuple(f"Left out: '{name}' holds words, not numbers." for name in layout.names if name in words)
-    return replace(made, notes=(*made.notes, *left_out))
+    return replace(made, notes=(*made.notes, *left_out, *layout.notes))
 
 
 def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
@@ -165,8 +165,10 @@ def _require_equal_rows(body: list[Line], layout: TableLayout) -> None:
 
 def _mend_row(number: int, line: str, body: list[Line], delimiter: str) -> str:
     """What to do about a row of another width."""
-    if any(_THOUSANDS.fullmatch(field.strip()) for field in re.split(r"[;\t|]", line)):
-        return _NO_THOUSANDS
+    if any(_THOUSANDS.fullmatch(field.strip(' "')) for field in re.split(r"[;\t|]", line)):
+        return NO_THOUSANDS
+    if delimiter in ", " and re.search(rf"(?<![\d.])[1-9]\d{{0,2}}{delimiter}\d{{3}}(?!\d)", line):
+        return f"where '{delimiter}' separates thousands, {NO_THOUSANDS}; else take that line out, or fill it up"
     if delimiter == " " and body[0][0] == number:
         return "where blanks delimit, put names that hold some in quotes"
     if body[0][0] == number:
@@ -208,6 +210,7 @@ def _numbers(column: "pd.Series[str]", name: str, body: list[Line], layout: Tabl
         comma = layout.decimal == "." and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", text.strip())
         hint = '; where the decimal sign is a comma, the map says decimal = "," under [csv]' if comma else ""
         dated = f"; {STAMP_WORDS}" if re.search(r"\d[-/:]\d", text) else ""
-        thousands = f"; {_NO_THOUSANDS}" if _THOUSANDS.fullmatch(text.strip()) else ""
-        raise ValueError(f"line {number}, column '{name}': '{text}' is not a number{hint}{dated}{thousands}")
+        thousands = f"; {NO_THOUSANDS}" if _THOUSANDS.fullmatch(text.strip()) else ""
+        mend = hint or dated or thousands or "; correct it, or leave it empty where the sample is missing"
+        raise ValueError(f"line {number}, column '{name}': '{text}' is not a number{mend}")
     return np.asarray(values, dtype=np.float64)

@@ -29,7 +29,8 @@ def split_row(line: str, delimiter: str) -> list[str]:
     if not line:
         return []
     if delimiter == " " and '"' not in line:
-        if all(map(_BRACKETED.fullmatch, words := line.split())):
+        words = line.split()
+        if all(is_empty(word) or _BRACKETED.fullmatch(word) for word in words):
             return words
         return re.split(r"\s+(?![\[(])", line.strip())  # `force [N]` is one field
     try:
@@ -52,6 +53,11 @@ def is_empty(field: str) -> bool:
     return field.lower() in EMPTY
 
 
+def filled_width(fields: Sequence[str]) -> int:
+    """Without empty fields at the end."""
+    return max((place for place, field in enumerate(fields, start=1) if field), default=0)
+
+
 def is_text(field: str) -> bool:
     """Whether a field is words, or a digit with letters (`3a`), not a number in a spelling that is not understood
     (`1.234,5`, `12:30`, `3 mm`) nor several in one field."""
@@ -67,6 +73,16 @@ def is_unit(text: str) -> bool:
     except UnknownUnitError:
         return False
     return True
+
+
+def holds_data(fields: Sequence[str], decimal: str) -> bool:
+    """Whether any is a number in whatever spelling, a date or a clock time, as no header has."""
+    return holds_number(fields, decimal) or any(is_stamp(field) or _is_spelled_number(field) for field in fields)
+
+
+def _is_spelled_number(field: str) -> bool:
+    like = _LIKE_A_NUMBER.fullmatch(field)
+    return like is not None and not like["rest"]
 
 
 def are_numbers(fields: Sequence[str], decimal: str, texts: Collection[int] = ()) -> bool:

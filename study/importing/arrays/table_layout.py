@@ -6,18 +6,21 @@ units with the header above; what stands higher is remarks.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
+from itertools import pairwise, takewhile
 
 from equalizer.signals.units import parse_unit, plain_unit
 from study.importing.arrays.table_cells import (
     COMMENTS,
     EMPTY,
     Line,
+    filled_width,
     first_numbers,
+    holds_data,
     holds_number,
     is_comment,
     is_number,
+    is_text,
     is_unit,
     split_row,
 )
@@ -38,6 +41,7 @@ class TableLayout:
     body: Sequence[Line]
     texts: frozenset[int] = frozenset()
     """Columns that hold words, by their place."""
+    notes: tuple[str, ...] = ()
 
 
 def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
@@ -47,16 +51,22 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
         raise ValueError("it holds no lines")
     marks = find_marks(rows, settings)
     begin = first_numbers(rows, marks.delimiter, marks.decimal, marks.texts)
-    above = [] if begin is None else _rows_above(lines, rows, begin, marks.delimiter)
-    if begin is not None and marks.delimiter != " ":
-        least = max([len(settings.names), *map(_width, above[-2:])])
-        rows = [*rows[:begin], *_without_empty_ends(rows[begin:], marks.delimiter, least)]
-    if begin is None or settings.names:
+    if begin is None:
         return _with_given_names(rows, begin, marks, settings)
+    whole, notes = _without_remarks_below(rows, begin, marks)
+    above = _rows_above(lines, whole, begin, marks.delimiter)
+    faulty = _count_faulty(whole[:begin], len(split_row(whole[begin][1], marks.delimiter)), marks)
+    least = max([len(settings.names), *map(filled_width, above[: len(above) - faulty][-2:])])
+    rows = [*whole[: begin - faulty], *_without_empty_ends(whole[begin - faulty :], marks.delimiter, least)]
+    if settings.names:
+        return replace(_with_given_names(rows, begin, marks, settings), notes=notes)
     fields = split_row(rows[begin][1], marks.delimiter)
     width = len(fields)
     named = [_fit_header(row, fields, marks.delimiter) for row in above]
     header, units = _header_and_units(named, width, marks.decimal)
+    if header is None and faulty:
+        header, units = _header_and_units(named[:-faulty], width, marks.decimal)
+        begin -= 0 if header is None else faulty
     if header is not None:
         names = _with_units(_name_columns(header), units)
     elif begin == 0 or (len(above[-1]) == 1 < width and all(len(row) != width for row in above)):  # remarks
@@ -64,7 +74,7 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
     else:
         begin = _first_header(rows[:begin], width, marks) + 1
         names = _name_columns(split_row(rows[begin - 1][1], marks.delimiter))
-    return TableLayout(marks.delimiter, marks.decimal, tuple(names), rows[begin:], marks.texts)
+    return TableLayout(marks.delimiter, marks.decimal, tuple(names), rows[begin:], marks.texts, notes)
 
 
 def _with_given_names(rows: Sequence[Line], begin: int | None, marks: TableMarks, settings: CsvMap) -> TableLayout:
@@ -81,6 +91,8 @@ def _with_given_names(rows: Sequence[Line], begin: int | None, marks: TableMarks
 
 def _without_empty_ends(body: Sequence[Line], delimiter: str, least: int) -> Sequence[Line]:
     """Without the delimiters with which all rows end, as far as at least so many columns are left."""
+    if delimiter == " ":
+        return body
     surplus = len(split_row(body[0][1], delimiter)) - max(least, 1)
     blanks = f" \t{delimiter}"
     for _, text in body:
@@ -90,9 +102,23 @@ def _without_empty_ends(body: Sequence[Line], delimiter: str, least: int) -> Seq
     return [(number, text.rsplit(delimiter, surplus)[0]) for number, text in body]
 
 
-def _width(fields: Sequence[str]) -> int:
-    """Without empty fields at the end."""
-    return max((place for place, field in enumerate(fields, start=1) if field), default=0)
+def _without_remarks_below(
+    rows: Sequence[Line], begin: int, marks: TableMarks
+) -> tuple[Sequence[Line], tuple[str, ...]]:
+    """Without lines of words below the last row, as `End of file`, that are no row; a sentence for each."""
+    width, end = len(split_row(rows[begin][1], marks.delimiter)), len(rows)
+    while end > begin + 1:
+        fields = [field for field in split_row(rows[end - 1][1], marks.delimiter) if field]
+        if len(fields) == width or not all(map(is_text, fields)):
+            break
+        end -= 1
+    return rows[:end], tuple(f"Left out: line {number}, '{text.strip()[:60]}'." for number, text in rows[end:])
+
+
+def _count_faulty(above: Sequence[Line], width: int, marks: TableMarks) -> int:
+    """How many rows directly above the first row of numbers are data too, with a cell that is wrong."""
+    rows = (split_row(text, marks.delimiter) for _, text in reversed(above))
+    return sum(1 for _ in takewhile(lambda fields: len(fields) == width and holds_data(fields, marks.decimal), rows))
 
 
 def _strip_comment(line: str) -> str:
@@ -100,14 +126,27 @@ def _strip_comment(line: str) -> str:
 
 
 def _rows_above(lines: Sequence[Line], rows: Sequence[Line], begin: int, delimiter: str) -> list[list[str]]:
-    """Those that are no comments, and below them a comment that holds units; comments where there is nothing else."""
-    plain = [split_row(text, delimiter) for _, text in rows[:begin]]
+    """Those that are no comments, and below them a comment that holds units; comments where there is nothing else. A
+    mark of comments that stands alone in the first of as many fields as there are columns is a name."""
+    narrow = len(split_row(_without_empty_ends(rows[begin:], delimiter, 1)[0][1], delimiter))
+    widths = range(narrow, len(split_row(rows[begin][1], delimiter)) + 1)
+    plain = [
+        fields
+        for number, text in lines
+        if number < rows[begin][0]
+        if (fields := split_row(text, delimiter))
+        and (not is_comment(text) or _is_marked_header(fields, widths, delimiter))
+    ]
     last = rows[begin - 1][0] if begin else 0
     between = [text for number, text in lines if last < number < rows[begin][0]]
     comments = [fields for text in between if (fields := split_row(_strip_comment(text), delimiter))]
     if not plain:
         return comments
     return plain + [fields for fields in comments if len(fields) == len(plain[-1]) and _are_units(fields)][-1:]
+
+
+def _is_marked_header(fields: list[str], widths: range, delimiter: str) -> bool:
+    return delimiter != " " and len(fields) in widths and fields[0] in COMMENTS and not any(map(is_comment, fields[1:]))
 
 
 def _first_header(above: Sequence[Line], width: int, marks: TableMarks) -> int:
@@ -138,8 +177,8 @@ def _header_and_units(
     last = words[-1] if words else None
     before = words[-2] if len(words) > 1 else None
     if last and len(words) > 1 and _are_units(last):  # units below what is no header do not become the header
-        return (before, last) if before and not holds_number(before, decimal) else (None, None)
-    return (None if last is None or holds_number(last, decimal) else last), None
+        return (before, last) if before and not holds_data(before, decimal) else (None, None)
+    return (None if last is None or holds_data(last, decimal) else last), None
 
 
 def _are_units(fields: Sequence[str]) -> bool:

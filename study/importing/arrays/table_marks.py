@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from study.importing.arrays.table_cells import (
     Line,
     are_numbers,
+    filled_width,
     first_numbers,
     holds_number,
     is_empty,
@@ -20,6 +21,8 @@ from study.importing.map_format.signal_words import name_signal
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _SAMPLED = 32
 """Rows that delimiter and decimal sign are tried on."""
+_POINTED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+")
+NO_THOUSANDS = "write numbers without signs between thousands"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +35,12 @@ class TableMarks:
 
 def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
     """Delimiter and decimal sign by which there are as many columns as the map names; or by which most rows are
-    numbers: of several, those that split the line above them alike, then those with the most columns. Where more are,
-    those by which the most columns are numbers beside columns of words; else what splits the rows alike.
-    Raises ValueError where a comma may be either sign."""
+    numbers: of several, tabs before blanks, those that split the line above them alike, then those with the most
+    columns. Where more are, those by which the most columns are numbers beside columns of words; else what splits the
+    rows alike. Raises ValueError where a comma or a point may be either sign."""
     sample = rows[:: max(len(rows) // _SAMPLED, 1)]
-    best, found = (False, 0, False, 0), None
+    tabbed = all("\t" in text for _, text in sample[len(sample) // 2 :])
+    best, found = (False, 0, False, False, 0), None
     for delimiter, decimal in _pairs(sample, settings):
         read = _rows_of_numbers(sample, TableMarks(delimiter, decimal))
         if not read:
@@ -44,8 +48,10 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
         columns = Counter(map(len, read)).most_common(1)[0][0]
         begin = first_numbers(rows, delimiter, decimal)
         header = rows[begin - 1][1] if begin else ""
-        alike = len(split_row(header, delimiter)) == columns and not _is_no_name(header, decimal, columns)
-        rank = (columns == len(settings.names), len(read), alike, columns)
+        named = split_row(header, delimiter)
+        fits = len(named) == columns or filled_width(named) == max(map(filled_width, read))
+        alike = fits and not _is_no_name(header, decimal, columns)
+        rank = (columns == len(settings.names), len(read), not (tabbed and delimiter == " "), alike, columns)
         if rank > best:
             best, found = rank, TableMarks(delimiter, decimal)
     beside = _beside_words(sample, settings)
@@ -53,6 +59,8 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
         found = beside
     if found and found.decimal == "," and not settings.decimal:
         _require_decimals(sample, found)
+    if found and found.decimal == "." and not settings.decimal:
+        _require_points(rows, sample, found)
     delimiter = settings.delimiter or _likely_delimiter(sample, settings.decimal)
     return found or TableMarks(delimiter, settings.decimal or ".")
 
@@ -112,6 +120,29 @@ def _require_decimals(sample: Sequence[Line], marks: TableMarks) -> None:
             f"line {number}: the comma in '{field}' may separate thousands; where the decimal sign is a comma, "
             'the map says decimal = "," under [csv]'
         )
+
+
+def _require_points(rows: Sequence[Line], sample: Sequence[Line], marks: TableMarks) -> None:
+    """Raises ValueError where each point in a column may as well separate thousands, as in 1.886 beside 946."""
+    columns = list(zip(*_rows_of_numbers(sample, marks), strict=False))
+    for place in (place for place, fields in enumerate(columns) if _may_be_thousands(fields)):
+        whole = [fields[place] for fields in _rows_of_numbers(rows, marks) if len(fields) > place]
+        if _may_be_thousands(whole):
+            shown = next(field for field in whole if "." in field)
+            raise ValueError(
+                f"the point in '{shown}' may separate thousands, for smaller numbers of its column have none; where "
+                f'it is the decimal sign, the map says decimal = "." under [csv], else {NO_THOUSANDS}'
+            )
+
+
+def _may_be_thousands(fields: Sequence[str]) -> bool:
+    numbers = [field for field in fields if not is_empty(field)]
+    pointed = [field for field in numbers if "." in field]
+    return (
+        0 < len(pointed) < len(numbers)
+        and all(_POINTED.fullmatch(field) for field in pointed)
+        and all(re.fullmatch(r"[-+]?\d{1,3}", field) for field in numbers if "." not in field)
+    )
 
 
 def _likely_delimiter(sample: Sequence[Line], decimal: str) -> str:

@@ -47,6 +47,7 @@ def test_columns_without_a_header_are_numbered(tmp_path):
 
 
 _THOUSANDS = "write numbers without signs between thousands"
+_CORRECT = "correct it, or leave it empty where the sample is missing"
 _COMMA = (
     "Line 3, column 'u': '0,25' is not a number; where the decimal sign is a comma, the map says decimal = \",\" under "
     "[csv]."
@@ -58,7 +59,7 @@ _COMMA = (
     [
         ("", {}, "It holds no lines."),
         ("t,u\n", {}, "It has a header, but no rows below it."),
-        ("t,u\n0,1\n1,OK\n", {}, "Line 3, column 'u': 'OK' is not a number."),
+        ("t,u\n0,1\n1,OK\n", {}, f"Line 3, column 'u': 'OK' is not a number; {_CORRECT}."),
         ("t;u\n0;1.5\n1;0,25\n", {}, _COMMA),
         ("t;u\n0;1\n1;0,25\n", {"decimal": "."}, _COMMA),
         (
@@ -70,7 +71,7 @@ _COMMA = (
         ("t [s],u [V]\ns,N\n0,1\n", {}, "Its header says V in 'u [V]', and its row of units says N."),
         ("t_s,travel_mm\ns,m\n0,1\n", {}, "Its header says mm in 'travel_mm', and its row of units says m."),
         ("t;u\n0;1.234,5\n1;2,5\n", {}, f"Line 2, column 'u': '1.234,5' is not a number; {_THOUSANDS}."),
-        ("t,u\nabc,def\n0,x\n", {}, "Line 2, column 't': 'abc' is not a number."),
+        ("t,u\nabc,def\n0,x\n", {}, f"Line 2, column 't': 'abc' is not a number; {_CORRECT}."),
     ],
 )
 def test_what_is_wrong_with_a_table_is_reported_with_its_line(tmp_path, text, settings, sentence):

@@ -111,3 +111,45 @@ def test_headers_of_strangers_need_no_map(tmp_path, header, units):
 def test_a_unit_that_is_unclear_is_refused_by_name(tmp_path, column, said):
     found = header_problems(read(tmp_path, f"time [s],{column},angle [deg]\n{ROWS}\n"))
     assert any(said in problem for problem in found)
+
+
+@pytest.mark.parametrize("below", ["End of file", "*** stopped by hand ***", "end;;", "\n\nSaved\nBye"])
+def test_words_below_the_last_row_are_left_out_with_a_note(tmp_path, below):
+    found = read(tmp_path, f"{table(';', '')}{below}\n")
+    np.testing.assert_array_equal(np.stack(list(found.by_name.values()), axis=1), VALUES)
+    assert len(found.notes) == len([line for line in below.splitlines() if line])
+    assert all(note.startswith("Left out: line ") for note in found.notes)
+
+
+@pytest.mark.parametrize("row", ["2;", "3;4;5", "3;x;5"])
+def test_a_row_below_that_holds_numbers_is_refused(tmp_path, row):
+    with pytest.raises(ImportRefusedError, match=r"Line 5"):
+        read(tmp_path, f"{table(';', '')}{row}\n".replace("2;\n", "2\n"))
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", "|"])
+@pytest.mark.parametrize("above", ["", "Rig 3\n", "# Rig 3\n"])
+@pytest.mark.parametrize("end", ["", "{}"])
+def test_a_mark_of_comments_may_be_the_name_of_a_column(tmp_path, delimiter, above, end):
+    end = end.replace("{}", delimiter)
+    rows = [delimiter.join(map(str, (k, *row))) + end for k, row in enumerate(VALUES)]
+    head = delimiter.join(("#", "t", "u"))
+    assert list(read(tmp_path, f"{above}{head}\n" + "\n".join(rows)).by_name) == ["#", "t", "u"]
+
+
+@pytest.mark.parametrize(("cells", "open_sign"), [(("946", "1.886", "-12.004"), True), (("1.886", "2.004"), False),
+                                                  (("946", "0.886"), False), (("946", "1.88"), False)])  # fmt: skip
+def test_points_that_may_separate_thousands_are_refused_until_the_map_states_the_decimal_sign(
+    tmp_path, cells, open_sign
+):
+    text = "t;u\n" + "".join(f"{k};{cell}\n" for k, cell in enumerate(cells))
+    if open_sign:
+        with pytest.raises(ImportRefusedError, match=r"point in '1\.886' may separate thousands"):
+            read(tmp_path, text)
+    found = read(tmp_path, text, CsvMap(decimal=".")).by_name["u"]
+    np.testing.assert_array_equal(found, [float(cell) for cell in cells])
+
+
+def test_a_first_row_with_a_wrong_cell_does_not_become_the_header(tmp_path):
+    with pytest.raises(ImportRefusedError, match="Line 3, column 'u \\[N\\]': '1'234' is not a number"):
+        read(tmp_path, "t;u\ns;N\n0;1'234\n1;2'345\n2;300\n")
