@@ -174,7 +174,10 @@ def test_a_file_that_says_nothing_gets_a_map_to_complete(tmp_path):
     with pytest.raises(MapNeededError) as refused:
         import_recording(ImportPlan((tmp_path / "a.npz",), None, tmp_path / "r.h5"))
     assert 'value = "u"' in refused.value.skeleton
-    assert refused.value.happened == "No column is the time (as in 'time [s]'); nothing says what 'y' is."
+    assert refused.value.happened == (
+        "No column is the time (as in 'time [s]'), and no number is the sample rate (as in 'rate_Hz'); nothing says "
+        "what 'y' is."
+    )
 
 
 @pytest.mark.parametrize("out", ["there.h5", "nowhere/r.h5"])
