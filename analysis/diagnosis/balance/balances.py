@@ -1,6 +1,7 @@
 """The force balances of recordings, one per command: in the band that noise allows, and in that of the motion."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,11 +12,14 @@ from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motion_band_hz, motions_of
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.types import Mapper, TimeBudget
+from analysis.diagnosis.settings import STILL_SHARE
+from analysis.diagnosis.types import Mapper, Mask, TimeBudget
 from equalizer.signals.recording import Recording
 
 NARROWER = 0.5
 """Share of the band that noise allows, below which the band of the motion is another look."""
+RESTS_ELSE = 0.5
+"""Share of the samples in which the device moves, below which these alone are another look."""
 
 
 def find_balances(
@@ -30,9 +34,11 @@ def find_balances(
         found = _balances_per_axis(motions, recordings, without, time_left, map_)
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
-    if any(balance.named or not balance.tested for balance in found) or not time_left():
-        return found
-    return _balances_in_motion_band(records, motions, without, time_left, map_) or found
+    for look_again in (_balances_in_motion_band, _balances_in_motion):
+        if any(balance.named or not balance.tested for balance in found) or not time_left():
+            return found
+        found = look_again(records, motions, without, time_left, map_) or found
+    return found
 
 
 def _balances_in_motion_band(
@@ -53,6 +59,35 @@ def _balances_in_motion_band(
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
     return found if any(balance.named for balance in found) else ()
+
+
+def _balances_in_motion(
+    records: Sequence[Observed],
+    motions: Sequence[Motion],
+    without: frozenset[str],
+    time_left: TimeBudget,
+    map_: Mapper,
+) -> tuple[Balance, ...]:
+    """The balances of the samples in which the device moves; empty where it moves most of the time, or no law is named.
+    At rest a friction holds whatever is asked of it: no law foretells that, and what is linear takes its place."""
+    moving = [_moves(motion, motions) for motion in motions]
+    if np.mean(np.concatenate(moving)) > RESTS_ELSE:
+        return ()
+    kept = [
+        replace(motion, fit=motion.fit & moves, test=motion.test & moves)
+        for motion, moves in zip(motions, moving, strict=True)
+    ]
+    try:
+        found = _balances_per_axis(kept, [each.recording for each in records], without, time_left, map_)
+    except (NoMotionError, np.linalg.LinAlgError):
+        return ()
+    return found if any(balance.named for balance in found) else ()
+
+
+def _moves(motion: Motion, motions: Sequence[Motion]) -> Mask:
+    """(n,): where any channel is faster than what counts as standing still."""
+    squares = np.concatenate([each.velocity[each.fit] ** 2 for each in motions]).mean(axis=0)
+    return np.asarray((motion.velocity**2 > STILL_SHARE * squares).any(axis=1))
 
 
 def _balances_per_axis(
