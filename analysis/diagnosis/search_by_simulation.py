@@ -134,6 +134,7 @@ def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozen
 
 
 def _beside_motion(name: str, place: str, imposed: bool) -> bool:
-    """Whether an effect of the actuator or sensor cannot be seen by a force balance."""
-    tested = name == "body_on_actuator" or (name in TESTED_BY_BALANCE and not imposed)
-    return place in ("actuator", "sensor") and not tested
+    """Whether an effect of the actuator or sensor cannot be seen by a force balance. Where a motion is imposed, there is
+    no actuator."""
+    driven = not imposed and name != "body_on_actuator" and name not in TESTED_BY_BALANCE
+    return place == "sensor" or (place == "actuator" and driven)

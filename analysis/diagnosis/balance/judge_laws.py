@@ -202,8 +202,17 @@ def _judge_law(
         chosen, law = law.effect, replace(law, effect=PLAYED_AS[law.effect])
     formula = None if law.formula is None or values is None else law.formula(values)
     return JudgedLaw(
-        number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, formula=formula, possible=possible
-    )
+        number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, formula=formula, possible=possible,
+        sure=low > 0 or (gain > 0 and _folds_agree(regression, (rest, laws), (without, held))),
+    )  # fmt: skip
+
+
+def _folds_agree(
+    regression: Regression, sums: tuple[Sequence[int], Sequence[int]], errors: tuple[FloatArray, FloatArray]
+) -> bool:
+    """Whether the gain's interval is above zero over the folds and the few held-out blocks together."""
+    folds = (regression.cross_validated_errors(regression.columns_of(laws)) for laws in sums)
+    return gain_with_bound(*(np.concatenate(each) for each in zip(errors, folds, strict=True)))[1] > 0
 
 
 def _special_cases(effect: str) -> tuple[str, ...]:

@@ -44,6 +44,8 @@ class JudgedLaw:
     """Of a law that no catalogue effect plays."""
     possible: bool = True
     """Its numbers have signs and sizes that such physics can have."""
+    sure: bool = True
+    """Its gain is larger than what varies between stretches, those by which it was chosen among them."""
 
     @property
     def played_as(self) -> str:

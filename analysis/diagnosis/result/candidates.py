@@ -108,7 +108,7 @@ def with_balances(
         for law in (*balance.laws, *balance.others)
         if law.formula is None or (law.played_as, axis_letter(channels[axis], channels)) not in named
     ]
-    found += [(0, each) for each in unconfirmed]
+    found += [(1, each) for each in unconfirmed]
     left = [each for _, each in sorted(found, key=lambda ranked: ranked[0]) if (each.effect, each.axis) not in named]
     retuned = {**diagnosis.retuned, **constants}
     verdict = diagnosis.verdict
@@ -144,13 +144,13 @@ def _names_covered_by(effect: NamedEffect) -> tuple[str, ...]:
 
 
 def _rank(weighed: JudgedLaw) -> int:
-    """Missing physics that is sure to gain and can have such numbers before what is not or cannot; then a linear model
-    of a higher order; and last what takes next to nothing."""
+    """Missing physics that is sure to gain and can have such numbers before what is not, and what cannot; then a linear
+    model of a higher order; and last what takes next to nothing."""
     if weighed.law.linear:
-        return 2
-    if weighed.share < SMALL:
         return 3
-    return 0 if weighed.possible and weighed.gain_low > 0 else 1
+    if weighed.share < SMALL:
+        return 4
+    return 2 if not weighed.possible else int(not weighed.sure)
 
 
 def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...], in_samples: bool = False) -> tuple[str, ...]:
