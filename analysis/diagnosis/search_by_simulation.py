@@ -26,7 +26,7 @@ from equalizer.effects.placing import place_of_effect
 from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
 from equalizer.signals.recording import Recording
 
-TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
+TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity", "slew_limit")
 """Laws of the command that a force balance tests: what it does not name is absent."""
 GAINS = ("force_gain", "sensor_gain")
 """A model fitted to the recordings contains these: only against a calibrated one can a gain be wrong."""

@@ -16,8 +16,13 @@ ERRS = 1.05
 """RMS residual of a channel, over its noise, from which these guesses are tried."""
 
 
+def limit_slew(commands: FloatArray, step_s: float, rate: float) -> FloatArray:
+    """(n,): mean force over each step, from no force at the beginning. commands: (n,)."""
+    return np.asarray(_mean_and_end(commands, step_s, rate)[0])
+
+
 def _limit_rate(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    return np.asarray(_mean_and_end(commands, step_s, values["rate"])[0])
+    return limit_slew(commands, step_s, values["rate"])
 
 
 def _limit_rate_at_end(commands: FloatArray, step_s: float, values: Values) -> FloatArray:

@@ -25,6 +25,7 @@ from analysis.diagnosis.balance.command_laws import (
     coil_laws,
     command_laws,
     neighbours_of,
+    slew_laws,
 )
 from analysis.diagnosis.balance.inverse_balance import InverseBalance
 from analysis.diagnosis.balance.judge_laws import MOST_ALIKE, Balance, judge_laws
@@ -124,8 +125,8 @@ def find_actuator(balance: Balance, rotational: bool, without: frozenset[str], m
     return Actuator(law, judged, bool(beside) and alone <= held / (1 - TOLD))
 
 
-Kinds = Sequence[tuple[AnyCommandLaw, Sequence[CommandLaw]]]
-"""Laws of the command of one kind, and a sum that comes near to each of them."""
+Kinds = Sequence[tuple[AnyCommandLaw | None, Sequence[CommandLaw]]]
+"""Laws of the command of one kind, and a sum that comes near to each of them; None = there is no such sum."""
 
 
 def _kinds_of_laws(regression: Regression, rotational: bool, without: frozenset[str]) -> Kinds:
@@ -134,7 +135,11 @@ def _kinds_of_laws(regression: Regression, rotational: bool, without: frozenset[
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
     if not np.any(command):
         return ()
-    kinds = [(any_curve(command), list(command_laws(command)))]
+    whole = [motion.force[:, regression.axis] for motion in motions]
+    kinds: list[tuple[AnyCommandLaw | None, list[CommandLaw]]] = [
+        (any_curve(command), list(command_laws(command))),
+        (None, list(slew_laws(whole, motions[0].rate_hz))),
+    ]
     if motions[0].order == 0 and not rotational:
         position = np.concatenate([motion.position[motion.fit, own] for motion in motions])
         kinds.append((any_pull(position), list(coil_laws(position))))
@@ -145,7 +150,9 @@ def _kinds_of_laws(regression: Regression, rotational: bool, without: frozenset[
 def _worth_trying(turned: InverseBalance, kinds: Kinds, most: float, beside: tuple[int, ...]) -> list[CommandLaw]:
     """Laws of those kinds of which a sum that comes near to any leaves no more than `most`, on the samples that it is
     fitted to: others need not be tried one by one."""
-    return [law for near, laws in kinds if turned.least_error(near, beside) <= most for law in laws]
+    return [
+        law for near, laws in kinds if near is None or turned.least_error(near, beside) <= most for law in laws
+    ]
 
 
 def _in_place_of_motion(turned: InverseBalance, kinds: Kinds, named: tuple[int, ...]) -> Actuator | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.law import Formula
 from equalizer.effects.force_nonlinearity import square_law_force
+from equalizer.effects.slew_limit import limit_slew
 from equalizer.signals.signal import FloatArray
 
 DEAD, FULL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
@@ -27,7 +28,8 @@ GAPS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 travel. One held by a spring stays within a third of the gap, which is 2 here."""
 CLOSER = (0.95, 0.98, 1.02, 1.05)
 """Factors by which a number is moved, as long as that helps."""
-MOVED = ("width", "limit", "square", "gap", "power")
+MOVED = ("width", "limit", "square", "gap", "power", "rate")
+RATES = 20
 
 BENDS = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
 """Shares of the samples below a place where a piecewise linear function bends; of the command's size, a curve jumps
@@ -93,6 +95,19 @@ def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
             values = {"width": width, "power": power}
             yield CommandLaw("actuator_curve", values, _power_force, rich=True, formula=_power_formula)
     yield CommandLaw("actuator_asymmetry", {}, lambda u, _: np.stack([u, np.abs(u)], axis=1))
+
+
+def slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[CommandLaw]:
+    """The command followed at a limited rate, as a positioning servo follows its target. commands: (n,) each; rates
+    from the full stroke in the longest of them to the fastest change."""
+    fastest = max(float(np.abs(np.diff(each)).max(initial=0.0)) for each in commands) * rate_hz
+    slowest = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(each) for each in commands)
+    for rate in np.geomspace(slowest, fastest, RATES)[:-1] if 0 < slowest < fastest else ():
+        yield CommandLaw("slew_limit", {"rate": float(rate)}, partial(_slewed_force, 1 / rate_hz))
+
+
+def _slewed_force(step_s: float, command: FloatArray, of: dict[str, float]) -> FloatArray:
+    return limit_slew(command, step_s, of["rate"])[:, None]
 
 
 def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:
