@@ -26,7 +26,7 @@ from equalizer.effects.placing import place_of_effect
 from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
 from equalizer.signals.recording import Recording
 
-TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity", "slew_limit")
+TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
 """Laws of the command that a force balance tests: what it does not name is absent."""
 GAINS = ("force_gain", "sensor_gain")
 """A model fitted to the recordings contains these: only against a calibrated one can a gain be wrong."""
@@ -134,7 +134,7 @@ def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozen
 
 
 def _beside_motion(name: str, place: str, imposed: bool) -> bool:
-    """Whether an effect of the actuator or sensor cannot be seen by a force balance. Where a motion is imposed, there is
-    no actuator."""
+    """Whether an effect of the actuator or sensor cannot be seen by a force balance. Where a motion is imposed, no
+    actuator drives it."""
     driven = not imposed and name != "body_on_actuator" and name not in TESTED_BY_BALANCE
     return place == "sensor" or (place == "actuator" and driven)

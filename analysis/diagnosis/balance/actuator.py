@@ -150,9 +150,7 @@ def _kinds_of_laws(regression: Regression, rotational: bool, without: frozenset[
 def _worth_trying(turned: InverseBalance, kinds: Kinds, most: float, beside: tuple[int, ...]) -> list[CommandLaw]:
     """Laws of those kinds of which a sum that comes near to any leaves no more than `most`, on the samples that it is
     fitted to: others need not be tried one by one."""
-    return [
-        law for near, laws in kinds if near is None or turned.least_error(near, beside) <= most for law in laws
-    ]
+    return [law for near, laws in kinds if near is None or turned.least_error(near, beside) <= most for law in laws]
 
 
 def _in_place_of_motion(turned: InverseBalance, kinds: Kinds, named: tuple[int, ...]) -> Actuator | None:

@@ -14,10 +14,12 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.settings import STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 
 NARROWER = 0.5
 """Share of the band that noise allows, below which the band of the motion is another look."""
+MOTIONS = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
 RESTS_ELSE = 0.5
 """Share of the samples in which the device moves, below which these alone are another look."""
 
@@ -102,6 +104,9 @@ def _balances_per_axis(
     axes = range(len(recordings[0].command.channels))
     if any(recording.meta.get("imposed") for recording in recordings):
         return tuple(judge_laws(search_beside_linear(motions, axis, turning, without, time_left)) for axis in axes)
+    # Only a target that is followed tells a limited rate: of a force, hardening springs and friction look like it.
+    targets = [quantity in MOTIONS for quantity in recordings[0].command.quantities]
+    allowed = [without if followed else without | {"slew_limit"} for followed in targets]
     return tuple(
-        doubt_laws_of_actuator(find_balance(motions, axis, turning, without, time_left, map_)) for axis in axes
+        doubt_laws_of_actuator(find_balance(motions, axis, turning, allowed[axis], time_left, map_)) for axis in axes
     )

@@ -30,6 +30,8 @@ CLOSER = (0.95, 0.98, 1.02, 1.05)
 """Factors by which a number is moved, as long as that helps."""
 MOVED = ("width", "limit", "square", "gap", "power", "rate")
 RATES = 20
+REACHED = 0.25
+"""Rates of a slew limit that are tried; share of the samples in which the command is reached, at least."""
 
 BENDS = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
 """Shares of the samples below a place where a piecewise linear function bends; of the command's size, a curve jumps
@@ -99,11 +101,15 @@ def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
 
 def slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[CommandLaw]:
     """The command followed at a limited rate, as a positioning servo follows its target. commands: (n,) each; rates
-    from the full stroke in the longest of them to the fastest change."""
+    from the full stroke in the longest of them to the fastest change, but those at which it is hardly ever reached:
+    what never catches up goes by the command's sign alone."""
     fastest = max(float(np.abs(np.diff(each)).max(initial=0.0)) for each in commands) * rate_hz
     slowest = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(each) for each in commands)
     for rate in np.geomspace(slowest, fastest, RATES)[:-1] if 0 < slowest < fastest else ():
-        yield CommandLaw("slew_limit", {"rate": float(rate)}, partial(_slewed_force, 1 / rate_hz))
+        law = CommandLaw("slew_limit", {"rate": float(rate)}, partial(_slewed_force, 1 / rate_hz))
+        reached = [np.abs(law.columns(each, law.values)[:, 0] - each) < rate / rate_hz for each in commands]
+        if np.mean(np.concatenate(reached)) > REACHED:
+            yield law
 
 
 def _slewed_force(step_s: float, command: FloatArray, of: dict[str, float]) -> FloatArray:
