@@ -70,11 +70,13 @@ def find_balance(
     without: frozenset[str],
     time_left: TimeBudget,
     map_: Mapper = map,
+    target: int | None = None,
 ) -> Balance:
     """The balance of one axis: laws of the motion and, where one earns it, a law of the command, through which the
-    commanded force is then passed before the laws of the motion are searched again."""
+    commanded force is then passed before the laws of the motion are searched again. target: derivative of the position
+    that the command is a target of; None = it is a force."""
     balance = judge_laws(search_beside_linear(motions, axis, rotational, without, time_left))
-    actuator = find_actuator(balance, rotational, without, map_) if balance.tested else None
+    actuator = find_actuator(balance, rotational, without, map_, target) if balance.tested else None
     if actuator is None:
         return balance
     judged = actuator.judged
@@ -99,20 +101,26 @@ def _pass_through_law(motion: Motion, axis: int, own: int, law: CommandLaw) -> M
     return replace(motion, force=force)
 
 
-def find_actuator(balance: Balance, rotational: bool, without: frozenset[str], map_: Mapper = map) -> Actuator | None:
+def find_actuator(
+    balance: Balance, rotational: bool, without: frozenset[str], map_: Mapper = map, target: int | None = None
+) -> Actuator | None:
     """The law of the command that leaves the smallest error; None where the balance has no clock, no command varies,
     no law of the command is allowed, or none can take enough."""
     search = balance.search
-    kinds = _kinds_of_laws(search.regression, rotational, without)
+    # Only what follows a target tells a limited rate: of a force, hardening springs and friction look like it.
+    barred = without if target is not None else without | {"slew_limit"}
+    kinds = _kinds_of_laws(search.regression, rotational, barred)
     if not np.isfinite(search.regression.motions[0].band_hz) or not kinds:
         return None
     turned = InverseBalance(
-        search, map_, any(each.law.effect in HOLDS_AT_REST and each.gain_low > 0 for each in balance.laws)
+        search, map_, any(each.law.effect in HOLDS_AT_REST and each.gain_low > 0 for each in balance.laws), target
     )
     instead = _in_place_of_motion(turned, kinds, tuple(each.place for each in balance.named))
     if instead is not None:
         return instead
-    plain, beside = min((turned.total_error(AS_COMMANDED, each), each) for each in _sums_to_try(search))
+    # Laws of the position would give it back where the balance is solved for it.
+    sums = _sums_to_try(search) if target is None else [()]
+    plain, beside = min((turned.total_error(AS_COMMANDED, each), each) for each in sums)
     laws = _worth_trying(turned, kinds, (1 - NOTABLE / 2) * plain, beside)
     if not laws:
         return None

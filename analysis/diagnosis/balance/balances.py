@@ -19,7 +19,6 @@ from equalizer.signals.recording import Recording
 
 NARROWER = 0.5
 """Share of the band that noise allows, below which the band of the motion is another look."""
-MOTIONS = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
 RESTS_ELSE = 0.5
 """Share of the samples in which the device moves, below which these alone are another look."""
 
@@ -104,9 +103,11 @@ def _balances_per_axis(
     axes = range(len(recordings[0].command.channels))
     if any(recording.meta.get("imposed") for recording in recordings):
         return tuple(judge_laws(search_beside_linear(motions, axis, turning, without, time_left)) for axis in axes)
-    # Only a target that is followed tells a limited rate: of a force, hardening springs and friction look like it.
-    targets = [quantity in MOTIONS for quantity in recordings[0].command.quantities]
-    allowed = [without if followed else without | {"slew_limit"} for followed in targets]
+    targets = [
+        None if quantity == "voltage" else DERIVATIVE_OF_QUANTITY.get(quantity)
+        for quantity in recordings[0].command.quantities
+    ]
     return tuple(
-        doubt_laws_of_actuator(find_balance(motions, axis, turning, allowed[axis], time_left, map_)) for axis in axes
+        doubt_laws_of_actuator(find_balance(motions, axis, turning, without, time_left, map_, targets[axis]))
+        for axis in axes
     )

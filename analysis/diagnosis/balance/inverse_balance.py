@@ -38,13 +38,23 @@ class ForceOfCommand(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InverseBalance:
-    """A balance solved for the acceleration along its axis."""
+    """A balance solved for the acceleration along its axis, or for what its command is a target of."""
 
     search: StructureSearch
     map_: Mapper
     rubs: bool
     """Whether a friction is among the laws of the motion: rest is no evidence then, for friction holds any force up to
     its level there, and a dead band gives none."""
+    target: int | None = None
+    """Derivative of the position that the command is a target of; None = it is a force."""
+
+    @property
+    def solved(self) -> int:
+        """Column of what the balance is solved for: what the command is a target of, else the acceleration."""
+        regression = self.search.regression
+        own, places = regression.beside.own, len(regression.motions[0].channels)
+        column = own if self.target is None else (2 - self.target) * places + own
+        return column if column < regression.matrices else own
 
     def total_errors(self, laws: Sequence[CommandLaw], beside: Sequence[int]) -> list[float]:
         """Of each law: its cross-validated sum of squares."""
@@ -80,8 +90,8 @@ class InverseBalance:
     def _blocks(self, rows: Sequence[FloatArray], tested: bool) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
         """To fit to, and, where they are asked for, to test by."""
         regression = self.search.regression
-        motions, own = regression.motions, regression.beside.own
-        aims = [columns[:, own] for columns in regression.columns]
+        motions, solved = regression.motions, self.solved
+        aims = [columns[:, solved] for columns in regression.columns]
         fit, test = (
             [motion.valid_samples(mask & moves) for motion, mask, moves in zip(motions, masks, moving, strict=True)]
             for moving in [self._moving()]
@@ -101,8 +111,8 @@ class InverseBalance:
 
     def _rows(self, law: ForceOfCommand, laws: Sequence[int]) -> list[FloatArray]:
         regression, found = self.search.regression, []
-        # Filters of the acceleration would give it back.
-        filters = {regression.beside.own, *range(regression.matrices, regression.base - 1)}
+        # Filters of what it is solved for would give it back.
+        filters = {self.solved, *range(regression.matrices, regression.base - 1)}
         beside = [column for column in regression.columns_of(laws) if column not in filters]
         for motion, columns in zip(regression.motions, regression.columns, strict=True):
             force = law.of(motion.force[:, regression.axis], motion.position[:, regression.beside.own])

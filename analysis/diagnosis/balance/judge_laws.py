@@ -203,7 +203,7 @@ def _judge_law(
     formula = None if law.formula is None or values is None else law.formula(values)
     return JudgedLaw(
         number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, formula=formula, possible=possible,
-        sure=low > 0 or (gain > 0 and _folds_agree(regression, (rest, laws), (without, held))),
+        agreed=gain > 0 and _folds_agree(regression, (rest, laws), (without, held)),
     )  # fmt: skip
 
 

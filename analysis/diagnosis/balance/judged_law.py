@@ -44,8 +44,8 @@ class JudgedLaw:
     """Of a law that no catalogue effect plays."""
     possible: bool = True
     """Its numbers have signs and sizes that such physics can have."""
-    sure: bool = True
-    """Its gain is larger than what varies between stretches, those by which it was chosen among them."""
+    agreed: bool = False
+    """Over the held-out blocks and the folds that it was chosen by, its gain is larger than what varies between them."""
 
     @property
     def played_as(self) -> str:

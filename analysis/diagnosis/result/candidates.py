@@ -144,13 +144,13 @@ def _names_covered_by(effect: NamedEffect) -> tuple[str, ...]:
 
 
 def _rank(weighed: JudgedLaw) -> int:
-    """Missing physics that is sure to gain and can have such numbers before what is not, and what cannot; then a linear
-    model of a higher order; and last what takes next to nothing."""
+    """Missing physics that is sure to gain and can have such numbers before what is not or cannot; then a linear model
+    of a higher order; and last what takes next to nothing."""
     if weighed.law.linear:
-        return 3
+        return 2
     if weighed.share < SMALL:
-        return 4
-    return 2 if not weighed.possible else int(not weighed.sure)
+        return 3
+    return 0 if weighed.possible and (weighed.gain_low > 0 or weighed.agreed) else 1
 
 
 def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...], in_samples: bool = False) -> tuple[str, ...]:

@@ -1,0 +1,59 @@
+"""A servo that follows its target at a limited speed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.balance.command_laws import REACHED, slew_laws
+
+RATE_HZ, SPEED = 50.0, 1.5
+
+
+@pytest.fixture(scope="module")
+def followed(recording_of):
+    """Of a speed: a recording of steps and sines of a target in metres, and the position that follows."""
+
+    def recording(speed):
+        rng, n = np.random.default_rng(5), 6000
+        times_s = np.arange(n) / RATE_HZ
+        target = np.repeat(rng.uniform(-0.6, 0.6, n // 60), 60) + 0.2 * np.sin(2 * np.pi * 0.4 * times_s)
+        place, seen = 0.0, np.zeros((n, 1))
+        for k in range(n):
+            seen[k] = place
+            for _ in range(10):
+                place += np.clip((target[k] - place) / 0.08, -speed, speed) / (10 * RATE_HZ)
+        made = recording_of(target[:, None], seen + 2e-4 * rng.standard_normal((n, 1)), RATE_HZ)
+        return replace(made, command=replace(made.command, quantity="position", unit="m"))
+
+    return recording
+
+
+def test_the_limit_is_named_with_its_speed(followed, balance_of):
+    (balance,) = balance_of(followed(SPEED))
+
+    assert balance.named[0].law.effect == "slew_limit"
+    assert balance.named[0].values["rate"] == pytest.approx(SPEED, rel=0.2)
+
+
+def test_a_servo_without_a_limit_gets_no_name(followed, balance_of):
+    (balance,) = balance_of(followed(1e3))
+
+    assert not balance.named
+
+
+def test_of_a_force_no_limit_is_asked(followed, balance_of):
+    given = followed(SPEED)
+    (balance,) = balance_of(replace(given, command=replace(given.command, quantity="force", unit="N")))
+
+    assert not any(law.law.effect == "slew_limit" for law in (*balance.laws, *balance.others))
+
+
+def test_rates_that_never_catch_up_are_not_tried():
+    command = np.sin(2 * np.pi * 5 * np.arange(5000) / 500)
+    rates = [law.values["rate"] for law in slew_laws([command], 500.0)]
+
+    assert rates
+    for law in slew_laws([command], 500.0):
+        reached = np.abs(law.of(command, command)[:, 0] - command) < law.values["rate"] / 500.0
+        assert reached.mean() > REACHED
