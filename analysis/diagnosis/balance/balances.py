@@ -70,7 +70,7 @@ def _balances_in_motion(
     map_: Mapper,
 ) -> tuple[Balance, ...]:
     """The balances of the samples in which the device moves; empty where it moves most of the time, or no law is named.
-    At rest a friction holds whatever is asked of it: no law foretells that, and what is linear takes its place."""
+    At rest a friction holds any force that is asked of it: no law foretells that, and what is linear takes its place."""
     moving = [_moves(motion, motions) for motion in motions]
     if np.mean(np.concatenate(moving)) > RESTS_ELSE:
         return ()

@@ -76,7 +76,7 @@ def is_unit(text: str) -> bool:
 
 
 def holds_data(fields: Sequence[str], decimal: str) -> bool:
-    """Whether any is a number in whatever spelling, a date or a clock time, as no header has."""
+    """Whether any is a number in any spelling, a date or a clock time, as no header has."""
     return holds_number(fields, decimal) or any(is_stamp(field) or _is_spelled_number(field) for field in fields)
 
 
