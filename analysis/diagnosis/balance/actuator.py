@@ -63,20 +63,26 @@ class Actuator:
     """By itself it leaves less than the named laws of the motion."""
 
 
+@dataclass(frozen=True, slots=True)
+class DrivenAxis:
+    number: int
+    rotational: bool
+    target: int | None = None
+    """Derivative of the position that the command is a target of; None = it is a force."""
+
+
 def find_balance(
     motions: Sequence[Motion],
-    axis: int,
-    rotational: bool,
+    driven: DrivenAxis,
     without: frozenset[str],
     time_left: TimeBudget,
     map_: Mapper = map,
-    target: int | None = None,
 ) -> Balance:
     """The balance of one axis: laws of the motion and, where one earns it, a law of the command, through which the
-    commanded force is then passed before the laws of the motion are searched again. target: derivative of the position
-    that the command is a target of; None = it is a force."""
+    commanded force is then passed before the laws of the motion are searched again."""
+    axis, rotational = driven.number, driven.rotational
     balance = judge_laws(search_beside_linear(motions, axis, rotational, without, time_left))
-    actuator = find_actuator(balance, rotational, without, map_, target) if balance.tested else None
+    actuator = find_actuator(balance, driven, without, map_) if balance.tested else None
     if actuator is None:
         return balance
     judged = actuator.judged
@@ -101,15 +107,13 @@ def _pass_through_law(motion: Motion, axis: int, own: int, law: CommandLaw) -> M
     return replace(motion, force=force)
 
 
-def find_actuator(
-    balance: Balance, rotational: bool, without: frozenset[str], map_: Mapper = map, target: int | None = None
-) -> Actuator | None:
+def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str], map_: Mapper = map) -> Actuator | None:
     """The law of the command that leaves the smallest error; None where the balance has no clock, no command varies,
     no law of the command is allowed, or none can take enough."""
-    search = balance.search
+    search, target = balance.search, driven.target
     # Only what follows a target tells a limited rate: of a force, hardening springs and friction look like it.
     barred = without if target is not None else without | {"slew_limit"}
-    kinds = _kinds_of_laws(search.regression, rotational, barred)
+    kinds = _kinds_of_laws(search.regression, driven.rotational, barred)
     if not np.isfinite(search.regression.motions[0].band_hz) or not kinds:
         return None
     turned = InverseBalance(

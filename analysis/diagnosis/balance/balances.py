@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.actuator import find_balance
+from analysis.diagnosis.balance.actuator import DrivenAxis, find_balance
 from analysis.diagnosis.balance.actuator_twins import doubt_laws_of_actuator
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.linear_part import search_beside_linear
@@ -70,7 +70,8 @@ def _balances_in_motion(
     map_: Mapper,
 ) -> tuple[Balance, ...]:
     """The balances of the samples in which the device moves; empty where it moves most of the time, or no law is named.
-    At rest a friction holds any force that is asked of it: no law foretells that, and what is linear takes its place."""
+    At rest a friction holds any force that is asked of it: no law foretells that, and what is linear takes its
+    place."""
     moving = [_moves(motion, motions) for motion in motions]
     if np.mean(np.concatenate(moving)) > RESTS_ELSE:
         return ()
@@ -108,6 +109,8 @@ def _balances_per_axis(
         for quantity in recordings[0].command.quantities
     ]
     return tuple(
-        doubt_laws_of_actuator(find_balance(motions, axis, turning, without, time_left, map_, targets[axis]))
+        doubt_laws_of_actuator(
+            find_balance(motions, DrivenAxis(axis, turning, targets[axis]), without, time_left, map_)
+        )
         for axis in axes
     )

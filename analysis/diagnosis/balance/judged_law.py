@@ -45,7 +45,7 @@ class JudgedLaw:
     possible: bool = True
     """Its numbers have signs and sizes that such physics can have."""
     agreed: bool = False
-    """Over the held-out blocks and the folds that it was chosen by, its gain is larger than what varies between them."""
+    """Over the held-out blocks and the folds that it was chosen by, its gain exceeds what varies between them."""
 
     @property
     def played_as(self) -> str:
