@@ -24,8 +24,9 @@ KINDS = ".csv, .txt, .tsv, .dat (tables), .xlsx, .xlsm, .json, .jsonl, .ndjson, 
 TABLES = (".csv", ".txt", ".tsv", ".dat")
 WORKBOOKS = (".xlsx", ".xlsm")
 RECORDS = (".json", ".jsonl", ".ndjson")
+HDF5 = (".h5", ".hdf5")
 FOREIGN = (*TABLES, *WORKBOOKS, *RECORDS, ".npz", ".npy", ".mat")
-"""Kinds of files that are never recordings of ours."""
+"""Kinds of files that are never recordings of ours; HDF5 may be."""
 
 _CHECK = "Check the file; nothing else can be read from it."
 
@@ -79,7 +80,7 @@ def _read_stored(path: Path) -> dict[str, Array]:
             return read_json_arrays(path)
         case ".mat":
             return read_hdf5_arrays(path, transposed=True) if is_hdf5(path) else read_mat5_arrays(path)
-        case ".h5" | ".hdf5":
+        case kind if kind in HDF5:
             return read_hdf5_arrays(path, transposed=False)
         case ".xls" | ".ods" | ".xlsb":
             raise ValueError("it is a workbook of another kind; save it as .xlsx, or the sheet as .csv")

@@ -93,20 +93,33 @@ hapteq import data.mat --out rec.h5 > MAP.toml                 # nothing says it
 hapteq import FOLDER --out rec.h5                              # its map, ours that fits, or numbered tables by header
 ```
 
-`hapteq look`, `show`, `diagnose` and `model` also take a file whose names say all as it is, imported in memory.
+`hapteq look`, `show`, `diagnose` and `model` also take a file whose names say all as it is, imported in memory;
+`validate` says what an import would read, and with which remarks, or why it would refuse.
 
-CSV and other tables, NPZ, NPY, MAT (both kinds) and HDF5 are read. The recording is in SI units, all channels on one
-uniform rate ([file formats](formats.md)). What was done to the samples is printed and kept in the recording
-(`meta/import`): what was resampled and how, which clock was moved and by how much, how many samples are missing. What
-cannot be understood is refused by name, and then nothing is written. `hapteq validate MAP.toml` checks a map.
+CSV and other tables, workbooks (XLSX), JSON, NPZ, NPY, MAT (both kinds) and HDF5 are read. The recording is in SI
+units, all channels on one uniform rate ([file formats](formats.md)). What was done to the samples is printed and kept
+in the recording (`meta/import`): what was resampled and how, which clock was moved and by how much, how many samples
+are missing. What cannot be understood is refused by name, and then nothing is written. `hapteq validate MAP.toml` checks a map.
 
 * **Tables** are read from their rows of numbers upwards: the row above them is the header, or units (`s,N,mm`,
   `[s] [N]`) with the header above; what stands higher, and lines with `#` or `%`, are remarks. Delimiter and decimal
   sign are those by which the rows are numbers. UTF-8, UTF-16 and Windows' western encoding (`µ`, `°`) are understood.
   Other encodings (GBK, Shift-JIS, EUC, KOI8 ...) are recognised by a word for what is measured in them, such as 位移 or
   сила, and that is said; else `encoding` under `[csv]` states it, and the error shows how the text reads in each.
+  Delimiters with which all lines end are no columns. Columns of words, columns that number the rows, and lines of words
+  below the last row are left out, and that is said. Signs between thousands are refused, and so are commas and points
+  that may be such (`1,250`; `1.886` beside `946`) until `decimal` under `[csv]` says that they are the decimal sign.
+* **Workbooks**: each sheet with rows of numbers is read as a table. Of several, arrays are named with their sheet
+  (`Run 1/force [N]`), and sheets that are alike are parts. `sheet` under `[csv]` takes a single one.
+* **JSON**: records (`[{{"t": 0, "u": 1}}, ...]`), columns (`{{"t": [0, ...], "u": [1, ...]}}`) or a record in each
+  line. What is inside an object is named by it (`imu.x` of records, `run1/u` of columns). A unit beside values
+  (`{{"unit": "N", "values": [...]}}`) is theirs.
+* **Rows that were logged twice** (the same time stamp, the same values) are left out and counted. Where a stamp comes
+  again with other values, time stands still, and the import is refused with the keys that mend it.
 * **Units** are never guessed: a channel without one keeps its numbers, in the unit `1`, and that is said. So is the
   unit in which each computed channel is taken to be. {ALLOWED[0].upper()}{ALLOWED[1:]}; `lb` and `oz` are masses.
+  In headers other spellings are understood (`RPM`, `rad/sec`, `m/sec2`, `m/s²`, `°/s`, `kgf·cm`, `oz-in`, `lbf-in`,
+  `force / N`, `force, N`); a unit that is not known is named, with the nearest one that is.
 * **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.
 * **Free motion**: a recording without a command gets one of zeros for each axis, as `[[computed]]` with
   `role = "command"`, `name = "none"`, `value = "0 * clock_s"`, `unit = "N"` (`"N m"` for angles).

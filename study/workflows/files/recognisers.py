@@ -7,6 +7,7 @@ from analysis.diagnosis.real_answer.real_answer import FORMAT as REAL_ANSWER_FOR
 from analysis.evaluation.reproduction.document import FORMAT as REPRODUCTION_FORMAT
 from analysis.look.driven_band import silent_segments
 from equalizer.plant.model_quality import quality_brief
+from equalizer.signals.recording import Recording
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY
 from protocols.definition.recording_protocol import RecordingProtocol
@@ -44,8 +45,13 @@ def recognise_recording(content: FileContent) -> str | None:
     found = read_recording(content.path)
     if silent := silent_segments(found):
         raise UnusableFileError(content.path, recording_layout.KIND, silent)
+    return f"recording, {describe_recording(found)}"
+
+
+def describe_recording(found: Recording) -> str:
+    """How long it is, and what it holds."""
     parts = [
-        f"recording, {found.response.duration_s:g} s at {found.sample_rate_hz:g} Hz",
+        f"{found.response.duration_s:g} s at {found.sample_rate_hz:g} Hz",
         _count(len(found.command.channels), "command"),
         _count(len(found.response.channels), "response"),
     ]

@@ -17,6 +17,7 @@ from study.store.sessions.archive import FOLDER
 from study.workflows.files.file_content import FileContent, open_content
 from study.workflows.files.recognisers import RECOGNISERS, Recogniser
 from study.workflows.files.session_recognisers import SESSION_RECOGNISERS
+from study.workflows.files.validate_foreign import check_foreign, is_foreign, may_be_foreign
 
 KNOWN = (
     "known are recordings and identified models (HDF5), mechanical models, protocols and import maps (TOML), "
@@ -41,7 +42,7 @@ def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECO
     found = _validate(path, recognisers)
     folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
     said = (privacy_warning(folder) for folder in folders if _is_folder(folder))
-    return replace(found, notes=(*filter(None, said), *_notes(found)))
+    return replace(found, notes=(*found.notes, *filter(None, said), *_notes(found)))
 
 
 def _notes(found: Validation) -> tuple[str, ...]:
@@ -63,6 +64,8 @@ def _is_folder(path: Path) -> bool:
 
 
 def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
+    if _is_foreign(path):
+        return _of_foreign(path, ())
     try:
         content = open_content(path)
         for recognise in recognisers:
@@ -74,7 +77,24 @@ def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
     except StudyError as error:
         return Validation(path, "unreadable", (error.happened,))
     kind, problem = _describe_unknown(content)
-    return Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
+    unknown = Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
+    said = content.hdf5_format or content.json_format or ""
+    return unknown if said or not may_be_foreign(path) else _of_foreign(path, unknown.problems, kind)
+
+
+def _is_foreign(path: Path) -> bool:
+    try:
+        return is_foreign(path)
+    except OSError:  # a name that no file can have
+        return False
+
+
+def _of_foreign(path: Path, unknown: tuple[str, ...], kind: str = "") -> Validation:
+    """unknown: why it is none of ours, which is said where it is no recording of others either."""
+    found = check_foreign((path,))
+    if found.problems:
+        return Validation(path, kind or found.kind, (*unknown, *found.problems))
+    return Validation(path, found.kind, (), found.notes)
 
 
 def _describe_unknown(content: FileContent) -> tuple[str, str]:
@@ -92,8 +112,7 @@ def _describe_unknown(content: FileContent) -> tuple[str, str]:
         case ".toml":
             return "TOML file", _toml_problem(content)
         case ".csv":
-            header = ",".join(content.header)
-            return "table", f"its header, '{header}', is none of ours; {KNOWN}; a table of others goes to hapteq import"
+            return "table", f"its header, '{','.join(content.header)}', is none of ours; {KNOWN}"
     return "unknown file", f"nothing here knows this file; {KNOWN}"
 
 
