@@ -4,8 +4,6 @@ import math
 import re
 from dataclasses import dataclass
 
-from equalizer.signals.unit_spellings import nearest_unit, respell
-
 Dimension = tuple[int, ...]
 """Exponents of kg, m, s, A, K, rad. The angle counts, or N m and N m/rad could not be told apart."""
 
@@ -218,6 +216,8 @@ def suggest_unit(text: str) -> str:
     plain = plain_unit(text)
     if plain != text:
         return plain
+    from equalizer.signals.unit_spellings import nearest_unit
+
     near = nearest_unit(text, _SYMBOLS)
     return near if near != text and _is_known(near) else ""
 
@@ -225,6 +225,9 @@ def suggest_unit(text: str) -> str:
 def plain_unit(text: str) -> str:
     """As it is written here (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`), where that is a unit; else the text
     itself."""
+    # Here, for only files of others spell units in other ways.
+    from equalizer.signals.unit_spellings import respell
+
     plain = respell(text, _SYMBOLS)
     return plain if plain != text and _is_known(plain) else text
 

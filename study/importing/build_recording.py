@@ -15,7 +15,6 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit, quantity_of
 from study.importing.alignment import Logger, align_signals
 from study.importing.arrays.arrays import Arrays, read_arrays
-from study.importing.doubled_rows import without_doubled_rows
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.namespace import of_file
 from study.importing.map_format.import_map import ChannelMap, ComputedMap, ImportMap
@@ -23,7 +22,7 @@ from study.importing.map_format.map_errors import ImportProblemError, ImportRefu
 from study.importing.map_format.map_files import PartFiles, part_files
 from study.importing.map_format.map_segments import segments_of
 from study.importing.part_signals import Key, PartSignals, part_signals
-from study.importing.time_base import NUMBERED_HZ, time_base
+from study.importing.time_base import NUMBERED_HZ, time_base, without_doubled_rows
 
 _NAMED = 3
 

@@ -99,7 +99,8 @@ hapteq import FOLDER --out rec.h5                              # its map, ours t
 CSV and other tables, workbooks (XLSX), JSON, NPZ, NPY, MAT (both kinds) and HDF5 are read. The recording is in SI
 units, all channels on one uniform rate ([file formats](formats.md)). What was done to the samples is printed and kept
 in the recording (`meta/import`): what was resampled and how, which clock was moved and by how much, how many samples
-are missing. What cannot be understood is refused by name, and then nothing is written. `hapteq validate MAP.toml` checks a map.
+are missing. What cannot be understood is refused by name, and then nothing is written.
+`hapteq validate MAP.toml` checks a map.
 
 * **Tables** are read from their rows of numbers upwards: the row above them is the header, or units (`s,N,mm`,
   `[s] [N]`) with the header above; what stands higher, and lines with `#` or `%`, are remarks. Delimiter and decimal

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.look.driven_band import silent_segments
 from study.errors import StudyError
+from study.importing.arrays.arrays import FOREIGN, HDF5, RECORDS, TABLES
 from study.regular_file import DOCUMENT_BYTES
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.privacy import privacy_warning
@@ -15,9 +17,8 @@ from study.store.disk.toml_text import TOML_BYTES, too_long_key
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import FOLDER
 from study.workflows.files.file_content import FileContent, open_content
-from study.workflows.files.recognisers import RECOGNISERS, Recogniser
+from study.workflows.files.recognisers import RECOGNISERS, Recogniser, describe_recording
 from study.workflows.files.session_recognisers import SESSION_RECOGNISERS
-from study.workflows.files.validate_foreign import check_foreign, is_foreign, may_be_foreign
 
 KNOWN = (
     "known are recordings and identified models (HDF5), mechanical models, protocols and import maps (TOML), "
@@ -65,7 +66,7 @@ def _is_folder(path: Path) -> bool:
 
 def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
     if _is_foreign(path):
-        return _of_foreign(path, ())
+        return _of_foreign(path)
     try:
         content = open_content(path)
         for recognise in recognisers:
@@ -78,23 +79,34 @@ def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
         return Validation(path, "unreadable", (error.happened,))
     kind, problem = _describe_unknown(content)
     unknown = Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
-    said = content.hdf5_format or content.json_format or ""
-    return unknown if said or not may_be_foreign(path) else _of_foreign(path, unknown.problems, kind)
+    foreign = path.is_file() and path.suffix.lower() in (*FOREIGN, *HDF5)
+    if not foreign or content.hdf5_format or content.json_format:
+        return unknown
+    return _of_foreign(path, kind, unknown.problems)
 
 
 def _is_foreign(path: Path) -> bool:
+    """Whether a file is of a kind in which nothing of ours is stored."""
+    kind = path.suffix.lower()
     try:
-        return is_foreign(path)
+        return kind in FOREIGN and kind not in (*TABLES, *RECORDS) and path.is_file()
     except OSError:  # a name that no file can have
         return False
 
 
-def _of_foreign(path: Path, unknown: tuple[str, ...], kind: str = "") -> Validation:
-    """unknown: why it is none of ours, which is said where it is no recording of others either."""
-    found = check_foreign((path,))
-    if found.problems:
-        return Validation(path, kind or found.kind, (*unknown, *found.problems))
-    return Validation(path, found.kind, (), found.notes)
+def _of_foreign(path: Path, kind: str = "", unknown: tuple[str, ...] = ()) -> Validation:
+    """A recording of others, as an import would read it. kind, unknown: of a file that may be a damaged one of ours,
+    which is said where it is no recording either."""
+    # Here, for the import takes longer to load than most files take to be checked.
+    from study.workflows.recording.import_recording import read_foreign
+
+    try:
+        found = read_foreign((path,), None)
+    except StudyError as refused:
+        problem = f"{refused.title}: {refused.happened}"
+        return Validation(path, kind or "recording of others", (*unknown, problem))
+    said = f"recording of others, {describe_recording(found.recording)}"
+    return Validation(path, said, tuple(silent_segments(found.recording)), found.notes)
 
 
 def _describe_unknown(content: FileContent) -> tuple[str, str]:
