@@ -12,13 +12,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.blocks import Block
-from analysis.diagnosis.balance.judged_law import DRAWS, JudgedLaw, bootstrap_draws, force_ratio, gain_with_bound
+from analysis.diagnosis.balance.judged_law import (
+    DRAWS,
+    JudgedLaw,
+    agrees_with_folds,
+    bootstrap_draws,
+    force_ratio,
+    gain_with_bound,
+    special_cases,
+)
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.plainest_structure import NOTABLE, numbers_of, plainest_structure
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import Structure, StructureSearch, values_of
 from analysis.diagnosis.settings import STILL_SHARE
-from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
@@ -185,6 +192,7 @@ def _judge_law(
     rest = tuple(each for each in laws if each != number)
     without = _held_out_errors(regression, rest)
     gain, low = gain_with_bound(without, held)
+    folds = [regression.cross_validated_errors(regression.columns_of(each)) for each in (rest, laws)]
     share = float((without - held).sum()) / room
     law = regression.laws[number]
     values = dict(zip(laws, values_of(regression, laws), strict=True))[number]
@@ -203,21 +211,8 @@ def _judge_law(
     formula = None if law.formula is None or values is None else law.formula(values)
     return JudgedLaw(
         number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, formula=formula, possible=possible,
-        agreed=gain > 0 and _folds_agree(regression, (rest, laws), (without, held)),
+        agreed=agrees_with_folds((without, held), folds),
     )  # fmt: skip
-
-
-def _folds_agree(
-    regression: Regression, sums: tuple[Sequence[int], Sequence[int]], errors: tuple[FloatArray, FloatArray]
-) -> bool:
-    """Whether the gain's interval is above zero over the folds and the few held-out blocks together."""
-    folds = (regression.cross_validated_errors(regression.columns_of(laws)) for laws in sums)
-    return gain_with_bound(*(np.concatenate(each) for each in zip(errors, folds, strict=True)))[1] > 0
-
-
-def _special_cases(effect: str) -> tuple[str, ...]:
-    """Effects that a law contains as special cases: it always fits better than these."""
-    return EFFECTS[effect].simpler if effect in EFFECTS else ()
 
 
 def _indistinguishable_effects(
@@ -241,7 +236,7 @@ def _indistinguishable_effects(
     first = np.ones(DRAWS, dtype=np.bool_)
     for effect, (_, laws) in found.items():
         behind = _held_out_errors(regression, laws) - held
-        if own.effect not in _special_cases(effect):
+        if own.effect not in special_cases(effect):
             first &= behind[drawn].sum(axis=1) >= 0
         # Of two that do as well, the plainer: what acts otherwise and has more numbers must leave less.
         more = numbers_of(regression, laws[-1:]) > numbers_of(regression, [number])
@@ -269,7 +264,7 @@ def _why_not(
         )
     family = family_of(law.effect) | (BY_CONDITION if law.effect in BY_CONDITION else set())
     strange = [effect for effect in alike if effect not in family]
-    others = [effect for effect in alike if law.effect not in _special_cases(effect)]
+    others = [effect for effect in alike if law.effect not in special_cases(effect)]
     if strange or (len(others) >= MOST_ALIKE and not {law.effect, *others} <= DRY_FRICTIONS):
         return f"these data cannot tell it from {', '.join(strange or alike)}"
     played = law.formula is not None or not {law.effect, PLAYED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from analysis.diagnosis.balance.law import Formula, Law
 from analysis.diagnosis.balance.regression import Regression
+from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
@@ -64,6 +65,13 @@ def gain_with_bound(without: FloatArray, with_it: FloatArray) -> tuple[float, fl
     return float(1 - with_it.sum() / max(float(without.sum()), 1e-300)), float(np.quantile(shares, LEVEL))
 
 
+def agrees_with_folds(held: Sequence[FloatArray], folds: Sequence[FloatArray]) -> bool:
+    """Whether a law gains over the held-out blocks, and over these and the folds together by more than what varies.
+    Each: errors without the law, and with it, (blocks,)."""
+    _, low = gain_with_bound(*(np.concatenate(each) for each in zip(held, folds, strict=True)))
+    return low > 0 and gain_with_bound(*held)[0] > 0
+
+
 def bootstrap_draws(blocks: int) -> npt.NDArray[np.int64]:
     return np.random.default_rng(SEED).integers(blocks, size=(DRAWS, blocks))
 
@@ -77,3 +85,8 @@ def force_ratio(regression: Regression, laws: Sequence[int], number: int) -> flo
     own = [c[mask, place] @ weights[place] for c, mask in zip(regression.columns, kept, strict=True)]
     force = [f[mask] for f, mask in zip(regression.force, kept, strict=True)]
     return float(np.concatenate(own).std() / max(float(np.concatenate(force).std()), 1e-300))
+
+
+def special_cases(effect: str) -> tuple[str, ...]:
+    """Effects that a law contains as special cases: it always fits better than these."""
+    return EFFECTS[effect].simpler if effect in EFFECTS else ()
