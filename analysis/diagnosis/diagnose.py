@@ -32,6 +32,7 @@ from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.search_by_simulation import SearchOutcome, search_by_simulation, search_context_of
+from analysis.diagnosis.settings import FAULT_BEYOND
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -96,7 +97,6 @@ def _diagnose_beside_clean(
     """Findings by comparison with the clean recordings, or by search where no fault explains the difference, or where
     the given model predicts the clean ones well enough to be used itself, or repeats show that noise is small."""
     # Imported here, as below: only some diagnoses have clean recordings.
-    from analysis.diagnosis.contrast.decide import BEYOND
     from analysis.diagnosis.reference.compare_with_reference import contrast_of, noise_is_from_repeats, predicts_clean
     from analysis.diagnosis.reference.learn_model_error import learn_model_floor
     from analysis.diagnosis.result.contrast_findings import add_contrast
@@ -121,7 +121,7 @@ def _diagnose_beside_clean(
     progress("writing down what was found", 0.95)
     floor = CleanFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
     whole = _assemble(recordings, settings, look, SearchOutcome(found, floor), ())
-    return add_contrast(whole, contrast, recordings[0], BEYOND)
+    return add_contrast(whole, contrast, recordings[0], FAULT_BEYOND)
 
 
 def _search_beside_clean(

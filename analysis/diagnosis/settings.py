@@ -1,6 +1,7 @@
-"""The numbers that the diagnosis decides by, in one table; those of the force balance stand at the head of its files.
+"""The numbers that the diagnosis decides by, in one table: of the search by simulation, then of the force balance and
+first models, then of the comparison with clean recordings.
 
-Purely numerical tolerances stay where they are used.
+Grids of starting values and purely numerical tolerances stay where they are used.
 
 Errors are rms errors over rms noise, 1 = noise alone; where one number stands for several channels, the worst counts.
 A gain is a difference of mean log error power, over the channels, between two fits (`FitScore.mean_log_error`).
@@ -10,7 +11,9 @@ Where a number comes from:
 * principle: it follows from the sentence beside it;
 * a name and a year: from the literature;
 * bank: it was set by what a bank of simulated devices showed (docs/proof.md), named by its first seed;
-* hand: it was set by hand during development, on simulated devices that no bank reports (docs/proof.md).
+* hand: it was set by hand during development, on simulated devices that no bank reports (docs/proof.md); of the force
+  balance on five public recordings and invented axes, of the comparison with clean recordings on devices in order,
+  halves of which were compared (docs/real.md).
 """
 
 from math import log
@@ -166,10 +169,8 @@ LAW_MAIN_PART = 0.3  # of the misfit that one term may leave; beyond, a sum is l
 LAW_ALMOST_NOISE = 1.1  # held-out error power along an axis, 1 = noise, below which no law is looked for
 LAW_WORTH_SHARE = 0.4  # of what is left above the noise that a further term must take
 LAW_AXES_SHARE = 0.3  # of the largest held-out misfit that a second axis needs, to be searched at once
-LAW_FITTED, LAW_FITTED_WITHIN = (
-    3,
-    3.0,
-)  # sums that are fitted by output error: of the best one's remainder, so many times
+LAW_FITTED = 3  # sums that are fitted by output error,
+LAW_FITTED_WITHIN = 3.0  # of so many times the best one's remainder
 LAW_MOST_ROUNDS = 3  # laws that are added one after the other
 LAW_SNAP = 0.003  # relative: so near a simple exponent, and so much more error, change nothing for a reader
 LAW_BEATS = 0.5  # of a catalogue rival's excess that a law may leave at most
@@ -177,3 +178,154 @@ LAW_STABLE = 0.2  # jackknife error of a factor over stretches, as a share; prin
 LAW_PLACEBO = 0.5  # of what chance leaves of a shuffled force, that a law may leave of the missing one at most
 LAW_SAME = 0.05  # of what a law foretells: laws that are no further apart are one, written in two ways (issue 16)
 LAW_NEAR = 0.03  # of a whole or half exponent, that is then no number to be told
+
+# How a law of the command is told from sums of laws of the motion (`balance/actuator`). By hand.
+SUMS_BESIDE_COMMAND_LAW = 4  # best sums of laws of the motion that are tried beside a law of the command
+# share of the error that the best sum of laws of the motion leaves which a law of the command must take: what lag
+# and delay leave is smaller
+COMMAND_LAW_LEAVES = 0.5
+COMMAND_RIVAL_LEAVES_MORE = 0.3  # share of its own error by which a rival must leave more to be told from it
+
+# In which band forces are balanced, and on which samples (`band`, `balances`, `motion`, `blocks`). By hand.
+# noise in the acceleration's mean square at most, as a share: about the relative bias of a mass
+ACCELERATION_NOISE_SHARE = 0.01
+BAND_WIDEST = 0.2  # the band's end at most, over the sample rate
+BAND_NARROWEST_CYCLES = 20.0  # the band's end at least, in cycles per recording
+SECOND_BAND_NARROWER = 0.5  # share of the band that noise allows, below which the band of the motion is another look
+# share of the samples in which the device moves, below which these alone are another look
+MOVES_MOST_OF_THE_TIME = 0.5
+MOVING_BAND_SHARE = 0.99  # share of the speed's mean square below the end of the band in which the device moves
+MOTION_OVERSAMPLED = 4.0  # samples that are kept per period of the band's end
+# periods of the band's end that are left out at either end of a part: there the filter reaches beyond the data
+MOTION_EDGE_PERIODS = 0.5
+BALANCE_FOLDS = 8  # blocks of the samples to fit, and as many of those to test by, at least
+# samples that numbers are fitted to at most, and as many to test by: the first ones of each block
+BALANCE_MOST_SAMPLES = 20000
+
+# Which sums of laws are tried, and which is the plainest (`structures`, `plainest_structure`, `linear_part`). By hand.
+MOST_SUMMED_LAWS = 3
+STRUCTURES_BEAM = 5  # structures of each size that are taken further
+FURTHER_LAW_GAIN = 0.02  # share of the cross-validated error power that a further law must take
+FURTHER_LAW_ERRORS = 2.0  # standard errors that the folds' mean gain, or their mean logarithmic gain, must exceed
+# share of what the best structure takes of the linear model's error that a plainer one may leave to be preferred
+PLAINER_LEAVES = 0.1
+# share that further laws must take of the error that a plain structure leaves above that of all laws together,
+FURTHER_LAW_OF_REST = 0.5
+FURTHER_LAW_OF_ALL = 0.3  # and of all that it leaves
+LINEAR_LAW_GAIN = 0.1  # share of the cross-validated error power that a delay or a linear law must take
+MOST_LINEAR_LAWS = 4  # linear laws beside mass, damping and stiffness
+LINEAR_PART_ROUNDS = 2  # searches at most, each with the linear part that the one before it found
+
+# Which laws of a balance are named (`judge_laws`, `judged_law`). By hand.
+# share of what all laws together take of the error that the named ones must reach, so that they are its main part
+NAMED_OF_CEILING = 0.5
+LAW_OF_CEILING = 0.05  # share of the same that each named law must take
+RIVAL_STAYS_BEHIND = 0.15  # share of a law's gain by which a rival in its place must stay behind to be told from it
+# share of the force's rms that a law must take: laboratory recordings are not calibrated better
+LAW_OF_SIGNAL = 0.02
+SECOND_OF_FAMILY = 2 / 3  # share of what is left that a second law of one family must take
+LARGEST_CLASS = 4  # effects of a class at most; a larger class says nothing, unless all of it is dry friction
+LEAST_JUDGED_BLOCKS = 4
+# standard deviation of a law's own force at most, over the recorded one's: more is cancelled by other columns
+LARGEST_LAW_FORCE = 2.0
+BOOTSTRAP_DRAWS, BOOTSTRAP_SEED = 2000, 1  # resampled blocks of an interval
+BOOTSTRAP_LEVEL = 0.025  # quantile that is its lower end
+
+# What a simulation must bear out of what a balance named (`confirm`). By hand.
+# times the held-out error without new physics that the completed model may leave at most
+CONFIRMED_LEAVES = 0.9
+# times the error that a constant may leave at most to be worth saying; principle: as a named law, `confirm_laws`
+CONSTANT_LEAVES = 0.9
+HELD_OUT_STRETCHES = 16  # number of stretches of all held-out samples, about
+LEAST_HELD_OUT_STRETCHES = 4
+AT_RETUNING_BOUND = 0.97  # share of a re-tuned number's bound, from which on it counts as at the bound
+CANDIDATES_WITH_GAIN = 3  # fitted candidates of the last round that are reported with their gain
+
+# What a first model is made of (`first_model`). By hand.
+MODES_GAIN = 0.1  # share of the held-out error in a free simulation that modes must take
+REMAINDER_REPORTED = 0.1  # share of the remaining power from which on its dependence on a signal is reported
+# share of the measured response's spread that a fitted model must show. By hand: models with masses without bound
+# show 1e-30 of it, poor ones a tenth
+LEAST_MODEL_ANSWER = 0.001
+DECAY_LEAST_CYCLES = 4  # cycles of a stretch of a decay that is fitted to or tested by
+DECAY_MOST_LEVELS = 6  # stretches of one decay
+# test blocks at least; with fewer, or where nothing moves in them, the held-out error is that of cross-validation
+# on the fit blocks
+LEAST_TEST_BLOCKS = 3
+FOUND_NUMBERS_OPEN = 0.1  # standard deviation of the numbers found at least, relative
+RICHER_STRUCTURE_GAIN = 0.02  # share of the plainer structure's error power that a richer one must take
+RICHER_STRUCTURE_ERRORS = 2.0  # standard errors over the folds that the gain must exceed
+# singular values of standardised commands and motions, over the largest, below which they are rounding: a
+# thousandth, by hand
+DEPENDENT_SIGNALS = 0.001
+UNSIGNED_BELOW_ZERO = 0.05  # negative values of such a speed by noise at most, over its rms
+PUSHED_BOTH_WAYS = 0.1  # share of the command's power that must push either way
+REVERSAL_NEAR_ZERO = 0.25  # speed over its rms below which a minimum may be a reversal
+SIGNED_SPEED_FITS = 0.5  # share of the signed speed's power that the filter must predict,
+SIGNED_SPEED_BETTER = 0.5  # and its error over that for the magnitude, at most
+# share of the folds' error power that the turned sign must take; as much as a linear law must
+REVERSED_SIGN_GAIN = 0.1
+# share of the held-out force power that a derivative of the response must explain to be of use
+DERIVATIVE_NEEDED = 0.02
+
+# What both sets are compared by (`bases`, `force_base`, `autoregressive_base`, `sensor_base`, `part`). By hand.
+BALANCE_HOLDS = 0.35  # share of the force's rms that a force balance may leave unexplained to be used
+CONSTANT_SIGNAL = 0.0001  # standard deviation of a signal over its rms below which it counts as constant
+# ratio of the motions of both sets above which they are not compared: a recording of motion does not predict what
+# a device does at rest. By hand: no sensor fault that can be undone makes as much
+MOTIONS_APART = 20.0
+AUTOREGRESSIVE_ORDER = 24  # order of the autoregressive model
+MOST_BASE_LAWS = 10
+BASE_LAW_GAIN = 0.01  # share of the folds' error that a further law must take
+RESPONSE_BAND_SHARE = 0.999  # share of the response's power below the band's end
+RESPONSE_OVERSAMPLED = 3.0  # samples per period of the band's end, at least
+SENSOR_TAPS = 2  # samples before and after that predict a reading: filters of the two sensors differ by so much
+PART_LEAST_SAMPLES = 64  # samples of a part at least
+# samples of a recording that are used at most, its last: enough to find a fault that matters, in bounded time
+PART_MOST_SAMPLES = 40000
+# blocks of each set: a fault that acts in a small part of a recording, such as a stop that is hit twice, must be
+# in several of them, or most resampled blocks would lack it
+CONTRAST_BLOCKS = 24
+CONTRAST_WHITENING_ORDER = 8  # order of the autoregressive model that whitens the errors
+
+# What sets two recordings apart (`compare`). By hand.
+# times the largest excess between stretches of one set that both together must have. By hand: of seven public
+# devices in order, halves of which a fault was named had up to 1.53 times; faults that were named right, 1.75 and
+# more
+SETS_APART = 1.6
+# excess of the error of both sets together over that of each by itself, up to which they are of one device
+SETS_AS_ONE = 0.05
+# share of the error power of both sets that a fault must gain: a fault that adds a tenth to the error power of
+# one set gains that much. Smaller ones are not worth a name
+LEAST_FAULT_GAIN = 0.05
+SIZE_IS_NEAR = 0.02  # distance from size 1 within which it is not
+# times at most that a fault whose undoing is not linear is undone anew about the size that was found
+UNDOING_ROUNDS = 4
+
+# Which faults are named (`decide`). By hand.
+# times the largest gain between stretches of one set that a fault must gain. By hand: of six public devices in
+# order, two halves differed by up to 3.7 times
+FAULT_BEYOND = 5.0
+# share of a gain that its lower end must be where the sets differ no more than stretches of one do. By hand: 0.16
+# to 0.37 where two halves in order had another delay by chance; 0.47 for a damper that is hardly seen
+FAULT_STEADY = 0.4
+# share of what sets the sets apart that a name must explain: with less, the main part is another's
+FAULT_MAIN_PART = 0.4
+FAULT_RIVAL_BEHIND = 0.1  # share of a fault's gain by which a rival must stay behind to be told from it,
+# or of what the fault leaves: where a gain is large, a tenth of it is many times that. By hand
+FAULT_RIVAL_WORSE = 0.25
+LARGEST_FAULT_CLASS = 4  # faults of a class at most; a larger class says nothing
+
+# Faults of signals (`signal_faults`, `sensor_faults`, `actuator_faults`). By hand, but where a principle is named.
+MAINS_HZ = (50.0, 60.0)
+MAINS_OFF_HZ = 0.5  # deviation of the mains frequency, or of a logger's clock, at most
+LINE_STANDS_OUT = 30.0  # power of a line over the median of its neighbourhood: noise exceeds it in one of e^30 lines
+LINE_IS_NEW = 6.0  # times as far as on the clean recordings, and as in the command, that it must stand out
+# times the largest noise of any clean stretch that the smallest of the faulty ones must have: what changes with
+# the motion is no noise of a sensor
+NOISE_LOUDER = 4.0
+NOISE_EVEN = 1.6  # ratio of the powers of white noise in two bands at most
+NOISE_STRETCHES = 6
+REVERSAL_OF_GAP = 0.05  # share of a gap by which a reading must go back to count as a reversal
+CLOCK_FASTEST = 0.05  # relative rate error of a clock at most
+LONGEST_DELAY = 0.3  # largest delay, over the period of the command's median frequency

@@ -28,24 +28,23 @@ from analysis.diagnosis.balance.command_laws import (
     slew_laws,
 )
 from analysis.diagnosis.balance.inverse_balance import InverseBalance
-from analysis.diagnosis.balance.judge_laws import MOST_ALIKE, Balance, judge_laws
+from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw, bootstrap_draws, gain_with_bound
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.balance.plainest_structure import NOTABLE
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, StructureSearch
+from analysis.diagnosis.settings import (
+    COMMAND_LAW_LEAVES,
+    COMMAND_RIVAL_LEAVES_MORE,
+    FURTHER_LAW_OF_ALL,
+    LARGEST_CLASS,
+    SUMS_BESIDE_COMMAND_LAW,
+)
 from analysis.diagnosis.types import Mapper, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
-SUMS = 4
-"""Best sums of laws of the motion that are tried beside a law of the command."""
-MOST = 0.5
-"""Share of the error that the best sum of laws of the motion leaves which a law of the command must take: what lag and
-delay leave is smaller."""
-TOLD = 0.3
-"""Share of its own error by which a rival must leave more to be told from it."""
 ROUNDS = 8
 NEEDLESS = "a law of the command leaves as little without it"
 HOLDS_AT_REST = (*SLIDING, "presliding_hysteresis")
@@ -91,9 +90,9 @@ def find_balance(
         through = [_pass_through_law(motion, axis, own, actuator.law) for motion in motions]
         again = judge_laws(search_beside_linear(through, axis, rotational, without, time_left))
         return replace(again, laws=(judged, *again.laws), linear=balance.linear)
-    if judged.gain_low <= 0 or judged.gain < NOTABLE:
+    if judged.gain_low <= 0 or judged.gain < FURTHER_LAW_OF_ALL:
         return balance
-    if judged.gain < MOST and not actuator.instead:
+    if judged.gain < COMMAND_LAW_LEAVES and not actuator.instead:
         return replace(balance, others=tuple(sorted((*balance.others, judged), key=lambda each: -each.gain)))
     laws = (
         [replace(each, why_not=each.why_not or NEEDLESS) for each in balance.laws] if actuator.alone else balance.laws
@@ -125,7 +124,7 @@ def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str],
     # Laws of the position would give it back where the balance is solved for it.
     sums = _sums_to_try(search) if target is None else [()]
     plain, beside = min((turned.total_error(AS_COMMANDED, each), each) for each in sums)
-    laws = _worth_trying(turned, kinds, (1 - NOTABLE / 2) * plain, beside)
+    laws = _worth_trying(turned, kinds, (1 - FURTHER_LAW_OF_ALL / 2) * plain, beside)
     if not laws:
         return None
     best = _best_of_each(turned, laws, beside)
@@ -134,7 +133,7 @@ def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str],
     rivals = [other for _, other in best if other is not law]
     law = _scaled_to_command(law, search.regression)
     judged = _judge_law(turned, law, rivals, (beside, beside))
-    return Actuator(law, judged, bool(beside) and alone <= held / (1 - TOLD))
+    return Actuator(law, judged, bool(beside) and alone <= held / (1 - COMMAND_RIVAL_LEAVES_MORE))
 
 
 Kinds = Sequence[tuple[AnyCommandLaw | None, Sequence[CommandLaw]]]
@@ -171,7 +170,8 @@ def _in_place_of_motion(turned: InverseBalance, kinds: Kinds, named: tuple[int, 
     if not named:
         return None
     # Half of what is asked for below, for the sums are not those laws themselves.
-    most = (1 - MOST / 2 if len(named) == 1 else 1 / (1 - TOLD)) * turned.total_error(AS_COMMANDED, named)
+    share = 1 - COMMAND_LAW_LEAVES / 2 if len(named) == 1 else 1 / (1 - COMMAND_RIVAL_LEAVES_MORE)
+    most = share * turned.total_error(AS_COMMANDED, named)
     laws = _worth_trying(turned, kinds, most, ())
     if not laws:
         return None
@@ -180,7 +180,7 @@ def _in_place_of_motion(turned: InverseBalance, kinds: Kinds, named: tuple[int, 
     rivals = [other for _, other in best if other is not law]
     law = _scaled_to_command(law, turned.search.regression)
     judged = _judge_law(turned, law, rivals, (named, ()))
-    less = judged.gain >= MOST or len(named) > 1
+    less = judged.gain >= COMMAND_LAW_LEAVES or len(named) > 1
     return Actuator(law, judged, True, True) if less and judged.gain_low > 0 else None
 
 
@@ -194,7 +194,7 @@ def _sums_to_try(search: StructureSearch) -> list[tuple[int, ...]]:
     """No law that is linear in the motion: such a filter of the acceleration would give it back."""
     laws = search.regression.laws
     plain = [each.laws for each in search.ranked if each.laws and not any(laws[k].linear for k in each.laws)]
-    return [(), *plain[:SUMS]]
+    return [(), *plain[:SUMS_BESIDE_COMMAND_LAW]]
 
 
 def _best_of_each(
@@ -211,7 +211,7 @@ def _best_of_each(
         (error, replace(law, values=values)) for (_, law), (error, values) in zip(best.values(), moved, strict=True)
     ]
     plain = min((error for error, law in refined if not law.rich), default=np.inf)
-    return [(error, law) for error, law in refined if not law.rich or error < (1 - TOLD) * plain]
+    return [(error, law) for error, law in refined if not law.rich or error < (1 - COMMAND_RIVAL_LEAVES_MORE) * plain]
 
 
 def _refined_values(
@@ -239,7 +239,8 @@ def _judge_law(
     linear = float(turned.errors(AS_COMMANDED, (), True).sum())
     drawn = bootstrap_draws(len(held))
     behind = [(turned.errors(rival, beside, True), rival.effect) for rival in rivals]
-    alike = tuple(effect for errors, effect in behind if float(errors.sum()) <= float(held.sum()) / (1 - TOLD))
+    most = float(held.sum()) / (1 - COMMAND_RIVAL_LEAVES_MORE)
+    alike = tuple(effect for errors, effect in behind if float(errors.sum()) <= most)
     first = [errors[drawn].sum(axis=1) >= held[drawn].sum(axis=1) for errors, _ in behind]
     gain, low = gain_with_bound(without, held)
     known = Law(law.effect, turned.search.regression.axis, (), lambda m, _: m.force, lambda w, n, mass: None)
@@ -252,12 +253,12 @@ def _judge_law(
 
 def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -> str:
     """A sentence; empty where it is to be named."""
-    if gain < MOST or low <= 0:
+    if gain < COMMAND_LAW_LEAVES or low <= 0:
         return (
             f"in the command's place it takes {100 * max(gain, 0.0):.0f} % of what laws of the motion leave, not most"
         )
     # A curve of the command and a pull that changes with the distance are different physics.
     strange = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.pull is not None]
-    if strange or len(alike) >= MOST_ALIKE:
+    if strange or len(alike) >= LARGEST_CLASS:
         return f"these data cannot tell it from {', '.join(alike)}"
     return "" if law.effect in EFFECTS_BY_NAME or law.formula else "no simulation of ours plays it yet"

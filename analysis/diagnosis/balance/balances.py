@@ -12,15 +12,10 @@ from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motion_band_hz, motions_of
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.settings import STILL_SHARE
+from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, SECOND_BAND_NARROWER, STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
-
-NARROWER = 0.5
-"""Share of the band that noise allows, below which the band of the motion is another look."""
-RESTS_ELSE = 0.5
-"""Share of the samples in which the device moves, below which these alone are another look."""
 
 
 def find_balances(
@@ -51,7 +46,7 @@ def _balances_in_motion_band(
 ) -> tuple[Balance, ...]:
     """The balances in the band in which the device moves; empty where it is hardly narrower, or no law is named."""
     narrow_hz = motion_band_hz(motions)
-    if not narrow_hz < NARROWER * motions[0].band_hz:
+    if not narrow_hz < SECOND_BAND_NARROWER * motions[0].band_hz:
         return ()
     try:
         found = _balances_per_axis(
@@ -73,7 +68,7 @@ def _balances_in_motion(
     At rest a friction holds any force that is asked of it: no law foretells that, and what is linear takes its
     place."""
     moving = [_moves(motion, motions) for motion in motions]
-    if np.mean(np.concatenate(moving)) > RESTS_ELSE:
+    if np.mean(np.concatenate(moving)) > MOVES_MOST_OF_THE_TIME:
         return ()
     kept = [
         replace(motion, fit=motion.fit & moves, test=motion.test & moves)

@@ -4,22 +4,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from analysis.diagnosis.settings import ACCELERATION_NOISE_SHARE, BAND_NARROWEST_CYCLES, BAND_WIDEST
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
-
-NOISE_SHARE = 0.01
-"""Noise in the acceleration's mean square at most, as a share: about the relative bias of a mass."""
-WIDEST = 0.2
-"""The band's end at most, over the sample rate."""
-NARROWEST_CYCLES = 20.0
-"""The band's end at least, in cycles per recording."""
 
 
 def band_end_hz(samples: Sequence[FloatArray], rate_hz: float, order: int) -> float:
     """The median over recordings and channels of the highest end that the noise allows."""
     ends = [_end_hz(column, rate_hz, 2 * (2 - order)) for each in samples for column in each.T]
     longest = max(len(each) for each in samples)
-    return float(np.clip(np.median(ends), NARROWEST_CYCLES * rate_hz / longest, WIDEST * rate_hz))
+    return float(np.clip(np.median(ends), BAND_NARROWEST_CYCLES * rate_hz / longest, BAND_WIDEST * rate_hz))
 
 
 def band_begin_hz(samples: Sequence[FloatArray], rate_hz: float) -> float:
@@ -31,7 +25,7 @@ def band_begin_hz(samples: Sequence[FloatArray], rate_hz: float) -> float:
         weight = frequency_hz**-4.0
         signal = np.cumsum((np.maximum(density - floor, 0.0) * weight)[::-1])[::-1]
         noise = np.cumsum((floor * weight)[::-1])[::-1]
-        allowed = np.flatnonzero(noise <= NOISE_SHARE * signal)
+        allowed = np.flatnonzero(noise <= ACCELERATION_NOISE_SHARE * signal)
         begins.append(float(frequency_hz[allowed[0]]) if len(allowed) else float(frequency_hz[0]))
     shortest = min(len(each) for each in samples)
     return max(float(np.median(begins)), 2 * rate_hz / shortest)
@@ -42,7 +36,7 @@ def _end_hz(column: FloatArray, rate_hz: float, power: int) -> float:
     frequency_hz, density, floor = _spectrum(flat, rate_hz)
     signal = np.cumsum(np.maximum(density - floor, 0.0) * frequency_hz**power)
     noise = np.cumsum(floor * frequency_hz**power)
-    allowed = np.flatnonzero(noise <= NOISE_SHARE * signal)
+    allowed = np.flatnonzero(noise <= ACCELERATION_NOISE_SHARE * signal)
     return float(frequency_hz[allowed[-1]] if len(allowed) else frequency_hz[0])
 
 

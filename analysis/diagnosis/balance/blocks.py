@@ -6,13 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from analysis.diagnosis.settings import BALANCE_FOLDS, BALANCE_MOST_SAMPLES
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
-FOLDS = 8
-"""Blocks of the samples to fit, and as many of those to test by, at least."""
-MOST_SAMPLES = 20_000
-"""Samples that numbers are fitted to at most, and as many to test by: the first ones of each block."""
 RIDGE = 1e-10
 """Ridge over the mean power of a column, against columns that are equal, or mere rounding errors in some blocks."""
 
@@ -49,10 +46,10 @@ def blocks_of(
     scale, mean = units
     total = sum(int(mask.sum()) for mask in masks)
     found = []
-    share = min(1.0, MOST_SAMPLES / max(total, 1))
+    share = min(1.0, BALANCE_MOST_SAMPLES / max(total, 1))
     for number, (columns, aim, mask) in enumerate(zip(rows, aims, masks, strict=True)):
         places = np.flatnonzero(mask)
-        count = int(np.clip(round(2 * FOLDS * len(places) / max(total, 1)), 1, len(places) or 1))
+        count = int(np.clip(round(2 * BALANCE_FOLDS * len(places) / max(total, 1)), 1, len(places) or 1))
         for whole in np.array_split(places, count) if len(places) else []:
             part = whole[: max(int(share * len(whole)), 1)]
             x, y = columns[part] / scale, aim[part]

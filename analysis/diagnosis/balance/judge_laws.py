@@ -13,7 +13,6 @@ import numpy as np
 
 from analysis.diagnosis.balance.blocks import Block
 from analysis.diagnosis.balance.judged_law import (
-    DRAWS,
     JudgedLaw,
     agrees_with_folds,
     bootstrap_draws,
@@ -22,30 +21,26 @@ from analysis.diagnosis.balance.judged_law import (
     special_cases,
 )
 from analysis.diagnosis.balance.law import Law
-from analysis.diagnosis.balance.plainest_structure import NOTABLE, numbers_of, plainest_structure
+from analysis.diagnosis.balance.plainest_structure import numbers_of, plainest_structure
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import Structure, StructureSearch, values_of
-from analysis.diagnosis.settings import STILL_SHARE
+from analysis.diagnosis.settings import (
+    BOOTSTRAP_DRAWS,
+    FURTHER_LAW_OF_ALL,
+    LARGEST_CLASS,
+    LARGEST_LAW_FORCE,
+    LAW_OF_CEILING,
+    LAW_OF_SIGNAL,
+    LEAST_JUDGED_BLOCKS,
+    NAMED_OF_CEILING,
+    RIVAL_STAYS_BEHIND,
+    SECOND_OF_FAMILY,
+    STILL_SHARE,
+)
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
-CEILING = 0.5
-"""Share of what all laws together take of the error that the named ones must reach, so that they are its main part."""
-SMALL = 0.05
-"""Share of the same that each named law must take."""
-ALMOST = 0.15
-"""Share of a law's gain by which a rival in its place must stay behind to be told from it."""
-OF_SIGNAL = 0.02
-"""Share of the force's rms that a law must take: calibration and filters of laboratory recordings are not known better.
-"""
-SECOND = 2 / 3
-"""Share of what is left that a second law of one family must take."""
 MENDS_SHAPE = "it acts like a named law, and may only mend its shape"
-MOST_ALIKE = 4
-"""Effects of a class at most; a larger class says nothing, unless all of it is dry friction."""
-LEAST_BLOCKS = 4
-CANCELLED = 2.0
-"""Standard deviation of a law's own force at most, over the recorded one's: more is cancelled by other columns."""
 DRY_FRICTIONS = {
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
     "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
@@ -138,7 +133,7 @@ def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
     found: list[JudgedLaw] = []
     for law in laws:
         mates = [other for other in found if other.named and family_of(other.law.effect) & {law.law.effect}]
-        found.append(replace(law, why_not=MENDS_SHAPE) if law.named and mates and law.gain < SECOND else law)
+        found.append(replace(law, why_not=MENDS_SHAPE) if law.named and mates and law.gain < SECOND_OF_FAMILY else law)
     return tuple(found)
 
 
@@ -149,11 +144,11 @@ def family_of(effect: str) -> set[str]:
 def blocks_to_judge(regression: Regression) -> tuple[Block, ...]:
     """The blocks that laws are judged by: the held-out ones where the device moves in them; else the fit blocks, by
     cross-validation, where several of them move; else none, for a single move tests nothing."""
-    if len(regression.test) >= LEAST_BLOCKS and held_out_moves(regression):
+    if len(regression.test) >= LEAST_JUDGED_BLOCKS and held_out_moves(regression):
         return regression.test
     fit = _speeds(regression, regression.fit)
-    several = float(fit.sum()) ** 2 >= LEAST_BLOCKS * float(fit @ fit)
-    return regression.fit if several or len(regression.test) < LEAST_BLOCKS else ()
+    several = float(fit.sum()) ** 2 >= LEAST_JUDGED_BLOCKS * float(fit @ fit)
+    return regression.fit if several or len(regression.test) < LEAST_JUDGED_BLOCKS else ()
 
 
 def held_out_moves(regression: Regression) -> bool:
@@ -199,10 +194,10 @@ def _judge_law(
     alike, likely = _indistinguishable_effects(regression, rest, number, (without, held))
     taken = float(np.sqrt(max(float((without - held).sum()), 0.0) / _signal_power(regression)))
     small = f"it takes {100 * taken:.1f} % of the force, less than such recordings are sure of"
-    why_not = _why_not(law, values, (gain, low, share, explained), alike) or (small if taken < OF_SIGNAL else "")
+    why_not = _why_not(law, values, (gain, low, share, explained), alike) or (small if taken < LAW_OF_SIGNAL else "")
     times = force_ratio(regression, laws, number)
-    possible = values is not None and times <= CANCELLED
-    if not why_not and times > CANCELLED:
+    possible = values is not None and times <= LARGEST_LAW_FORCE
+    if not why_not and times > LARGEST_LAW_FORCE:
         why_not = f"its force would be {times:.0f} times what was recorded, and other terms would cancel it"
     chosen = ""
     if not why_not and law.effect in PLAYED_AS:
@@ -233,14 +228,15 @@ def _indistinguishable_effects(
             found[law.effect] = crossed, laws
     gained = float((without - held).sum())
     alike, drawn = [], bootstrap_draws(len(held))
-    first = np.ones(DRAWS, dtype=np.bool_)
+    first = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for effect, (_, laws) in found.items():
         behind = _held_out_errors(regression, laws) - held
         if own.effect not in special_cases(effect):
             first &= behind[drawn].sum(axis=1) >= 0
         # Of two that do as well, the plainer: what acts otherwise and has more numbers must leave less.
         more = numbers_of(regression, laws[-1:]) > numbers_of(regression, [number])
-        if float(behind.sum()) <= (0.0 if more and effect not in family_of(own.effect) else ALMOST * gained):
+        most = 0.0 if more and effect not in family_of(own.effect) else RIVAL_STAYS_BEHIND * gained
+        if float(behind.sum()) <= most:
             alike.append((float(behind.sum()), effect))
     return tuple(effect for _, effect in sorted(alike)), float(first.mean())
 
@@ -256,16 +252,16 @@ def _why_not(
         return "its numbers have signs that such physics cannot have"
     if low <= 0:
         return "its gain on held-out data is not larger than what varies between stretches"
-    if share < SMALL and gain < NOTABLE:
+    if share < LAW_OF_CEILING and gain < FURTHER_LAW_OF_ALL:
         return f"it takes {100 * share:.1f} % of what all laws together take"
-    if explained < CEILING:
+    if explained < NAMED_OF_CEILING:
         return (
             f"with it, {100 * (1 - explained):.0f} % of what all laws together take are left: the main part is another"
         )
     family = family_of(law.effect) | (BY_CONDITION if law.effect in BY_CONDITION else set())
     strange = [effect for effect in alike if effect not in family]
     others = [effect for effect in alike if law.effect not in special_cases(effect)]
-    if strange or (len(others) >= MOST_ALIKE and not {law.effect, *others} <= DRY_FRICTIONS):
+    if strange or (len(others) >= LARGEST_CLASS and not {law.effect, *others} <= DRY_FRICTIONS):
         return f"these data cannot tell it from {', '.join(strange or alike)}"
     played = law.formula is not None or not {law.effect, PLAYED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)
     return "" if played else "no simulation of ours plays it yet"
@@ -293,7 +289,7 @@ def _judge_further_laws(
         share = float((held - errors).sum()) / room
         why = "it takes too little beside what is named" if chosen.laws else "its gain is too small to be named"
         if gain > 0 and low > 0:
-            possible = force_ratio(regression, laws, number) <= CANCELLED
+            possible = force_ratio(regression, laws, number) <= LARGEST_LAW_FORCE
             law = regression.laws[number]
             found.append(JudgedLaw(number, law, values, gain, low, share, (), 0.0, why, possible=possible))
     return tuple(sorted(found, key=lambda each: -each.gain))

@@ -8,11 +8,10 @@ import numpy.typing as npt
 
 from analysis.diagnosis.balance.law import Formula, Law
 from analysis.diagnosis.balance.regression import Regression
+from analysis.diagnosis.settings import BOOTSTRAP_DRAWS, BOOTSTRAP_LEVEL, BOOTSTRAP_SEED
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
-
-DRAWS, SEED, LEVEL = 2000, 1, 0.025
 
 NO_COLUMN = -1
 """Place in a regression of a law that changes the force itself."""
@@ -62,7 +61,7 @@ def gain_with_bound(without: FloatArray, with_it: FloatArray) -> tuple[float, fl
     """Share of the error power that a law takes, and its lower bound by bootstrap over blocks. Inputs: (blocks,)."""
     drawn = bootstrap_draws(len(without))
     shares = 1 - with_it[drawn].sum(axis=1) / np.maximum(without[drawn].sum(axis=1), 1e-300)
-    return float(1 - with_it.sum() / max(float(without.sum()), 1e-300)), float(np.quantile(shares, LEVEL))
+    return float(1 - with_it.sum() / max(float(without.sum()), 1e-300)), float(np.quantile(shares, BOOTSTRAP_LEVEL))
 
 
 def agrees_with_folds(held: Sequence[FloatArray], folds: Sequence[FloatArray]) -> bool:
@@ -73,7 +72,7 @@ def agrees_with_folds(held: Sequence[FloatArray], folds: Sequence[FloatArray]) -
 
 
 def bootstrap_draws(blocks: int) -> npt.NDArray[np.int64]:
-    return np.random.default_rng(SEED).integers(blocks, size=(DRAWS, blocks))
+    return np.random.default_rng(BOOTSTRAP_SEED).integers(blocks, size=(BOOTSTRAP_DRAWS, blocks))
 
 
 def force_ratio(regression: Regression, laws: Sequence[int], number: int) -> float:

@@ -23,15 +23,10 @@ from analysis.diagnosis.balance.structures import (
     search_structures,
     values_of,
 )
+from analysis.diagnosis.settings import LINEAR_LAW_GAIN, LINEAR_PART_ROUNDS, MOST_LINEAR_LAWS
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
-WORTH = 0.1
-"""Share of the cross-validated error power that a delay or a linear law must take."""
-MOST_BESIDE = 4
-"""Linear laws beside mass, damping and stiffness."""
-ROUNDS = 2
-"""Searches at most, each with the linear part that the one before it found."""
 LATER = 2.0 ** np.arange(-5, 2)
 """Delays that are tried, over the period of the band's end: up to twice that, beyond which signals repeat."""
 FINER = 4
@@ -50,7 +45,7 @@ def search_beside_linear(
     """As `search_structures`, repeated beside the delay and the linear laws that the first search finds."""
     beside = BaseTerms(driven_motion(motions)[axis])
     found = search_structures(motions, axis, rotational, without, time_left, beside)
-    for _ in range(ROUNDS - 1):
+    for _ in range(LINEAR_PART_ROUNDS - 1):
         if not time_left():
             break
         more = _extend_base(found, beside)
@@ -111,7 +106,7 @@ def _complete_base(
     laws = [*(regression.laws[k] for k in bent), *others]
     room = regression_of(motions, regression.axis, laws, _turns(regression), replace(beside, laws=held))
     chosen = Structure(tuple(range(len(bent))), room.cross_validated_errors(room.columns_of(range(len(bent)))))
-    while len(held) + len(chosen.laws) - len(bent) < MOST_BESIDE:
+    while len(held) + len(chosen.laws) - len(bent) < MOST_LINEAR_LAWS:
         richer = _add_linear_law(room, chosen)
         if richer is None:
             break
@@ -139,7 +134,7 @@ def _add_linear_law(room: Regression, chosen: Structure) -> tuple[Regression, St
 
 
 def _is_worth_it(plain: Structure, richer: Structure) -> bool:
-    return richer.error < (1 - WORTH) * plain.error and is_better(plain, richer)
+    return richer.error < (1 - LINEAR_LAW_GAIN) * plain.error and is_better(plain, richer)
 
 
 def _turns(regression: Regression) -> bool:

@@ -15,19 +15,13 @@ from scipy.fft import irfft, rfft, rfftfreq
 from analysis.diagnosis.balance.band import band_begin_hz, band_end_hz
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, is_read_as_free
 from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.settings import MOTION_EDGE_PERIODS, MOTION_OVERSAMPLED, MOVING_BAND_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.effects.discovered_law import condition_names, law_channels
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.band_limited import low_pass_gain, odd_extension
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
-
-OVERSAMPLED = 4.0
-"""Samples that are kept per period of the band's end."""
-MOVING = 0.99
-"""Share of the speed's mean square below the end of the band in which the device moves."""
-EDGE = 0.5
-"""Periods of the band's end that are left out at either end of a part: there the filter reaches beyond the data."""
 
 
 class NoMotionError(ValueError):
@@ -86,7 +80,7 @@ class Motion:
 
     def valid_samples(self, mask: Mask) -> Mask:
         """(kept samples,): the samples of a mask (n,) that are not within a filter length of the part's ends."""
-        edge = int(EDGE * self.rate_hz / self.band_hz) + 1
+        edge = int(MOTION_EDGE_PERIODS * self.rate_hz / self.band_hz) + 1
         inside = np.zeros(len(mask), dtype=np.bool_)
         inside[edge : len(mask) - edge] = True
         return (mask & inside)[:: self.step]
@@ -150,7 +144,7 @@ def motion_band_hz(motions: Sequence[Motion]) -> float:
         every, where = np.concatenate(power), np.concatenate(frequency_hz)
         order = np.argsort(where)
         below = np.cumsum(every[order])
-        ends.append(float(where[order][min(np.searchsorted(below, MOVING * below[-1]), len(where) - 1)]))
+        ends.append(float(where[order][min(np.searchsorted(below, MOVING_BAND_SHARE * below[-1]), len(where) - 1)]))
     return max(ends)
 
 
@@ -174,7 +168,7 @@ def _motion(
         # It is the force, turned round: no law may explain it by itself.
         acceleration = np.zeros_like(acceleration)
     return Motion(
-        rate_hz, band_hz, max(int(rate_hz / (OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
+        rate_hz, band_hz, max(int(rate_hz / (MOTION_OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
         acceleration, fill_gaps(record.command), condition, record.fit | record.choose, record.test, lowest_hz,
     )  # fmt: skip
 

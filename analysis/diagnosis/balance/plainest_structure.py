@@ -4,13 +4,7 @@ from collections.abc import Sequence
 
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import Structure, StructureSearch, is_better
-
-PLAIN = 0.1
-"""Share of what the best structure takes of the linear model's error that a plainer one may leave to be preferred."""
-MOST_OF_REST, NOTABLE = 0.5, 0.3
-"""Shares that further laws must take: of the error that a plain structure leaves above that of all laws together, and
-of all that it leaves."""
-
+from analysis.diagnosis.settings import FURTHER_LAW_OF_ALL, FURTHER_LAW_OF_REST, PLAINER_LEAVES
 
 WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
 """Laws whose only nonlinear number is the width of a smoothed sign."""
@@ -18,7 +12,7 @@ WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
 
 def plainest_structure(search: StructureSearch) -> Structure:
     """The structure with the fewest parameters whose cross-validated error is hardly above the best one's."""
-    allowed = search.best.error + PLAIN * (search.linear.error - search.best.error)
+    allowed = search.best.error + PLAINER_LEAVES * (search.linear.error - search.best.error)
     enough = [each for each in search.ranked if each.error <= allowed]
     plain = min(enough, key=lambda each: (numbers_of(search.regression, each.laws), each.error), default=search.linear)
     ceiling = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
@@ -29,7 +23,7 @@ def plainest_structure(search: StructureSearch) -> Structure:
 
 def _further(search: StructureSearch, plain: Structure, ceiling: float) -> Structure | None:
     """The structure with further laws that take most of what all laws together could still take; None = no such."""
-    allowed = plain.error - max(MOST_OF_REST * (plain.error - ceiling), NOTABLE * plain.error)
+    allowed = plain.error - max(FURTHER_LAW_OF_REST * (plain.error - ceiling), FURTHER_LAW_OF_ALL * plain.error)
     more = [
         each
         for each in search.ranked

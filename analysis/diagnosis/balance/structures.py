@@ -10,16 +10,10 @@ from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, scales_of
 from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.balance.regression import Regression, append_laws, keep_laws, regression_of, replace_law
+from analysis.diagnosis.settings import FURTHER_LAW_ERRORS, FURTHER_LAW_GAIN, MOST_SUMMED_LAWS, STRUCTURES_BEAM
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
-MOST_LAWS = 3
-BEAM = 5
-"""Structures of each size that are taken further."""
-NOTICED = 0.02
-"""Share of the cross-validated error power that a further law must take."""
-SURE = 2.0
-"""Standard errors that the folds' mean gain, or their mean logarithmic gain, must exceed."""
 REFINED = (0.8, 0.93, 1.075, 1.25)
 """Factors by which nonlinear numbers are moved, as long as that helps."""
 ROUNDS = 6
@@ -84,16 +78,16 @@ def search_structures(
 def _beam(first: Regression, linear: Structure, time_left: TimeBudget) -> tuple[Regression, list[Structure], Structure]:
     """The regression with its laws refined, the structures of all sizes, and the best."""
     beam, ranked, best = [linear], [linear], linear
-    for _ in range(MOST_LAWS):
+    for _ in range(MOST_SUMMED_LAWS):
         if not time_left():
             break
         grown = _add_law_to_each(first, beam)
         if not grown:
             break
-        first = refine_numbers(first, grown[:BEAM])
+        first = refine_numbers(first, grown[:STRUCTURES_BEAM])
         grown = [replace(each, errors=first.cross_validated_errors(first.columns_of(each.laws))) for each in grown]
         ranked += grown
-        beam = sorted(grown, key=lambda each: each.error)[:BEAM]
+        beam = sorted(grown, key=lambda each: each.error)[:STRUCTURES_BEAM]
         if not is_better(best, beam[0]):
             break
         best = beam[0]
@@ -106,12 +100,12 @@ def is_better(plain: Structure, richer: Structure) -> bool:
     floor = 1e-12 * plain.error / len(plain.errors)
     shares = np.log(np.maximum(plain.errors, floor) / np.maximum(richer.errors, floor)) if floor > 0 else np.zeros(1)
     agreed = any(_is_significant(gains) for gains in (plain.errors - richer.errors, shares))
-    return richer.error < (1 - NOTICED) * plain.error and agreed
+    return richer.error < (1 - FURTHER_LAW_GAIN) * plain.error and agreed
 
 
 def _is_significant(gains: FloatArray) -> bool:
     spread = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
-    return float(gains.sum()) > SURE * spread
+    return float(gains.sum()) > FURTHER_LAW_ERRORS * spread
 
 
 def _linear_structure(regression: Regression) -> Structure:

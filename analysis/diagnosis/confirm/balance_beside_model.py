@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.given_base import GivenBase
-from analysis.diagnosis.balance.judge_laws import OF_SIGNAL, Balance, judge_laws
-from analysis.diagnosis.balance.motion import OVERSAMPLED, Motion, NoMotionError, motions_of
+from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
+from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.measured_motion import has_motion
@@ -20,6 +20,7 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.forces.needed_force import band_motion, needed_force
+from analysis.diagnosis.settings import LAW_OF_SIGNAL, MOTION_OVERSAMPLED
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import PlacedEffect, Structure
 from equalizer.effects.placing import place_recorded_effects
@@ -54,7 +55,7 @@ def find_balances_beside_model(
             judge_laws(
                 search_structures(
                     [_select_axis(each.motion, axis) for each in seen], axis, model.rotational, without, time_left,
-                    GivenBase(tuple(each.columns[axis] for each in seen), float(mass[axis]), OF_SIGNAL),
+                    GivenBase(tuple(each.columns[axis] for each in seen), float(mass[axis]), LAW_OF_SIGNAL),
                 )
             )
             for axis in range(model.inputs)
@@ -88,7 +89,7 @@ def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _
     every = max(int(rate_hz / (FINEST * motion.band_hz)), 1)
     position, velocity, acceleration = (each[::every] for each in course)
     thin = replace(
-        motion, rate_hz=rate_hz / every, step=max(int(rate_hz / every / (OVERSAMPLED * motion.band_hz)), 1),
+        motion, rate_hz=rate_hz / every, step=max(int(rate_hz / every / (MOTION_OVERSAMPLED * motion.band_hz)), 1),
         channels=motion.channels[:m], position=position, velocity=velocity, acceleration=acceleration,
         force=motion.band_pass(entered + added)[::every], condition=motion.condition[::every],
         fit=motion.fit[::every], test=motion.test[::every],

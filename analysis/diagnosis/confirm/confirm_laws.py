@@ -11,7 +11,6 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance, family_of
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.balance.plainest_structure import NOTABLE
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_something
 from analysis.diagnosis.confirm.laws_to_play import (
     CONSTANT,
@@ -31,7 +30,7 @@ from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
 from analysis.diagnosis.search.without_effect import without_effect
-from analysis.diagnosis.settings import HELD_OUT_ERROR, INTERVAL_FACTOR
+from analysis.diagnosis.settings import CONFIRMED_LEAVES, FURTHER_LAW_OF_ALL, HELD_OUT_ERROR, INTERVAL_FACTOR
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.signal import FloatArray
 
@@ -47,10 +46,6 @@ BESIDE_RUNAWAY = "the model without it leaves more than the mean of the signal, 
 VAGUE = 1.96 * INTERVAL_FACTOR
 """Half width of an interval in standard errors: a logarithm with a larger relative error leaves its number open."""
 _Named = list[tuple[int, JudgedLaw]]
-
-HELD_BY_SIMULATION = 0.9
-"""Times the held-out error without new physics that the completed model may leave at most, in the measure that suits.
-"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +119,7 @@ def _prefer_special_case(begun: _Confirming, found: SearchResult, named: _Named)
         other = None if simpler is None else _confirm(begun, _without(named, place, simpler))
         if other is None or len(other[1]) < len(named):
             continue
-        if other[0].found.after.held_out <= found.found.after.held_out - np.log(HELD_BY_SIMULATION):
+        if other[0].found.after.held_out <= found.found.after.held_out - np.log(CONFIRMED_LEAVES):
             return other[0]
     return found
 
@@ -169,7 +164,7 @@ def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
 def _takes_enough(context: SearchContext, found: Explanation) -> bool:
     """Whether the last effect takes a notable share of the held-out error power beside those before it."""
     before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
-    return not found.after.held_out > before.held_out + np.log(1 - NOTABLE) / 2
+    return not found.after.held_out > before.held_out + np.log(1 - FURTHER_LAW_OF_ALL) / 2
 
 
 def _from_starts(
@@ -269,4 +264,4 @@ def _open_numbers(result: SearchResult) -> list[int]:
 
 
 def _is_borne_out(plain: FittedCandidate, after: FittedCandidate) -> bool:
-    return not np.isfinite(plain.held_out) or after.held_out <= plain.held_out + np.log(HELD_BY_SIMULATION)
+    return not np.isfinite(plain.held_out) or after.held_out <= plain.held_out + np.log(CONFIRMED_LEAVES)

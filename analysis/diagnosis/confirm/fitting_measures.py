@@ -16,13 +16,10 @@ from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.first_model.model_of_balance import first_model, share_within
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.settings import LAWS_WITHIN
+from analysis.diagnosis.settings import CONSTANT_LEAVES, LAWS_WITHIN
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 
-MENDED = 0.9
-"""Times the error that a constant may leave at most to be worth saying; principle: as a named law, `confirm_laws`.
-"""
 ABOUT_MEAN = (
     "The fitted model holds no constants: one was added to the command, with which its mean error on what was fitted "
     "to is zero. Weights, offsets of sensor and amplifier, and the point that the device works at are all in it."
@@ -60,7 +57,7 @@ def choose_fitting_measure(
     if moved is None:
         return look
     other = measure_of(moved, model, clean, compared)
-    if other.measure.name != measure.name or _error_over_noise(model, other) > MENDED * _error_over_noise(
+    if other.measure.name != measure.name or _error_over_noise(model, other) > CONSTANT_LEAVES * _error_over_noise(
         model, look.chosen
     ):
         return look

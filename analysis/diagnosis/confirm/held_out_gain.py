@@ -9,16 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.judged_law import LEVEL, bootstrap_draws
+from analysis.diagnosis.balance.judged_law import bootstrap_draws
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import SEALED_SURPRISE
+from analysis.diagnosis.settings import BOOTSTRAP_LEVEL, HELD_OUT_STRETCHES, LEAST_HELD_OUT_STRETCHES, SEALED_SURPRISE
 from equalizer.signals.signal import FloatArray
-
-STRETCHES = 16
-"""Number of stretches of all held-out samples, about."""
-LEAST_STRETCHES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +32,14 @@ def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: Fitt
     """The gain of one candidate over another. measure: with the held-out samples, as both candidates' fits. None where
     too little is held out."""
     left, right = (_powers(measure, each) for each in (without, with_it))
-    if len(left) < LEAST_STRETCHES or not (np.isfinite(left).all() and np.isfinite(right).all()):
+    if len(left) < LEAST_HELD_OUT_STRETCHES or not (np.isfinite(left).all() and np.isfinite(right).all()):
         return None
     # Each channel in units of what is left of it without the effect: no channel drowns the others.
     size = np.maximum(left.sum(axis=0), np.finfo(float).tiny)
     before, after = (left / size).mean(axis=1), (right / size).mean(axis=1)
     drawn = bootstrap_draws(len(before))
     shares = 1 - after[drawn].sum(axis=1) / np.maximum(before[drawn].sum(axis=1), np.finfo(float).tiny)
-    low, high = np.quantile(shares, [LEVEL, 1 - LEVEL])
+    low, high = np.quantile(shares, [BOOTSTRAP_LEVEL, 1 - BOOTSTRAP_LEVEL])
     return HeldOutGain(float(1 - after.sum() / before.sum()), float(low), float(high))
 
 
@@ -67,6 +63,6 @@ def _powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:
     for record, residuals in zip(measure.records, candidate.fitted.residuals, strict=True):
         places = np.flatnonzero(record.test)
         if len(places):
-            count = int(np.clip(round(STRETCHES * len(places) / total), 1, len(places)))
+            count = int(np.clip(round(HELD_OUT_STRETCHES * len(places) / total), 1, len(places)))
             found += [np.sum(residuals[part] ** 2, axis=0) for part in np.array_split(places, count)]
     return np.array(found).reshape(len(found), -1)

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.judge_laws import CEILING, PLAYED_AS, Balance
-from analysis.diagnosis.balance.plainest_structure import NOTABLE
+from analysis.diagnosis.balance.judge_laws import PLAYED_AS, Balance
 from analysis.diagnosis.confirm.balance_beside_model import find_balances_beside_model
 from analysis.diagnosis.confirm.confirm_laws import search_by_balance
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
@@ -22,14 +21,16 @@ from analysis.diagnosis.search.parsimony import only_refines
 from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement
-from analysis.diagnosis.settings import NAMED_ERROR, RETUNING_BOUND
+from analysis.diagnosis.settings import (
+    AT_RETUNING_BOUND,
+    CANDIDATES_WITH_GAIN,
+    FURTHER_LAW_OF_ALL,
+    NAMED_ERROR,
+    NAMED_OF_CEILING,
+    RETUNING_BOUND,
+)
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.recording import Recording
-
-AT_LIMIT = 0.97
-"""Share of a re-tuned number's bound, from which on it counts as at the bound."""
-SHOWN = 3
-"""Fitted candidates of the last round that are reported with their gain."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,15 +80,15 @@ def objection(seen: SearchResult, balances: Sequence[Balance]) -> str:
         return "too little was held out to confirm it"
     if min(whole.low, last.low) <= 0:
         return "its gain on held-out data is not larger than what varies between stretches"
-    if min(whole.gain, last.gain) < NOTABLE:
+    if min(whole.gain, last.gain) < FURTHER_LAW_OF_ALL:
         return f"on held-out data it takes {100 * min(whole.gain, last.gain):.0f} % of the error's power, not a third"
-    if np.any(np.abs(found.after.fitted.deviations) >= AT_LIMIT * RETUNING_BOUND):
+    if np.any(np.abs(found.after.fitted.deviations) >= AT_RETUNING_BOUND * RETUNING_BOUND):
         return "beside it, a number of the model stands at the end of its tolerance"
     rival = _best_rival(context, seen)
     if rival is not None and _not_better(context, rival, found.after):
         return f"these data cannot tell it from {rival.newest.replace('_', ' ')}"
     claims = found.after.fitted.hypothesis.claims
-    if whole.gain < CEILING and not all(_is_named_by_balance(claim, balances) for claim in claims):
+    if whole.gain < NAMED_OF_CEILING and not all(_is_named_by_balance(claim, balances) for claim in claims):
         return "it takes less than half of the error's power, and the force balance does not bear it out"
     return ""
 
@@ -133,7 +134,7 @@ def _unconfirmed_candidates(seen: SearchResult, why_not: str) -> tuple[Unconfirm
     for candidate in rounds[number]:
         first.setdefault(candidate.newest, candidate)
     found = []
-    for place, candidate in enumerate([*first.values()][:SHOWN]):
+    for place, candidate in enumerate([*first.values()][:CANDIDATES_WITH_GAIN]):
         gain = held_out_gain(seen.context.whole, seen.found.plain, seen.context.with_test_score(candidate))
         if gain is not None and gain.gain > 0:
             found.append(

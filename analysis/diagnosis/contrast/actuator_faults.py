@@ -8,6 +8,7 @@ from scipy.interpolate import make_interp_spline
 
 from analysis.diagnosis.contrast.fault import ColumnChange, Fault, Numbers, Undo, Variant, proportional_number
 from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.settings import LONGEST_DELAY
 from equalizer.effects.simulation.sensor_path import filter_one_pole
 from equalizer.effects.simulation.slew_kernel import limit_rate
 from equalizer.signals.signal import FloatArray
@@ -16,8 +17,6 @@ CommandChange = Callable[[FloatArray, float], FloatArray]
 """Maps one axis's command (n,), at a rate in Hz, to the force that the faulty drive makes of it."""
 AROUND = (0.75, 1.35)
 """Range of sizes in which the change for size 1, scaled, stands for other sizes."""
-LONGEST = 0.3
-"""Largest delay, over the period of the command's median frequency."""
 GRID = 12
 BEGUN = (0.0, 0.25, 0.5)
 """Shares of a drift that had come before the recording began."""
@@ -134,8 +133,8 @@ def _deadband(axis: _Axis, width: float) -> Variant:
 
 
 def delays_to_try(samples: FloatArray, rate_hz: float) -> list[float]:
-    """Delays in s on a logarithmic grid, from a tenth of a sample to `LONGEST`."""
-    shortest, longest = 0.1 / rate_hz, LONGEST / median_frequency_hz(samples, rate_hz)
+    """Delays in s on a logarithmic grid, from a tenth of a sample to `LONGEST_DELAY`."""
+    shortest, longest = 0.1 / rate_hz, LONGEST_DELAY / median_frequency_hz(samples, rate_hz)
     if longest <= shortest:
         return []
     # Sizes `AROUND` each must meet those of the next.

@@ -8,13 +8,9 @@ import numpy as np
 
 from analysis.diagnosis.balance.motion import low_pass_filter
 from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.settings import RESPONSE_BAND_SHARE, RESPONSE_OVERSAMPLED
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
-
-POWER = 0.999
-"""Share of the response's power below the band's end."""
-OVERSAMPLED = 3.0
-"""Samples per period of the band's end, at least."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +57,6 @@ def likely_step(parts: Sequence[Part]) -> int:
             floor = float(np.median(column[3 * len(column) // 4 :]))
             course = np.cumsum(np.maximum(column - floor, 0.0))
             if course[-1] > 0:
-                ends.append(int(np.searchsorted(course, POWER * course[-1])) * part.rate_hz / len(moved))
+                ends.append(int(np.searchsorted(course, RESPONSE_BAND_SHARE * course[-1])) * part.rate_hz / len(moved))
     fastest = max(ends, default=parts[0].rate_hz / 2)
-    return max(int(parts[0].rate_hz / (OVERSAMPLED * 2 * max(fastest, 1e-9))), 1)
+    return max(int(parts[0].rate_hz / (RESPONSE_OVERSAMPLED * 2 * max(fastest, 1e-9))), 1)

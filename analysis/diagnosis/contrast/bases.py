@@ -9,18 +9,9 @@ from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase, 
 from analysis.diagnosis.contrast.force_base import force_base
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.stream import Base
+from analysis.diagnosis.settings import AUTOREGRESSIVE_ORDER, BALANCE_HOLDS, CONSTANT_SIGNAL, MOTIONS_APART
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-
-HOLDS = 0.35
-"""Share of the force's rms that a force balance may leave unexplained to be used."""
-STILL = 1e-4
-"""Standard deviation of a signal over its rms below which it counts as constant."""
-STILLER = 20.0
-"""Ratio of the motions of both sets above which they are not compared: a recording of motion does not predict what a
-device does at rest. By hand: no sensor fault that can be undone makes as much."""
-STEPS = 24
-"""Order of the autoregressive model."""
 
 
 def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> tuple[list[Base], tuple[Motion, ...]]:
@@ -35,18 +26,19 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> tuple[list[Ba
         motions = (*first, *more)
     if motions and np.isfinite(motions[0].band_hz):
         bases: list[Base] = [force_base(motions, axis, turning) for axis in range(len(recording.command.channels))]
-        if all(unexplained_share(base, side) < HOLDS for base in bases for side in (clean, faulty) if side):
+        if all(unexplained_share(base, side) < BALANCE_HOLDS for base in bases for side in (clean, faulty) if side):
             return bases, motions
     step = likely_step((*clean, *faulty))
-    return [AutoregressiveBase(channel, STEPS, step) for channel in range(len(recording.response.channels))], motions
+    channels = range(len(recording.response.channels))
+    return [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step) for channel in channels], motions
 
 
 def move_alike(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
-    """Whether no response, detrended, moves more than `STILLER` times as far on one side as on the other."""
+    """Whether no response, detrended, moves more than `MOTIONS_APART` times as far on one side as on the other."""
     sizes = np.array(
         [np.sqrt(np.mean([_detrended_mean_squares(part) for part in side], axis=0)) for side in (clean, faulty)]
     )
-    return bool(np.all(sizes.max(axis=0) <= STILLER * sizes.min(axis=0)))
+    return bool(np.all(sizes.max(axis=0) <= MOTIONS_APART * sizes.min(axis=0)))
 
 
 def _detrended_mean_squares(part: Part) -> FloatArray:
@@ -65,7 +57,7 @@ def unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:
     rows = np.vstack([part[mask] for part, mask in zip(base.rows(parts), base.valid_samples(parts), strict=True)])
     size = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
     spread = float(np.std(rows[:, 0]))
-    if spread <= STILL * size[0]:
+    if spread <= CONSTANT_SIGNAL * size[0]:
         return np.inf
     weights = np.linalg.lstsq(rows[:, 1:] / size[1:], rows[:, 0], rcond=1e-10)[0]
     return float(np.std(rows[:, 0] - rows[:, 1:] / size[1:] @ weights)) / spread

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.judged_law import LEVEL, bootstrap_draws
+from analysis.diagnosis.balance.judged_law import bootstrap_draws
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
 from analysis.diagnosis.contrast.bases import bases_of, is_rotational, move_alike, unexplained_share
 from analysis.diagnosis.contrast.fault import Fault, Variant
@@ -23,31 +23,28 @@ from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
-from analysis.diagnosis.contrast.stream import BLOCKS, Stream, rows_with_fault_undone, stream_of
+from analysis.diagnosis.contrast.stream import Stream, rows_with_fault_undone, stream_of
+from analysis.diagnosis.settings import (
+    BOOTSTRAP_LEVEL,
+    CONTRAST_BLOCKS,
+    LEAST_FAULT_GAIN,
+    SETS_APART,
+    SETS_AS_ONE,
+    SIZE_IS_NEAR,
+    UNDOING_ROUNDS,
+)
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 Tried = tuple[Fit, Fault, Variant, list[Pair]]
 """A variant of a fault with its best size."""
-ALL = tuple(range(BLOCKS))
-SIXTHS, THIRDS = (tuple(tuple(ALL[k : k + size]) for k in ALL[::size]) for size in (BLOCKS // 6, BLOCKS // 3))
+ALL = tuple(range(CONTRAST_BLOCKS))
+SIXTHS, THIRDS = (tuple(tuple(ALL[k : k + size]) for k in ALL[::size]) for size in (len(ALL) // 6, len(ALL) // 3))
 FOLDS = len(SIXTHS)
 """Parts of each set that are left out in turn."""
-APART = (*THIRDS, ALL[: BLOCKS // 2])
+APART = (*THIRDS, ALL[: CONTRAST_BLOCKS // 2])
 """Blocks of a set that are compared with its other blocks, thirds and halves, as if they were two recordings."""
-FURTHER = 1.6
-"""Times the largest excess between stretches of one set that both together must have. By hand: of seven public devices
-in order, halves of which a fault was named had up to 1.53 times; faults that were named right, 1.75 and more."""
-AS_ONE = 0.05
-"""Excess of the error of both sets together over that of each by itself, up to which they are of one device."""
-NEAR = 0.02
-"""Distance from size 1 within which it is not."""
-TURNS = 4
-"""Times at most that a fault whose undoing is not linear is undone anew about the size that was found."""
-LEAST = 0.05
-"""Share of the error power of both sets that a fault must gain: a fault that adds a tenth to the error power of one set
-gains that much. Smaller ones are not worth a name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,12 +104,12 @@ class Comparison:
     @property
     def differ(self) -> bool:
         """Whether the two sets differ by more than stretches of one set do."""
-        return self.excess > max(AS_ONE, FURTHER * self.usual)
+        return self.excess > max(SETS_AS_ONE, SETS_APART * self.usual)
 
     def differ_but_for(self, fault: JudgedFault) -> bool:
         """The same with the fault undone in the faulty set: one that comes and goes sets its stretches apart, too. And
         one that no base takes up makes all of that set's errors larger, so that it shows in its sure gain alone."""
-        return max(self.excess, fault.gain_low) > max(AS_ONE, FURTHER * max(self.usual_clean, fault.apart))
+        return max(self.excess, fault.gain_low) > max(SETS_AS_ONE, SETS_APART * max(self.usual_clean, fault.apart))
 
 
 def compare(
@@ -198,9 +195,9 @@ def _error_of(tried: Tried) -> float:
 
 def _approach(found: Tried, bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
     """The fault undone about the size that was found, again and again: beside it, the change was only extrapolated."""
-    for _ in range(TURNS):
+    for _ in range(UNDOING_ROUNDS):
         fit, fault, variant, _ = found
-        if variant.about is None or abs(float(fit.sizes[0]) - 1) < NEAR:
+        if variant.about is None or abs(float(fit.sizes[0]) - 1) < SIZE_IS_NEAR:
             break
         again = _try_variant(bare, streams, fault, variant.about(float(fit.sizes[0])))
         if again is None or _error_of(again) >= _error_of(found):
@@ -233,7 +230,7 @@ def _judge_fault(streams: Sequence[Stream], found: Tried, plain: Fit, samples: i
               for name in values}  # fmt: skip
     gains = (
         list(_gains_within_a_set(streams, fault, variant, fit.sizes))
-        if plain.error > (1 + LEAST) * fit.error
+        if plain.error > (1 + LEAST_FAULT_GAIN) * fit.error
         else [0.0]
     )
     typical = max(float(np.median(gains)), 0.0)
@@ -243,7 +240,7 @@ def _judge_fault(streams: Sequence[Stream], found: Tried, plain: Fit, samples: i
     left, room = float(errors.sum()), plain.error - samples
     return JudgedFault(
         fault, values, spread, errors, plain.error / max(left, 1e-300) - 1, max([0.0, *gains]) - typical, typical,
-        (plain.error - left) / room if room > 0 else 0.0, held, float(np.quantile(beyond, LEVEL)),
+        (plain.error - left) / room if room > 0 else 0.0, held, float(np.quantile(beyond, BOOTSTRAP_LEVEL)),
         max(_excesses_within_a_set([pair.with_it.undo_sizes(fit.sizes) for pair in pairs])),
     )  # fmt: skip
 

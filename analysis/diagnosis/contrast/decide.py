@@ -6,23 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from analysis.diagnosis.balance.judged_law import DRAWS, LEVEL, bootstrap_draws
-from analysis.diagnosis.contrast.compare import FOLDS, LEAST, Comparison, JudgedFault
+from analysis.diagnosis.balance.judged_law import bootstrap_draws
+from analysis.diagnosis.contrast.compare import FOLDS, Comparison, JudgedFault
+from analysis.diagnosis.settings import (
+    BOOTSTRAP_DRAWS,
+    BOOTSTRAP_LEVEL,
+    FAULT_BEYOND,
+    FAULT_MAIN_PART,
+    FAULT_RIVAL_BEHIND,
+    FAULT_RIVAL_WORSE,
+    FAULT_STEADY,
+    LARGEST_FAULT_CLASS,
+    LEAST_FAULT_GAIN,
+)
 
-BEYOND = 5.0
-"""Times the largest gain between stretches of one set that a fault must gain. By hand: of six public
-devices in order, two halves differed by up to 3.7 times."""
-STEADY = 0.4
-"""Share of a gain that its lower end must be where the sets differ no more than stretches of one do. By hand: 0.16 to
-0.37 where two halves in order had another delay by chance; 0.47 for a damper that is hardly seen."""
-MAIN = 0.4
-"""Share of what sets the sets apart that a name must explain: with less, the main part is another's."""
-ALMOST = 0.1
-"""Share of a fault's gain by which a rival must stay behind to be told from it,"""
-WORSE = 0.25
-"""or of what the fault leaves: where a gain is large, a tenth of it is many times that. By hand."""
-MOST_ALIKE = 4
-"""Faults of a class at most; a larger class says nothing."""
 BOUND = float(stdtrit(FOLDS - 1, 0.975))
 """Half width of a 95 % interval in standard errors (Student's t for so few blocks): within it, a number may be none."""
 SAME = {
@@ -55,9 +52,12 @@ def decide(found: Comparison, responses: int) -> Decision:
     rivals = [law for law in sure if law is not best]
     told_apart_from = [rival for rival in rivals if not _refines(rival, best)]
     inseparable = [rival for rival in told_apart_from if _is_inseparable(best, rival, found)]
-    unsure = [law for law, why in reasons if why and law.gain >= LEAST and not _refines(law, best)]
+    unsure = [law for law, why in reasons if why and law.gain >= LEAST_FAULT_GAIN and not _refines(law, best)]
     inseparable += [law for law in rivals if _refines(law, best) and _is_sure_to_leave_less(law, best)]
-    alike = (*inseparable, *_unsure_but_as_good(unsure, best, found)[: max(MOST_ALIKE - 1 - len(inseparable), 0)])
+    alike = (
+        *inseparable,
+        *_unsure_but_as_good(unsure, best, found)[: max(LARGEST_FAULT_CLASS - 1 - len(inseparable), 0)],
+    )
     ahead = [law for law in unsure if law.gain_low > 0 and _behind(law, best) < -_least(best, found)]
     same = SAME.get(best.fault.effect, ()) if responses == 1 or best.fault.effect == "force_offset" else ()
     names = tuple(name for name in dict.fromkeys((*(rival.fault.effect for rival in alike), *same))
@@ -66,9 +66,9 @@ def decide(found: Comparison, responses: int) -> Decision:
     why_not = ""
     if ahead:
         why_not = f"{ahead[0].fault.effect} explains more, and is not sure itself"
-    elif best.share < MAIN:
+    elif best.share < FAULT_MAIN_PART:
         why_not = f"it explains {100 * best.share:.0f} % of what sets these recordings apart: the main part is another"
-    elif len(names) >= MOST_ALIKE:
+    elif len(names) >= LARGEST_FAULT_CLASS:
         why_not = "these data cannot tell it from " + ", ".join(names)
     elif elsewhere:
         why_not = f"these data cannot tell whether it is on {best.fault.axis} or on {', '.join(elsewhere)}"
@@ -105,12 +105,12 @@ def _choose_plainest(sure: Sequence[JudgedFault], found: Comparison) -> JudgedFa
 def _why_not(weighed: JudgedFault, differ: bool) -> str:
     """differ: whether the sets do by more than stretches of one. Where they do not, a fault must gain in all blocks
     alike, which what changes in the course of a recording does not."""
-    if weighed.gain < LEAST or weighed.gain_low <= 0:
+    if weighed.gain < LEAST_FAULT_GAIN or weighed.gain_low <= 0:
         return "its gain is not larger than what varies between stretches"
-    steady = weighed.gain_low >= STEADY * weighed.gain and not weighed.fault.varies
+    steady = weighed.gain_low >= FAULT_STEADY * weighed.gain and not weighed.fault.varies
     if not differ and not steady:
         return "stretches of one set differ as much as the sets do"
-    if weighed.gain <= BEYOND * weighed.usual:
+    if weighed.gain <= FAULT_BEYOND * weighed.usual:
         return f"it gains {weighed.usual:.2g} between stretches of one kind, too, and {weighed.gain:.2g} here"
     main = next(iter(weighed.values))
     if abs(_distance_from_none(weighed, main)) <= BOUND * weighed.spread[main]:
@@ -126,13 +126,13 @@ def _distance_from_none(weighed: JudgedFault, name: str) -> float:
 def _is_inseparable(best: JudgedFault, other: JudgedFault, found: Comparison) -> bool:
     behind = other.errors - best.errors
     drawn = bootstrap_draws(len(behind))
-    return bool(behind.sum() <= _least(best, found) or np.quantile(behind[drawn].sum(axis=1), LEVEL) <= 0)
+    return bool(behind.sum() <= _least(best, found) or np.quantile(behind[drawn].sum(axis=1), BOOTSTRAP_LEVEL) <= 0)
 
 
 def _is_sure_to_leave_less(finer: JudgedFault, best: JudgedFault) -> bool:
     """Whether a fault that holds the best as a special case leaves less, beyond what resampled blocks vary."""
     ahead = best.errors - finer.errors
-    return bool(np.quantile(ahead[bootstrap_draws(len(ahead))].sum(axis=1), LEVEL) > 0)
+    return bool(np.quantile(ahead[bootstrap_draws(len(ahead))].sum(axis=1), BOOTSTRAP_LEVEL) > 0)
 
 
 def _behind(other: JudgedFault, best: JudgedFault) -> float:
@@ -143,12 +143,12 @@ def _behind(other: JudgedFault, best: JudgedFault) -> float:
 def _least(best: JudgedFault, found: Comparison) -> float:
     """What a rival must leave beyond the best to be told from it."""
     left = float(best.errors.sum())
-    return min(ALMOST * (float(found.plain.sum()) - left), WORSE * left)
+    return min(FAULT_RIVAL_BEHIND * (float(found.plain.sum()) - left), FAULT_RIVAL_WORSE * left)
 
 
 def _probability_of_best(best: JudgedFault, rivals: Sequence[JudgedFault]) -> float:
     drawn = bootstrap_draws(len(best.errors))
-    first = np.ones(DRAWS, dtype=np.bool_)
+    first = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for other in rivals:
         first &= (other.errors - best.errors)[drawn].sum(axis=1) >= 0
     return float(first.mean())

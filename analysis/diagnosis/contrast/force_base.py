@@ -11,12 +11,9 @@ from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
 from analysis.diagnosis.balance.motion import Motion, band_pass, motions_of
 from analysis.diagnosis.balance.regression import Regression, keep_laws, regression_of
 from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.settings import BASE_LAW_GAIN, MOST_BASE_LAWS
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
-
-MOST_LAWS = 10
-WORTH = 0.01
-"""Share of the folds' error that a further law must take."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,16 +79,16 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
 
 
 def _select_laws(regression: Regression) -> tuple[int, ...]:
-    """Forward selection of laws, as long as the cross-validated error falls by `WORTH`."""
+    """Forward selection of laws, as long as the cross-validated error falls by `BASE_LAW_GAIN`."""
     laws: tuple[int, ...] = ()
     left = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
-    while len(laws) < MOST_LAWS:
+    while len(laws) < MOST_BASE_LAWS:
         tried = [
             (float(regression.cross_validated_errors(regression.columns_of((*laws, number))).sum()), number)
             for number in range(len(regression.laws))
             if number not in laws
         ]
-        if not tried or min(tried)[0] > (1 - WORTH) * left:
+        if not tried or min(tried)[0] > (1 - BASE_LAW_GAIN) * left:
             break
         left, best = min(tried)
         laws = (*laws, best)

@@ -8,14 +8,10 @@ import numpy as np
 from analysis.diagnosis.data.measured_motion import fill_gaps
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import part_of, parts_of
+from analysis.diagnosis.settings import PART_LEAST_SAMPLES, PART_MOST_SAMPLES
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
-
-LEAST_SAMPLES = 64
-"""Samples of a part at least."""
-MOST_SAMPLES = 40_000
-"""Samples of a recording that are used at most, its last: enough to find a fault that matters, in bounded time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,9 +59,9 @@ def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
     found: list[Part] = []
     for recording in recordings:
         for start, stop in parts_of(recording):
-            begin = max(start, len(recording) - MOST_SAMPLES)
+            begin = max(start, len(recording) - PART_MOST_SAMPLES)
             known = np.flatnonzero(_finite_samples(part_of(recording, begin, stop)))
-            if len(known) and known[-1] - known[0] + 1 >= LEAST_SAMPLES:
+            if len(known) and known[-1] - known[0] + 1 >= PART_LEAST_SAMPLES:
                 found.append(_fill_part(recording, begin + int(known[0]), begin + int(known[-1]) + 1))
     return tuple(found)
 

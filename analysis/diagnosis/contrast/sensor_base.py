@@ -10,12 +10,10 @@ import numpy as np
 
 from analysis.diagnosis.balance.motion import differentiate, low_pass_filter
 from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.settings import SENSOR_TAPS
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
-
-REACH = 2
-"""Samples before and after that predict a reading: filters of the two sensors differ by so much."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,16 +34,16 @@ class SensorBase:
             inside = part.known.copy()
             inside[:edge] = False
             inside[max(len(inside) - edge, 0) :] = False
-            found.append(inside[:: self.step][REACH:-REACH])
+            found.append(inside[:: self.step][SENSOR_TAPS:-SENSOR_TAPS])
         return tuple(found)
 
     def _rows(self, part: Part) -> FloatArray:
         assert part.position is not None
         read = low_pass_filter(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
         moved = differentiate(part.position[:, [self.channel]], part.rate_hz, self.band_hz, self.times)[:: self.step]
-        count = len(read) - 2 * REACH
-        near = [moved[shift : shift + count] for shift in range(2 * REACH + 1)]
-        return np.hstack([read[REACH : REACH + count], *near, np.ones((count, 1))])
+        count = len(read) - 2 * SENSOR_TAPS
+        near = [moved[shift : shift + count] for shift in range(2 * SENSOR_TAPS + 1)]
+        return np.hstack([read[SENSOR_TAPS : SENSOR_TAPS + count], *near, np.ones((count, 1))])
 
 
 def sensor_bases(parts: Sequence[Part], band_hz: float, step: int) -> tuple[SensorBase, ...]:

@@ -18,6 +18,7 @@ from analysis.diagnosis.contrast.actuator_faults import (
 )
 from analysis.diagnosis.contrast.fault import EVERY, Fault, Numbers, Undo, Variant, proportional_number
 from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.settings import CLOCK_FASTEST, REVERSAL_OF_GAP
 from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
@@ -32,12 +33,8 @@ BENT = (0.02, 0.06, 0.15, 0.3)
 """Nonlinearity errors at the largest reading, as a share of it."""
 PLAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 """Gaps before the sensor, over the channel's rms."""
-TURNED = 0.05
-"""Share of a gap by which a reading must go back to count as a reversal."""
 LATE = (*np.geomspace(0.004, 0.2, GRID // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
 """How late a clock may be at the end of the file, in periods: beyond the first ones, closer than half a period."""
-FASTEST = 0.05
-"""Relative rate error of a clock at most."""
 IN_UNITS = ("sensor_offset", "sensor_drift")
 """Faults that only channels of one unit can have alike."""
 
@@ -106,7 +103,7 @@ def _common_faults(channel: _Channel, longest: Part, course: FloatArray) -> Iter
     period = longest.rate_hz / median_frequency_hz(course, longest.rate_hz)
     rates = [side * late * period / longest.whole for late in LATE for side in (1.0, -1.0)]
     runs_on = (True, False) if longest.start > 0 else (True,)
-    clocks = [_clock_drift(channel, rate, on) for rate in rates if abs(rate) < FASTEST for on in runs_on]
+    clocks = [_clock_drift(channel, rate, on) for rate in rates if abs(rate) < CLOCK_FASTEST for on in runs_on]
     yield replace(channel.fault("clock_drift", clocks), varies=True)
 
 
@@ -117,13 +114,13 @@ def _play(channel: _Channel, gap: float) -> Variant:
 def _undo_play(y: FloatArray, gap: float) -> FloatArray:
     """(n,): the motion that drives a reading through a gap, half the gap ahead of it. It reverses at the reading's
     extreme, slowly at first, and has crossed the gap where the reading reverses."""
-    side = np.sign(bristle_bend(y, TURNED * gap))
+    side = np.sign(bristle_bend(y, REVERSAL_OF_GAP * gap))
     ahead = 0.5 * side
     turns = np.flatnonzero(side[1:] * side[:-1] < 0) + 1
     for begin, turn in pairwise([0, *turns.tolist()]):
         course = side[turn - 1] * y[begin:turn]
         top = begin + int(np.argmax(course))
-        left = top + int(np.flatnonzero(course[top - begin :] > course.max() - TURNED * gap)[-1])
+        left = top + int(np.flatnonzero(course[top - begin :] > course.max() - REVERSAL_OF_GAP * gap)[-1])
         crossed = (np.arange(top, turn) - top) / max(left - top, 1)
         ahead[top:turn] = side[turn - 1] * (0.5 - np.minimum(crossed, 1.0) ** 2)
     return np.asarray(y + gap * ahead)

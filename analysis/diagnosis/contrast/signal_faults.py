@@ -7,26 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.contrast.part import Part
-from analysis.diagnosis.settings import STEP_FACTOR
+from analysis.diagnosis.settings import (
+    LINE_IS_NEW,
+    LINE_STANDS_OUT,
+    MAINS_HZ,
+    MAINS_OFF_HZ,
+    NOISE_EVEN,
+    NOISE_LOUDER,
+    NOISE_STRETCHES,
+    STEP_FACTOR,
+)
 from equalizer.effects.starts.lattice import confirm_lattice_step, lattice_step
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.signal import FloatArray
-
-MAINS_HZ = (50.0, 60.0)
-OFF_HZ = 0.5
-"""Deviation of the mains frequency, or of a logger's clock, at most."""
-STANDS_OUT = 30.0
-"""Power of a line over the median of its neighbourhood: noise exceeds it in one of e^30 lines."""
-NEW = 6.0
-"""Times as far as on the clean recordings, and as in the command, that it must stand out."""
-
-
-LOUDER = 4.0
-"""Times the largest noise of any clean stretch that the smallest of the faulty ones must have: what changes with the
-motion is no noise of a sensor."""
-EVEN = 1.6
-"""Ratio of the powers of white noise in two bands at most."""
-STRETCHES = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,8 +59,8 @@ def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
         if not len(here) or not len(usual):
             continue
         new = np.median(here, axis=0) - np.median(usual, axis=0)
-        louder = bool(np.all(here.min(axis=0) > LOUDER * usual.max(axis=0)))
-        if louder and 1 / EVEN < new[0] / new[1] < EVEN:
+        louder = bool(np.all(here.min(axis=0) > NOISE_LOUDER * usual.max(axis=0)))
+        if louder and 1 / NOISE_EVEN < new[0] / new[1] < NOISE_EVEN:
             found.append((float(np.sqrt(new.mean())), channel))
     if not found:
         return None
@@ -87,7 +80,7 @@ def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
 
 
 def _stretches(part: Part) -> list[slice]:
-    count = max(len(part.response) // STRETCHES, 64)
+    count = max(len(part.response) // NOISE_STRETCHES, 64)
     starts = range(0, len(part.response) - count + 1, count)
     return [slice(start, start + count) for start in starts if part.known[start : start + count].all()]
 
@@ -114,7 +107,11 @@ def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int
         ratio, amplitude, at = _line_power_ratio(longest.response[:, channel], longest.rate_hz, mains)
         usual = [_line_power_ratio(part.response[:, channel], part.rate_hz, mains)[0] for part in clean]
         driven = [_line_power_ratio(column, longest.rate_hz, mains)[0] for column in longest.command.T]
-        if ratio > STANDS_OUT and ratio > NEW * max([1.0, *usual, *driven]) and (best is None or amplitude > best[0]):
+        if (
+            ratio > LINE_STANDS_OUT
+            and ratio > LINE_IS_NEW * max([1.0, *usual, *driven])
+            and (best is None or amplitude > best[0])
+        ):
             best = amplitude, at
     return best
 
@@ -126,9 +123,9 @@ def _line_power_ratio(samples: FloatArray, rate_hz: float, mains: float) -> tupl
     power = np.abs(np.fft.rfft((moved - moved.mean()) * window)) ** 2
     frequency = np.fft.rfftfreq(len(samples), 1 / rate_hz)
     resolution = rate_hz / len(samples)
-    near = np.abs(frequency - mains) <= max(OFF_HZ, 1.5 * resolution)
+    near = np.abs(frequency - mains) <= max(MAINS_OFF_HZ, 1.5 * resolution)
     around = (np.abs(frequency - mains) <= max(6.0, 24 * resolution)) & (
-        np.abs(frequency - mains) > max(2 * OFF_HZ, 4 * resolution)
+        np.abs(frequency - mains) > max(2 * MAINS_OFF_HZ, 4 * resolution)
     )
     if not near.any() or not around.any():
         return 0.0, 0.0, mains

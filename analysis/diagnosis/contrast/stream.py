@@ -14,16 +14,12 @@ from analysis.diagnosis.contrast.joint_products import Grams, Places, weights_of
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
 from analysis.diagnosis.data.lagged_products import lagged_products
+from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 Base = ForceBase | AutoregressiveBase | SensorBase
-BLOCKS = 24
-"""Blocks of each set: a fault that acts in a small part of a recording, such as a stop that is hit twice, must be in
-several of them, or most resampled blocks would lack it."""
-MEMORY = 8
-"""Order of the autoregressive model that whitens the errors."""
-REACH = 2 * MEMORY
+REACH = 2 * CONTRAST_WHITENING_ORDER
 """Rows that the ends of a part, and gaps, reach: by the filter that whitens, which begins from rest, and by what is
 left of those that differentiate. On real recordings, errors there were up to 20 times the rms."""
 
@@ -73,7 +69,7 @@ class Stream:
         moved = [_changed_columns(each.rows, side.rows) for each in changed]
         kept = np.hstack([side.white, *(self._changes(side, *each) for each in zip(changed, moved, strict=True))])
         return Grams(
-            np.array([block.T @ block for block in np.array_split(kept, BLOCKS)]),
+            np.array([block.T @ block for block in np.array_split(kept, CONTRAST_BLOCKS)]),
             tuple(moved),
             len(self.columns),
         )
@@ -141,7 +137,14 @@ def _white_error(white: FloatArray) -> float:
 
 def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
     courses = [np.where(mask, error, np.nan)[:, None] for error, mask in zip(errors, masks, strict=True)]
-    power = np.sum([lagged_products(course, MEMORY)[:, 0] for course in courses if len(course) > MEMORY], axis=0)
+    power = np.sum(
+        [
+            lagged_products(course, CONTRAST_WHITENING_ORDER)[:, 0]
+            for course in courses
+            if len(course) > CONTRAST_WHITENING_ORDER
+        ],
+        axis=0,
+    )
     if not np.any(power > 0):
         return np.array([1.0])
     power[0] *= 1 + 1e-6

@@ -9,7 +9,6 @@ from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.first_model.model_structures import (
-    LEAST_GAIN,
     BalancedRecordings,
     Kind,
     StructureFit,
@@ -19,15 +18,12 @@ from analysis.diagnosis.first_model.model_structures import (
     fit_modal_structure,
     fit_structure,
 )
+from analysis.diagnosis.settings import MODES_GAIN, REMAINDER_REPORTED, RICHER_STRUCTURE_GAIN
 from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
 from equalizer.identification.mechanical.mechanical_lines import segment_lines, split_fit_and_test
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-MODES_GAIN = 0.1
-"""Share of the held-out error in a free simulation that modes must take."""
-SHOWN = 0.1
-"""Share of the remaining power from which on its dependence on a signal is reported."""
 SHAPES: dict[str, Callable[[Motion], FloatArray]] = {
     "the direction of motion, as dry friction does": lambda m: smooth_sign(m.velocity, 0.01 * float(m.velocity.std())),
     "the square of the speed": lambda m: m.velocity * np.abs(m.velocity),
@@ -77,8 +73,8 @@ def choose_structure(
         return Choice(best, tried, said, remains(None, best))
     best = choose_plainest(fits)
     reason = (
-        f"{best.kind} is the structure of fewest numbers from which no other takes {100 * LEAST_GAIN:.0f} % of the "
-        "error power, fold by fold."
+        f"{best.kind} is the structure of fewest numbers from which no other takes "
+        f"{100 * RICHER_STRUCTURE_GAIN:.0f} % of the error power, fold by fold."
     )
     return _with_modes(Choice(best, tried, reason, remains(given, best)), recordings, on_progress)
 
@@ -95,7 +91,7 @@ def remains(given: BalancedRecordings | None, fit: StructureFit) -> str:
         for name, shape in SHAPES.items()
     }
     name, share = max(shares.items(), key=lambda item: item[1])
-    if share < SHOWN:
+    if share < REMAINDER_REPORTED:
         return f"{left} remains; it goes with neither speed nor position."
     return f"{left} remains; {100 * share:.0f} % of its power goes with {name}."
 

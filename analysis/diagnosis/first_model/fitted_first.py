@@ -19,6 +19,7 @@ from analysis.diagnosis.first_model.model_structures import (
     fit_structure,
 )
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
+from analysis.diagnosis.settings import LEAST_MODEL_ANSWER
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from equalizer.effects.simulation.simulator import simulate_response
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
@@ -35,9 +36,6 @@ BALANCE_SAID = (
     "No model was given. One body per axis, with damping and a spring, was fitted first to the forces along the "
     "measured motion; its numbers are left open by a tenth, and by half of what the named laws change in them."
 )
-LEAST_ANSWER = 1e-3
-"""Share of the measured response's spread that a fitted model must show. By hand: models with masses without bound
-show 1e-30 of it, poor ones a tenth."""
 UNTIMED_SAID = (
     "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "
     "The mass in the file is a floor that no force shows; damping and mass are not known."
@@ -133,7 +131,7 @@ def _answers(model: MechanicalModel, recording: Recording) -> bool:
         model, fill_gaps(recording.command.samples), recording.sample_rate_hz, (), recording.hold
     )
     measured = np.nanstd(recording.response.samples, axis=0)
-    return bool((np.std(played.response, axis=0) >= LEAST_ANSWER * measured).any())
+    return bool((np.std(played.response, axis=0) >= LEAST_MODEL_ANSWER * measured).any())
 
 
 def _require_no_weight(recordings: Sequence[Recording]) -> None:

@@ -16,12 +16,10 @@ from analysis.diagnosis.balance.motion import differentiate
 from analysis.diagnosis.data.measured_motion import FREE, fill_gaps, is_quasi_static
 from analysis.diagnosis.data.observed import moving_spans
 from analysis.diagnosis.data.observed_parts import parts_of
+from analysis.diagnosis.settings import DECAY_LEAST_CYCLES, DECAY_MOST_LEVELS
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
-
-LEAST_CYCLES, MOST_LEVELS = 4, 6
-"""Cycles of a stretch that is fitted to and tested by, by hand; and stretches of one decay."""
 
 
 def is_free_motion(recordings: Sequence[Recording]) -> bool:
@@ -75,7 +73,7 @@ def _levels(recording: Recording, samples: FloatArray) -> tuple[Segment, ...]:
         away = moving[:, int(np.argmax(np.ptp(moving, axis=0)))]
         rest = float(np.median(samples[span.start : span.stop, int(np.argmax(np.ptp(moving, axis=0)))]))
         cycles = np.count_nonzero(np.diff(np.signbit(away - rest))) / 2
-        count = int(np.clip(cycles / LEAST_CYCLES, 1, MOST_LEVELS))
+        count = int(np.clip(cycles / DECAY_LEAST_CYCLES, 1, DECAY_MOST_LEVELS))
         edges = np.linspace(span.start, span.end_of_motion, count + 1).astype(int)
         for start, stop in pairwise(edges.tolist()):
             found.append(

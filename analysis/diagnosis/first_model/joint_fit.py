@@ -11,18 +11,15 @@ from typing import Literal
 import numpy as np
 from scipy.special import stdtrit
 
-from analysis.diagnosis.balance.band import NOISE_SHARE
 from analysis.diagnosis.balance.blocks import Block, block_products, squared_error
 from analysis.diagnosis.balance.judge_laws import held_out_moves
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression, regression_of, signal_power
+from analysis.diagnosis.settings import ACCELERATION_NOISE_SHARE, LEAST_TEST_BLOCKS
 from equalizer.signals.signal import FloatArray
 
 Part = Literal["mass", "damping", "stiffness"]
 PARTS: tuple[Part, ...] = ("mass", "damping", "stiffness")
-LEAST_BLOCKS = 3
-"""Test blocks at least; with fewer, or where nothing moves in them, the held-out error is that of cross-validation on
-the fit blocks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,13 +66,14 @@ def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> Joint
     crossed = [_solve((whole[0] - gram, whole[1] - pull)) for gram, pull in own]
     folds = _errors(fit, shape, crossed)
     test = [regression.test for regression in regressions]
-    tested = len(test[0]) >= LEAST_BLOCKS and any(map(held_out_moves, regressions))
+    tested = len(test[0]) >= LEAST_TEST_BLOCKS and any(map(held_out_moves, regressions))
     held = _errors(test, shape, [found] * len(test[0])) if tested else folds
     sizes = np.array([max(signal_power(blocks), 1e-300) for blocks in (test if tested else fit)])
     folded = (folds / np.array(powers)).mean(axis=1)
     matrices, deviations = (_matrices(regressions[0], shape, values) for values in (found, spread))
     reach = float(stdtrit(max(len(own) - 1, 1), 0.975))
-    halves = {part: np.hypot(reach * deviations[part], NOISE_SHARE * np.abs(matrices[part])) for part in PARTS}
+    biases = {part: ACCELERATION_NOISE_SHARE * np.abs(matrices[part]) for part in PARTS}
+    halves = {part: np.hypot(reach * deviations[part], biases[part]) for part in PARTS}
     return JointFit(
         matrices, halves, {part: float(np.diagonal(deviations[part]).max()) for part in PARTS}, folded,
         float(np.sqrt(folded.sum())), np.sqrt(held.sum(axis=0) / sizes), _remainders(regressions, shape, found),

@@ -8,13 +8,10 @@ import numpy as np
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced
-from analysis.diagnosis.settings import MASSLESS_SHARE
+from analysis.diagnosis.settings import FOUND_NUMBERS_OPEN, MASSLESS_SHARE
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-
-OPEN = 0.1
-"""Standard deviation of the numbers found at least, relative."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +48,7 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
     floor = floor / np.maximum(_rms(np.vstack(moved)), 1e-300)
     mass = mass + np.diag(np.maximum(floor - np.diagonal(mass), 0.0))
     spread = [
-        float(np.max(np.abs(given - full)) / 2 + OPEN * np.abs(given).max())
+        float(np.max(np.abs(given - full)) / 2 + FOUND_NUMBERS_OPEN * np.abs(given).max())
         for given, full in zip((mass, damping, stiffness), beside, strict=True)
     ]
     turning = any(unit.startswith(("rad", "N m")) for unit in (*recording.response.units, *recording.command.units))

@@ -12,7 +12,7 @@ from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.data.measured_motion import is_read_as_free, time_unit
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, joint_fit, regressions_of
-from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR
+from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
 from equalizer.identification.mechanical.open_tolerance import widen_tolerance
@@ -32,10 +32,6 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
 }
 HELD_FIXED = 1e-6
 """Factor of the least mass, and standard deviation of unknown numbers, where no time is known."""
-LEAST_GAIN = 0.02
-"""Share of the plainer structure's error power that a richer one must take."""
-SURE = 2.0
-"""Standard errors over the folds that the gain must exceed."""
 NAME = "first model, {}"
 FORCE, MOTION = "force along the measured motion", "free simulation"
 
@@ -168,7 +164,8 @@ def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
         assert best.joint is not None and other.joint is not None
         gains = best.joint.folds - other.joint.folds
         spread = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
-        if gains.sum() > max(LEAST_GAIN * float(best.joint.folds.sum()), SURE * spread, MODEL_FLOOR**2):
+        least = max(RICHER_STRUCTURE_GAIN * float(best.joint.folds.sum()), RICHER_STRUCTURE_ERRORS * spread)
+        if gains.sum() > max(least, MODEL_FLOOR**2):
             best = other
     return best
 

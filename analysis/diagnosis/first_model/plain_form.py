@@ -17,6 +17,7 @@ from analysis.diagnosis.first_model.free_motion import read_free_motion
 from analysis.diagnosis.first_model.restore_sign import restore_sign
 from analysis.diagnosis.first_model.reversed_commands import reverse_commands
 from analysis.diagnosis.first_model.unnamed_motion import name_motion
+from analysis.diagnosis.settings import DEPENDENT_SIGNALS
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
@@ -27,9 +28,6 @@ DRIVES = FORCES | {"voltage", "current"} | set(DERIVATIVE_OF_QUANTITY)
 """Quantities of commands that drive a motion; all others are conditions."""
 STILL = 1e-9
 """Range of a signal over its size, below which changes are rounding errors."""
-LAST_DIGITS = 1e-3
-"""Singular values of standardised commands and motions, over the largest, below which they are rounding: a thousandth,
-by hand."""
 MOTIONS = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
 
 Recordings = tuple[Recording, ...]
@@ -199,7 +197,7 @@ def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
     # sum would else be taken for the drive.
     x, y = (found - found.mean(axis=0) for found in (np.vstack(rows), np.vstack(aims)[:, 0]))
     size = np.maximum(x.std(axis=0), 1e-300)
-    pushed = np.linalg.lstsq(x / size, y, rcond=LAST_DIGITS)[0][: motions[0].force.shape[1]]
+    pushed = np.linalg.lstsq(x / size, y, rcond=DEPENDENT_SIGNALS)[0][: motions[0].force.shape[1]]
     main = int(np.argmax(np.abs(pushed)))
     own = pushed / size[: len(pushed)]
     return np.asarray(own / own[main]), main

@@ -10,21 +10,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.diagnosis.settings import (
+    PUSHED_BOTH_WAYS,
+    REVERSAL_NEAR_ZERO,
+    SIGNED_SPEED_BETTER,
+    SIGNED_SPEED_FITS,
+    UNSIGNED_BELOW_ZERO,
+)
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-BELOW = 0.05
-"""Negative values of such a speed by noise at most, over its rms."""
-BOTH_WAYS = 0.1
-"""Share of the command's power that must push either way."""
 TAPS, RIDGE, ROUNDS = 40, 1e-3, 20
 """Number of taps of the filter, its ridge, and how often it is fitted."""
-NEAR_ZERO = 0.25
-"""Speed over its rms below which a minimum may be a reversal."""
-FITS, BETTER = 0.5, 0.5
-"""Share of the signed speed's power that the filter must predict, and its error over that for the magnitude, at
-most."""
 
 
 def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
@@ -36,7 +34,7 @@ def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
         amount = recording.response.samples[:, 0]
         signed, left = _find_signs(recording.command.samples[:, 0], amount)
         plain = _unexplained_share(recording.command.samples[:, 0], amount)
-        if left > 1 - FITS or left > BETTER * plain:
+        if left > 1 - SIGNED_SPEED_FITS or left > SIGNED_SPEED_BETTER * plain:
             return recordings, ""
         found.append(replace(recording, response=replace(recording.response, samples=signed[:, None])))
     name = recordings[0].response.channels[0]
@@ -56,8 +54,10 @@ def _is_unsigned_speed(recording: Recording) -> bool:
     rms = float(np.sqrt(np.mean(speed**2)))
     power = float(np.sum(pushed**2))
     ways = [float(np.sum(pushed[pushed * sign > 0] ** 2)) for sign in (1, -1)]
-    touches = float(np.quantile(speed, 0.05)) < NEAR_ZERO * rms
-    return rms > 0 and float(speed.min()) > -BELOW * rms and touches and min(ways) > BOTH_WAYS * power
+    touches = float(np.quantile(speed, 0.05)) < REVERSAL_NEAR_ZERO * rms
+    return (
+        rms > 0 and float(speed.min()) > -UNSIGNED_BELOW_ZERO * rms and touches and min(ways) > PUSHED_BOTH_WAYS * power
+    )
 
 
 def _find_signs(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, float]:
@@ -94,7 +94,7 @@ def _predict_speed(rows: FloatArray, speed: FloatArray) -> FloatArray:
 
 def _stretches(amount: FloatArray) -> list[slice]:
     """Stretches between minima near zero."""
-    low = NEAR_ZERO * float(np.sqrt(np.mean(amount**2)))
+    low = REVERSAL_NEAR_ZERO * float(np.sqrt(np.mean(amount**2)))
     inner = (amount[1:-1] <= amount[:-2]) & (amount[1:-1] <= amount[2:]) & (amount[1:-1] < low)
     ends = [0, *(np.flatnonzero(inner) + 1).tolist(), len(amount)]
     return [slice(begin, end) for begin, end in itertools.pairwise(ends) if end > begin]

@@ -20,6 +20,7 @@ from analysis.diagnosis.balance.structures import Structure, is_better
 from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.measured_motion import is_read_as_free
 from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.settings import REVERSED_SIGN_GAIN
 from analysis.wording import conjoin
 from equalizer.effects.turned_commands import with_turned_commands
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -28,8 +29,6 @@ from equalizer.signals.signal import FloatArray, Signal
 
 REVERSED = "turned commands"
 """Note of a recording: the channels of its commands that were turned round."""
-CLEARLY = 0.1
-"""Share of the folds' error power that the turned sign must take; as much as a linear law must."""
 
 
 def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
@@ -80,7 +79,7 @@ def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
         for sign in (1.0, -1.0)
     )
     first, other = (Structure((), each.cross_validated_errors(each.columns_of(()))) for each in (plain, turned))
-    return other.error < (1 - CLEARLY) * first.error and is_better(first, other)
+    return other.error < (1 - REVERSED_SIGN_GAIN) * first.error and is_better(first, other)
 
 
 def _reverse(recording: Recording, imposed: bool, sign: FloatArray) -> Recording:

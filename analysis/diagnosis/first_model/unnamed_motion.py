@@ -13,13 +13,12 @@ import numpy as np
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import regression_of
 from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.settings import DERIVATIVE_NEEDED
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 
 KNOWN = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) - {"voltage"}
-NEEDED = 0.02
-"""Share of the held-out force power that a derivative of the response must explain to be of use."""
 
 
 def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
@@ -59,7 +58,7 @@ def _likely_quantity(recordings: Sequence[Recording]) -> str:
 
     d = len(motions[0].channels)
     twice, itself = use(range(d)), use(range(2 * d, 3 * d))
-    return "velocity" if twice < NEEDED <= itself else "position"
+    return "velocity" if twice < DERIVATIVE_NEEDED <= itself else "position"
 
 
 def _with_quantity(recording: Recording, quantity: str) -> Recording:

@@ -4,15 +4,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from analysis.diagnosis.balance.judge_laws import SMALL, Balance
+from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
-from analysis.diagnosis.balance.structures import NOTICED
 from analysis.diagnosis.confirm.confirm_laws import CONSTANTS
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
 from analysis.diagnosis.effect_words import noun_of, place_of
 from analysis.diagnosis.first_model.reduced_recordings import linear_laws
 from analysis.diagnosis.result.candidate_wording import REFINED
 from analysis.diagnosis.result.findings import BalanceErrors
+from analysis.diagnosis.settings import FURTHER_LAW_GAIN, LAW_OF_CEILING
 from analysis.wording import conjoin
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
@@ -61,7 +61,7 @@ def beside_given(
     by_balance = [
         _candidate(replace(law, why_not=BEYOND) if law.law.linear else law, axis)
         for axis, law in sorted(weighed, key=lambda placed: (_rank(placed[1]), -placed[1].gain))
-        if law.share >= SMALL and law.gain >= NOTICED
+        if law.share >= LAW_OF_CEILING and law.gain >= FURTHER_LAW_GAIN
     ]
     both = sorted((*unconfirmed, *by_balance), key=lambda each: -each.held_out_gain)
     left = [each for each in both if (each.effect, each.axis) not in named]
@@ -148,7 +148,7 @@ def _rank(weighed: JudgedLaw) -> int:
     of a higher order; and last what takes next to nothing."""
     if weighed.law.linear:
         return 2
-    if weighed.share < SMALL:
+    if weighed.share < LAW_OF_CEILING:
         return 3
     return 0 if weighed.possible and (weighed.gain_low > 0 or weighed.agreed) else 1
 

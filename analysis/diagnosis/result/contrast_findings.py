@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.contrast.compare import AS_ONE, Comparison, JudgedFault
+from analysis.diagnosis.contrast.compare import Comparison, JudgedFault
 from analysis.diagnosis.contrast.decide import BOUND, Decision
 from analysis.diagnosis.contrast.fault import Fault
-from analysis.diagnosis.contrast.stream import BLOCKS
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
 from analysis.diagnosis.effect_words import unit_of
 from analysis.diagnosis.reference.compare_with_reference import Contrast
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
+from analysis.diagnosis.settings import CONTRAST_BLOCKS, SETS_AS_ONE
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
@@ -71,9 +71,13 @@ def _with_comparison(
     best = decided.named
     named = () if best is None else (_named_fault(best, decided, recording, system),)
     candidates = tuple(_candidate(law, why, recording) for law, why in decided.others)
-    verdict: Verdict = "partly_explained" if named else "no_mismatch" if found.excess <= AS_ONE else "unexplained"
+    verdict: Verdict = "partly_explained" if named else "no_mismatch" if found.excess <= SETS_AS_ONE else "unexplained"
     fit = Fit(
-        _errors(found, found.plain[:BLOCKS].sum(), (found.plain if best is None else best.errors)[:BLOCKS].sum()),
+        _errors(
+            found,
+            found.plain[:CONTRAST_BLOCKS].sum(),
+            (found.plain if best is None else best.errors)[:CONTRAST_BLOCKS].sum(),
+        ),
         _errors(found, found.held_out, found.held_out if best is None else best.held_out),
     )
     error = "predicted force" if found.by_force else f"windows of {found.step_s:.6f} s"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.balances import RESTS_ELSE
+from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME
 
 RATE_HZ, LEVEL, MASS, DAMPING = 100.0, 0.4, 0.05, 0.8
 
@@ -42,7 +42,7 @@ def test_friction_of_an_axis_that_mostly_rests_is_named(held):
     speed = np.gradient(position[:, 0], 1 / RATE_HZ)
     (named, *_) = balance.named
 
-    assert np.mean(np.abs(speed) > 0.1 * speed.std()) < RESTS_ELSE + 0.3
+    assert np.mean(np.abs(speed) > 0.1 * speed.std()) < MOVES_MOST_OF_THE_TIME + 0.3
     assert named.law.effect in ("coulomb_friction", "presliding_hysteresis")
     assert named.values["level"] == pytest.approx(LEVEL, rel=0.15)
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.band import WIDEST
 from analysis.diagnosis.balance.laws import laws_of
 from analysis.diagnosis.balance.motion import NoMotionError, motion_signal, motions_of
 from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.settings import BAND_WIDEST
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import Signal
 
@@ -65,7 +65,7 @@ def test_the_band_ends_where_the_noise_of_the_motion_would_bend_the_mass(recordi
             recording_of(course(2), course(0) + noise * random.standard_normal((COUNT, 1)), RATE_HZ)
         ).band_hz
 
-    assert end_hz(0.0) == pytest.approx(WIDEST * RATE_HZ)
+    assert end_hz(0.0) == pytest.approx(BAND_WIDEST * RATE_HZ)
     ends = [end_hz(noise) for noise in (1e-6, 1e-5, 1e-3)]
     assert ends[0] > ends[1] > ends[2] > 3.0
 

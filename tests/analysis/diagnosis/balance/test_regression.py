@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.blocks import FOLDS
 from analysis.diagnosis.balance.law import Law, name_weights
 from analysis.diagnosis.balance.motion import motions_of
 from analysis.diagnosis.balance.regression import fit_all_laws, keep_laws, regression_of, replace_law
 from analysis.diagnosis.balance.structures import Structure, is_better
 from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.settings import BALANCE_FOLDS
 
 RATE_HZ, COUNT = 500.0, 6000
 SCALE = Law("scale", 0, (1.0,), lambda m, n: np.tanh(m.velocity[:, :1] / n[0]), name_weights("level"))
@@ -73,7 +73,7 @@ def test_held_out_errors_are_of_samples_that_nothing_was_fitted_to(regression):
     assert regression.held_out_errors(columns) == pytest.approx(truth, rel=1e-4)
     rows = {(b.motion, k) for b in regression.fit for k in b.rows.tolist()}
     assert not rows & {(b.motion, k) for b in regression.test for k in b.rows.tolist()}
-    assert len(regression.fit) >= FOLDS
+    assert len(regression.fit) >= BALANCE_FOLDS
 
 
 def test_a_law_in_anothers_place_gives_what_a_new_regression_would(regression):

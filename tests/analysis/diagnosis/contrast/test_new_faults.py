@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
 from analysis.diagnosis.contrast.compare import compare
 from analysis.diagnosis.contrast.part import split_into_parts
-from analysis.diagnosis.contrast.stream import BLOCKS
+from analysis.diagnosis.settings import CONTRAST_BLOCKS
 from equalizer.signals.signal import FloatArray
 
 
@@ -44,7 +44,7 @@ def test_the_error_is_that_of_the_faulty_recording_however_many_clean_ones_there
         found = compare([rig.recording(2, "viscous_damping", 2.0)], clean, frozenset(), lambda: False)
         assert found is not None
         assert found.faulty_samples == pytest.approx(found.samples / (1 + len(clean)), rel=0.01)
-        assert 1.0 <= found.plain[:BLOCKS].sum() / found.faulty_samples < 2.0
+        assert 1.0 <= found.plain[:CONTRAST_BLOCKS].sum() / found.faulty_samples < 2.0
 
 
 def behind(gap: float):
