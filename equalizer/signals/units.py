@@ -110,6 +110,9 @@ QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
 UNSTATED = "1"
 """Taken where a file states no unit: its numbers stay as they are."""
 
+LONGEST_UNIT = 100
+"""Characters, of a unit that is read in another spelling."""
+
 _SYMBOLS = frozenset(_FIXED) | {prefix + base for prefix in ("", *_PREFIXES) for base in _PREFIXABLE}
 
 
@@ -218,13 +221,15 @@ def suggest_unit(text: str) -> str:
         return plain
     from equalizer.signals.unit_spellings import nearest_unit
 
-    near = nearest_unit(text, _SYMBOLS)
+    near = nearest_unit(text, _SYMBOLS) if len(text) <= LONGEST_UNIT else text
     return near if near != text and _is_known(near) else ""
 
 
 def plain_unit(text: str) -> str:
     """As it is written here (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`), where that is a unit; else the text
     itself."""
+    if len(text) > LONGEST_UNIT:
+        return text
     # Here, for only files of others spell units in other ways.
     from equalizer.signals.unit_spellings import respell
 

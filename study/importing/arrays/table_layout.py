@@ -30,6 +30,8 @@ from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.signal_words import name_signal
 
 _UNITLESS = (*EMPTY, "1")
+# From the text's begin or a bracket on: without that, the time of a search would grow with the square of the length.
+_BRACKETED = re.compile(r"(?<![^\[\]()])[^\[\]()]+[\[(][^\[\]()]*[\])]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +164,7 @@ def _fit_header(header: list[str], fields: Sequence[str], delimiter: str) -> lis
     width = len(fields)
     if len(header) > width and not any(header[width:]):
         return header[:width]
-    bracketed = re.findall(r"[^\[\]()]+[\[(][^\[\]()]*[\])]", f"{delimiter} ".join(header))
-    if len(header) > width == len(bracketed):
+    if len(header) > width == len(bracketed := _BRACKETED.findall(f"{delimiter} ".join(header))):
         return [" ".join(name.strip(f" {delimiter}").split()) for name in bracketed]
     at = next((k for k, pair in enumerate(pairwise(fields)) if all(map(is_stamp, pair))), None)
     return header if at is None or len(header) != width - 1 else [*header[:at], "date", *header[at:]]

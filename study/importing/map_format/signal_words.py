@@ -20,6 +20,8 @@ from study.importing.map_format.import_map import SignalRole
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+(?:\([^\[\]()]*\))?)[\])]\s*")
 _SAID_BEHIND = re.compile(r"(?<=\w)(?:\s*/\s*|\s*,\s+|\s+in\s+)(?=\S)")
 """`force / N`, `force, N`, `Kraft in N`: as standards and testing machines write it."""
+LONGEST_NAME = 300
+"""Characters; no channel is called by more, and to search for a unit in them takes time by the square."""
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _WORDS = {
     "force": ("force", "load", "thrust"),
@@ -96,7 +98,7 @@ def _without_unit(column: ParsedName) -> str:
 
 def unit_in(header: str) -> tuple[str, str]:
     """Name and bracketed unit; the unit is empty if there is none."""
-    match = _BRACKETED.fullmatch(header)
+    match = _BRACKETED.fullmatch(header) if len(header) <= LONGEST_NAME else None
     if not match or not match["name"].strip():
         return header, ""
     return match["name"].strip(), plain_unit(match["unit"].strip())
@@ -208,6 +210,8 @@ def _by_quantity(columns: Sequence[ParsedName]) -> dict[str, SignalRole]:
 def unit_at_end(name: str) -> tuple[str, str]:
     """Name and unit at its end as in `displacement_mm`, `omega_rad_s`, `a_mps2`, `force / N` (the longest that is a
     unit); the whole name and empty if there is none."""
+    if len(name) > LONGEST_NAME:
+        return name, ""
     parts = name.split("_")
     ends = [("_".join(parts[:first]), _joined(parts[first:])) for first in range(1, len(parts))]
     ends += [(name[: mark.start()], name[mark.end() :]) for mark in _SAID_BEHIND.finditer(name)]

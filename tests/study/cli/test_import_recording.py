@@ -45,7 +45,7 @@ def test_a_map_to_complete_goes_to_stdout_and_why_to_stderr(tmp_path, capsys):
 def test_a_file_that_is_wrong_is_an_error_of_its_own(table, tmp_path, capsys):
     table.write_text(table.read_text().replace("0.10,", "ten,"))
     assert main(["import", str(table), "--out", str(tmp_path / "r.h5")]) == 1
-    assert "Line 12, column 'time [s]': 'ten' is not a number." in capsys.readouterr().err
+    assert "Line 12, column 'time [s]': 'ten' is not a number; correct it, or leave it empty" in capsys.readouterr().err
 
 
 def test_a_map_that_does_not_exist_is_wrong_use(table, tmp_path, capsys):

@@ -8,12 +8,13 @@ import pytest
 
 from study.importing.arrays.arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
-from study.importing.map_format.map_errors import ImportRefusedError
+from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
 from study.store.disk.toml_text import too_long_key
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.workflows.files.validate import validate_file
+from study.workflows.recording.import_recording import read_foreign
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -67,6 +68,15 @@ def test_a_table_of_a_hundred_thousand_columns_is_refused_at_once(tmp_path):
     (tmp_path / "a.csv").write_text(",".join(f"c{n}" for n in range(100_000)) + "\n" + ",".join(["1"] * 100_000) + "\n")
     with pytest.raises(ImportRefusedError, match="It has 100000 columns"):
         read_arrays(tmp_path / "a.csv", CsvMap())
+
+
+@pytest.mark.parametrize("letters", [" ", "_", " in", " /", "[", "()", "(", "m/", "aB", "1.234"])
+def test_a_header_of_two_hundred_thousand_letters_costs_no_square_of_them(letters, tmp_path):
+    """Before: 60 s and more for names of spaces, underscores, or `in`."""
+    rows = "".join(f"{k / 1000},{k % 7}\n" for k in range(300))
+    (tmp_path / "a.csv").write_text(f"a{letters * (200_000 // len(letters))}b,c\n{rows}")
+    with pytest.raises(MapNeededError, match="No column is the time"):
+        read_foreign((tmp_path / "a.csv",), None)
 
 
 def test_a_problem_of_a_million_letters_is_cut():
