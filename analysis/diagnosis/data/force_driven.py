@@ -1,12 +1,21 @@
-"""Recordings of an imposed motion and a measured force, with command and response exchanged."""
+"""What drives a recorded motion: a command that changes, or a motion that is imposed and whose force is measured."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 
 _FORCES = frozenset({"force", "torque"})
+
+
+def is_driven(recordings: Sequence[Recording]) -> bool:
+    """Whether any command changes, in a recording or between them; True where none holds a number."""
+    commands = np.vstack([each.command.samples for each in recordings])
+    commands = commands[np.isfinite(commands).all(axis=1)]
+    return len(commands) == 0 or bool(np.any(np.ptp(commands, axis=0) != 0))
 
 
 def as_force_driven(recording: Recording) -> Recording:

@@ -13,6 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.band import band_end_hz
 from analysis.diagnosis.balance.motion import differentiate
+from analysis.diagnosis.data.force_driven import is_driven
 from analysis.diagnosis.data.measured_motion import FREE, fill_gaps, is_quasi_static
 from analysis.diagnosis.data.observed import moving_spans
 from analysis.diagnosis.data.observed_parts import parts_of
@@ -24,13 +25,10 @@ from equalizer.signals.signal import FloatArray, Signal
 
 def is_free_motion(recordings: Sequence[Recording]) -> bool:
     """Whether no command ever changes, and positions or velocities were measured over time."""
-    commands = np.vstack([each.command.samples for each in recordings])
-    commands = commands[np.isfinite(commands).all(axis=1)]
-    still = len(commands) > 0 and bool(np.all(np.ptp(commands, axis=0) == 0))
     orders = {DERIVATIVE_OF_QUANTITY.get(quantity, 2) for quantity in recordings[0].response.quantities}
     turning = {unit.startswith("rad") for unit in recordings[0].response.units}
     alike = len(orders) == 1 and len(turning) == 1
-    return still and alike and max(orders) < 2 and not any(map(is_quasi_static, recordings))
+    return not is_driven(recordings) and alike and max(orders) < 2 and not any(map(is_quasi_static, recordings))
 
 
 def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], str]:

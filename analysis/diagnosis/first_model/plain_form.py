@@ -39,7 +39,7 @@ def plain_form(recordings: Sequence[Recording], turns: bool = True) -> tuple[Rec
     commands that are counted against their motion are reversed; not where a model says already how they are counted."""
     found, said = tuple(recordings), []
     steps: tuple[Step, ...] = (
-        read_free_motion, name_motion, _separate_conditions, _select_imposed_motion, _select_motions, _select_forces,
+        name_motion, read_free_motion, _separate_conditions, _select_imposed_motion, _select_motions, _select_forces,
         restore_sign, _drop_constant_commands, _merge_commands,
     )  # fmt: skip
     for step in (*steps, reverse_commands) if turns else steps:

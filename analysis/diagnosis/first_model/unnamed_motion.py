@@ -12,6 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import regression_of
+from analysis.diagnosis.data.force_driven import is_driven
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.settings import DERIVATIVE_NEEDED
 from analysis.wording import conjoin
@@ -27,6 +28,13 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
     first = recordings[0]
     if set(first.response.quantities) & KNOWN:
         return recordings, ""
+    if not is_driven(recordings):
+        if set(first.response.quantities) == {"voltage"}:
+            return recordings, ""
+        return tuple(_with_quantity(each, "position") for each in recordings), (
+            f"Nothing says what {conjoin(list(first.response.channels))} measures: it was taken for a position that "
+            "moves freely; if it is a speed, say so in the map (quantity)."
+        )
     moved = set(first.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
     quantity = "force" if moved else _likely_quantity(recordings)
     if quantity == "position" and set(first.response.quantities) == {"voltage"}:

@@ -10,6 +10,7 @@ from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.first_model.choose_structure import choose_structure
 from analysis.diagnosis.first_model.free_motion import is_free_motion, read_free_motion
 from analysis.diagnosis.first_model.model_structures import StructureRefused
+from analysis.diagnosis.first_model.plain_form import plain_form
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -79,6 +80,15 @@ def test_dry_friction_is_named_from_a_decay(seed):
     (friction,) = found.diagnosis.effects
     assert "coulomb_friction" in names_of(found)
     assert friction.parameters["level"].value == pytest.approx(0.8, rel=0.25)
+
+
+def test_a_decay_in_an_unknown_unit_is_read_as_a_position_and_named():
+    """As of a photodiode that a swinging mirror shines on: its numbers are in no unit."""
+    counted = recording(decay(rubbing, 1.0, 8, 3))
+    response = replace(counted.response, quantity="1", unit="1")
+    unknown = replace(counted, response=response)
+    assert "coulomb_friction" in names_of(diagnose_values(unknown))
+    assert "angle measures: it was taken for a position that moves freely" in plain_form([unknown])[1][0]
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
