@@ -79,6 +79,9 @@ def _diagnose_by_model(
     balances: tuple[Balance, ...] = (),
 ) -> Findings:
     look = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
+    if settings.fitted and is_too_short_to_name(recordings):
+        unsearched = SearchOutcome(_unsearched(recordings, look, settings, map_), CleanFloor())
+        return _assemble(recordings, settings, look, unsearched, balances)
     seen = search_by_simulation(recordings, look, settings, map_, progress, balances)
     if not settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.9)
@@ -104,6 +107,8 @@ def _diagnose_beside_clean(
     look = FittingMeasure(model, measure_of(recordings, model))
     progress("comparing with the clean recordings", 0.1)
     contrast = contrast_of(recordings, settings.clean, frozenset(settings.without), settings.time_left)
+    if is_too_short_to_name(recordings):
+        contrast = contrast.without_name(TOO_SHORT)
     if not settings.fitted and (noise_is_from_repeats(look.chosen) or predicts_clean(model, settings.clean)):
         found_by_model = _diagnose_by_model(recordings, model, settings, map_, progress)
         said = found_by_model.diagnosis
@@ -114,14 +119,21 @@ def _diagnose_beside_clean(
         unweighed = _search_beside_clean(recordings, model, settings, contrast.tested_effects, map_, progress)
         if unweighed is not None:
             return unweighed
-    context = search_context_of(recordings[0], look, settings, map_)
-    given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
-    stands = context.with_test_score(context.candidate(given))
-    found = SearchResult(context, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
+    found = _unsearched(recordings, look, settings, map_)
     progress("writing down what was found", 0.95)
     floor = CleanFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
     whole = _assemble(recordings, settings, look, SearchOutcome(found, floor), ())
     return add_contrast(whole, contrast, recordings[0], FAULT_BEYOND)
+
+
+def _unsearched(
+    recordings: Sequence[Recording], look: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
+) -> SearchResult:
+    """The model as it is given, with nothing named."""
+    context = search_context_of(recordings[0], look, settings, map_)
+    given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    stands = context.with_test_score(context.candidate(given))
+    return SearchResult(context, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
 
 
 def _search_beside_clean(

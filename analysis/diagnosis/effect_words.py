@@ -66,7 +66,7 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     ),
     "force_saturation": EffectWords("force saturation", {"limit": "at {}"}),
     "force_deadband": EffectWords("a dead band of the force", {"width": "± {}"}),
-    "slew_limit": EffectWords("a limited rate of change of the force", {"rate": "at most {}"}),
+    "slew_limit": EffectWords("a limited rate of change of the command", {"rate": "at most {}"}),
     "amplifier_lag": EffectWords("a lag of the amplifier", {"time_constant": "time constant {}"}),
     "transport_delay": EffectWords("a delay of the command"),
     "force_gain": EffectWords("a wrong force gain", {"gain": "a factor of {}"}),
@@ -107,7 +107,7 @@ class LawWords:
 
 
 _FORCE, _DAMPING, _STIFFNESS = ("N", "N m"), ("N s/m", "N m s/rad"), ("N/m", "N m/rad")
-_CHANGE = "± {} from beginning to end"
+_CHANGE = "by {} from the middle to the end"
 _PER_CONDITION = "{} per standard deviation of the condition"
 LAW_WORDS: Mapping[str, LawWords] = {
     "viscoelastic_relaxation": LawWords(

@@ -186,6 +186,10 @@ SUMS_BESIDE_COMMAND_LAW = 4  # best sums of laws of the motion that are tried be
 COMMAND_LAW_LEAVES = 0.5
 COMMAND_RIVAL_LEAVES_MORE = 0.3  # share of its own error by which a rival must leave more to be told from it
 
+# share of the samples, at least, in which an actuator of a tried limited rate reaches its command. By hand: one that
+# never does goes by the command's sign alone
+SLEW_REACHED = 0.25
+
 # In which band forces are balanced, and on which samples (`band`, `balances`, `motion`, `blocks`). By hand.
 # noise in the acceleration's mean square at most, as a share: about the relative bias of a mass
 ACCELERATION_NOISE_SHARE = 0.01

@@ -73,6 +73,11 @@ def error_text(error: float | None) -> str:
     return f"{100 * error:.3g} %" if 100 * error < 1000 else f"{error:.3g} times"
 
 
+def error_of_signal(error: float | None) -> str:
+    """ "14 % of the signal", "12 times the signal"."""
+    return f"{error_text(error)} {'the' if error is not None and 100 * error >= 1000 else 'of the'} signal"
+
+
 def probability_text(probability: float) -> str:
     return f"{probability:.2f}" if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
 

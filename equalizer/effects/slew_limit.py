@@ -16,9 +16,9 @@ ERRS = 1.05
 """RMS residual of a channel, over its noise, from which these guesses are tried."""
 
 
-def limit_slew(commands: FloatArray, step_s: float, rate: float) -> FloatArray:
-    """(n,): mean force over each step, from no force at the beginning. commands: (n,)."""
-    return np.asarray(_mean_and_end(commands, step_s, rate)[0])
+def limit_slew(commands: FloatArray, step_s: float, rate: float, first: float = 0.0) -> FloatArray:
+    """(n,): mean force over each step, from `first` at the beginning. commands: (n,)."""
+    return np.asarray(first + _mean_and_end(commands - first, step_s, rate)[0])
 
 
 def _limit_rate(commands: FloatArray, step_s: float, values: Values) -> FloatArray:

@@ -2,7 +2,8 @@
 
 Without reversal, friction is a constant that the motion overcomes from rest: a dead band looks the same, and a drag
 beside it may be the curve of that actuator. Where no inertia shows, speed follows the command at once: then a drag that
-grows with the speed is a gain that falls with the command, and a dead band is dry friction.
+grows with the speed is a gain that falls with the command, and a dead band is dry friction. Where an axis rests as
+long as its dead band passes no force, dry friction may hold it instead: the two are named as a class.
 """
 
 from dataclasses import replace
@@ -13,9 +14,10 @@ from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, Structure, is_better
-from analysis.diagnosis.settings import STILL_SHARE
+from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
 
-TWINS = {"quadratic_damping": "force_nonlinearity", "force_deadband": "coulomb_friction"}
+DEAD_BAND = "force_deadband"
+TWINS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND: "coulomb_friction"}
 BACKWARDS = "it never moves backwards"
 
 
@@ -32,10 +34,12 @@ def doubt_laws_of_actuator(balance: Balance) -> Balance:
 
 def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
     regression, effect = balance.search.regression, judged.law.effect
+    if judged.named and effect == DEAD_BAND and judged.place == NO_COLUMN and _rests_within(regression):
+        return replace(judged, alike=tuple(dict.fromkeys((*judged.alike, TWINS[DEAD_BAND]))))
     if not judged.named or judged.law.channel < 0:
         return judged
     if effect in SLIDING and not _reverses(regression, judged.law.channel):
-        return _doubted(judged, "force_deadband", BACKWARDS)
+        return _doubted(judged, DEAD_BAND, BACKWARDS)
     if effect == "quadratic_damping":
         rubs = any(each.law.effect in SLIDING and each.law.channel == judged.law.channel for each in balance.named)
         if rubs and not _reverses(regression, judged.law.channel):
@@ -43,6 +47,15 @@ def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
     if effect in TWINS and not _has_inertia(regression, balance.chosen.laws):
         return _doubted(judged, TWINS[effect], "no inertia shows")
     return judged
+
+
+def _rests_within(regression: Regression) -> bool:
+    """Whether the axis rests in most samples in which its dead band passes no force."""
+    motions, axis, own = regression.motions, regression.axis, regression.beside.own
+    speed = np.concatenate([motion.velocity[motion.fit, own] for motion in motions])
+    force = np.concatenate([motion.force[motion.fit, axis] for motion in motions])
+    moves = speed**2 > STILL_SHARE * np.mean(speed**2)
+    return bool(np.mean(moves[force == 0.0]) < MOVES_MOST_OF_THE_TIME) if np.any(force == 0.0) else False
 
 
 def _doubted(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from analysis.diagnosis.balance.law import Formula
+from analysis.diagnosis.settings import SLEW_REACHED
 from equalizer.effects.force_nonlinearity import square_law_force
 from equalizer.effects.slew_limit import limit_slew
 from equalizer.signals.signal import FloatArray
@@ -30,9 +31,7 @@ CLOSER = (0.95, 0.98, 1.02, 1.05)
 """Factors by which a number is moved, as long as that helps."""
 MOVED = ("width", "limit", "square", "gap", "power", "rate")
 RATES = 20
-REACHED = 0.25
-"""Rates of a slew limit that are tried; share of the samples in which the command is reached, at least."""
-
+"""Of a slew limit, that are tried."""
 BENDS = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
 """Shares of the samples below a place where a piecewise linear function bends; of the command's size, a curve jumps
 there, too."""
@@ -108,12 +107,13 @@ def slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[Comman
     for rate in np.geomspace(slowest, fastest, RATES)[:-1] if 0 < slowest < fastest else ():
         law = CommandLaw("slew_limit", {"rate": float(rate)}, partial(_slewed_force, 1 / rate_hz))
         reached = [np.abs(law.columns(each, law.values)[:, 0] - each) < rate / rate_hz for each in commands]
-        if np.mean(np.concatenate(reached)) > REACHED:
+        if np.mean(np.concatenate(reached)) > SLEW_REACHED:
             yield law
 
 
 def _slewed_force(step_s: float, command: FloatArray, of: dict[str, float]) -> FloatArray:
-    return limit_slew(command, step_s, of["rate"])[:, None]
+    # A servo stands at its first target when the recording begins.
+    return limit_slew(command, step_s, of["rate"], float(command[0]))[:, None]
 
 
 def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:

@@ -58,7 +58,7 @@ PLAYED_AS = {"drifting_friction": "coulomb_friction"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Balance:
-    """What a recording's forces say along one axis."""
+    """What a recording's forces say of one axis."""
 
     search: StructureSearch
     chosen: Structure
@@ -82,8 +82,7 @@ class Balance:
 
     def without_names(self, why_not: str) -> "Balance":
         """The balance with its named laws left as candidates."""
-        laws = tuple(replace(each, why_not=each.why_not or why_not) for each in self.laws)
-        return replace(self, laws=laws)
+        return replace(self, laws=tuple(replace(each, why_not=each.why_not or why_not) for each in self.laws))
 
     def error_of(self, laws: Sequence[int]) -> float:
         """Held-out error with these laws, over the signal's rms. laws: by number in the regression."""
@@ -187,7 +186,6 @@ def _judge_law(
     rest = tuple(each for each in laws if each != number)
     without = _held_out_errors(regression, rest)
     gain, low = gain_with_bound(without, held)
-    folds = [regression.cross_validated_errors(regression.columns_of(each)) for each in (rest, laws)]
     share = float((without - held).sum()) / room
     law = regression.laws[number]
     values = dict(zip(laws, values_of(regression, laws), strict=True))[number]
@@ -206,8 +204,15 @@ def _judge_law(
     formula = None if law.formula is None or values is None else law.formula(values)
     return JudgedLaw(
         number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, formula=formula, possible=possible,
-        agreed=agrees_with_folds((without, held), folds),
+        agreed=agrees_with_folds((without, held), _errors_of_folds(regression, (rest, laws))),
     )  # fmt: skip
+
+
+def _errors_of_folds(regression: Regression, sums: Sequence[Sequence[int]]) -> list[FloatArray]:
+    """Errors of each sum of laws in the folds, (blocks,); empty where the folds are what is judged by."""
+    if blocks_to_judge(regression) is not regression.test:
+        return [np.zeros(0) for _ in sums]
+    return [regression.cross_validated_errors(regression.columns_of(each)) for each in sums]
 
 
 def _indistinguishable_effects(

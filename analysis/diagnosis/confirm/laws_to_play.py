@@ -112,6 +112,8 @@ def numbers_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Seque
     weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
     given = (model.mass, model.damping, model.stiffness)
     for place, (weight, matrix) in enumerate(zip(weights, given, strict=False)):
+        if tuning.deviation[place] == 0:  # it stays as it is
+            continue
         if place == 0:
             weight = max(weight, matrix[0, 0] / 10)
         start[place] = np.clip((weight - matrix[0, 0]) / tuning.deviation[place], -3.9, 3.9)

@@ -8,6 +8,7 @@ from scipy.special import stdtrit
 
 from analysis.diagnosis.balance.judged_law import bootstrap_draws
 from analysis.diagnosis.contrast.compare import FOLDS, Comparison, JudgedFault
+from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
     BOOTSTRAP_LEVEL,
@@ -28,6 +29,9 @@ SAME = {
     "force_offset": ("constant_force",),
 }  # fmt: skip
 """What no recording of one command and one response could tell apart."""
+
+FINER = "it holds the named fault as a special case, and is not sure to leave less"
+BEHIND = "another explains more of what sets these recordings apart"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,14 +69,14 @@ def decide(found: Comparison, responses: int) -> Decision:
     elsewhere = [rival.fault.axis for rival in alike if rival.fault.effect == best.fault.effect]
     why_not = ""
     if ahead:
-        why_not = f"{ahead[0].fault.effect} explains more, and is not sure itself"
+        why_not = f"{noun_of(ahead[0].fault.effect)} explains more, and is not sure itself"
     elif best.share < FAULT_MAIN_PART:
         why_not = f"it explains {100 * best.share:.0f} % of what sets these recordings apart: the main part is another"
     elif len(names) >= LARGEST_FAULT_CLASS:
         why_not = "these data cannot tell it from " + ", ".join(names)
     elif elsewhere:
         why_not = f"these data cannot tell whether it is on {best.fault.axis} or on {', '.join(elsewhere)}"
-    behind = tuple((rival, "another explains more of what sets these recordings apart") for rival in rivals)
+    behind = tuple((rival, FINER if _refines(rival, best) else BEHIND) for rival in rivals)
     if why_not:
         return Decision(None, (), 0.0, ((best, why_not), *behind, *others))
     left = tuple(item for item in (*behind, *others) if item[0] not in alike)

@@ -66,7 +66,7 @@ def sensor_faults(number: int, name: str, parts: Sequence[Part]) -> Iterator[Fau
     whole = np.concatenate([part.response[:, number] for part in parts])
     channel = _Channel((number,), name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
     longest = max(parts, key=lambda part: len(part.response))
-    yield from _common_faults(channel, longest, longest.response[:, number])
+    yield from _common_faults(channel, parts, longest.response[:, number])
     shares = [side * share for share in BENT for side in (1.0, -1.0)]
     yield channel.fault("sensor_nonlinearity", [_nonlinearity(channel, share, 3, "cubic") for share in shares])
     yield channel.fault("sensor_asymmetry", [_nonlinearity(channel, share, 2, "square") for share in shares])
@@ -85,13 +85,14 @@ def faults_of_all(parts: Sequence[Part]) -> Iterator[Fault]:
     channel = _Channel(tuple(range(whole.shape[1])), "", float(sizes[largest]) or 1.0, top)
     longest = max(parts, key=lambda part: len(part.response))
     alike = len(set(longest.recording.response.units)) == 1
-    for fault in _common_faults(channel, longest, longest.response[:, largest]):
+    for fault in _common_faults(channel, parts, longest.response[:, largest]):
         if alike or fault.effect not in IN_UNITS:
             yield fault
 
 
-def _common_faults(channel: _Channel, longest: Part, course: FloatArray) -> Iterator[Fault]:
+def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray) -> Iterator[Fault]:
     """Faults that one channel may have, or all. course: (n,) of the longest part."""
+    longest = max(parts, key=lambda part: len(part.response))
     times = delays_to_try(course, longest.rate_hz)
     yield channel.fault("sensor_gain", [_gain(channel, gain) for gain in GAINS])
     shifts = [side * share * channel.rms for share in SHIFTS for side in (1.0, -1.0)]
@@ -102,7 +103,7 @@ def _common_faults(channel: _Channel, longest: Part, course: FloatArray) -> Iter
     yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz) for time_s in times])
     period = longest.rate_hz / median_frequency_hz(course, longest.rate_hz)
     rates = [side * late * period / longest.whole for late in LATE for side in (1.0, -1.0)]
-    runs_on = (True, False) if longest.start > 0 else (True,)
+    runs_on = (True, False) if any(part.start > 0 for part in parts) else (True,)
     clocks = [_clock_drift(channel, rate, on) for rate in rates if abs(rate) < CLOCK_FASTEST for on in runs_on]
     yield replace(channel.fault("clock_drift", clocks), varies=True)
 

@@ -14,14 +14,14 @@ from analysis.diagnosis.contrast.joint_products import Grams, Places, weights_of
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
 from analysis.diagnosis.data.lagged_products import lagged_products
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER
+from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_KEPT
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 Base = ForceBase | AutoregressiveBase | SensorBase
 REACH = 2 * CONTRAST_WHITENING_ORDER
-"""Rows that the ends of a part, and gaps, reach: by the filter that whitens, which begins from rest, and by what is
-left of those that differentiate. On real recordings, errors there were up to 20 times the rms."""
+"""Rows that the ends of a part reach: by the filter that whitens, which begins from rest, and by what is left of those
+that differentiate. On real recordings, errors there were up to 20 times the rms."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +63,8 @@ class Stream:
     """Coefficients of the whitening filter of the errors."""
     columns: FloatArray
     """(1 + columns,): rms of each."""
+    gap_reach: int
+    """Rows after a gap that are left out, for the whitening filter reaches back into it; see `_reach_of_gaps`."""
 
     def grams(self, side: Side, changed: Sequence[Undone]) -> Grams:
         """Products of a side's rows and of their changes by undone faults; see `Grams`."""
@@ -102,7 +104,12 @@ def _changed_columns(rows: Sequence[FloatArray], plain: Sequence[FloatArray]) ->
 
 def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Stream:
     rows = base.rows(clean), base.rows(other)
-    masks = tuple(tuple(_settled(mask) for mask in base.valid_samples(parts)) for parts in (clean, other))
+    valid = tuple(base.valid_samples(parts) for parts in (clean, other))
+    gap_reach = _reach_of_gaps([*valid[0], *valid[1]])
+    masks = tuple(tuple(_settled(mask, gap_reach) for mask in side) for side in valid)
+    fewest = max(CONTRAST_BLOCKS, 2 * rows[0][0].shape[1])
+    if any(sum(int(mask.sum()) for mask in side) < fewest for side in masks):
+        raise ValueError("too few rows are left of one set to be compared by")
     everything = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
     columns = np.sqrt(np.mean(everything**2, axis=0))
     columns = np.where(columns > 0, columns, 1.0)
@@ -113,13 +120,24 @@ def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Strea
         white = _whiten(colour, own, kept) / columns
         scale = _white_error(white)
         sides.append(Side(tuple(parts), own, kept, scale, white / scale))
-    return Stream(base, sides[0], sides[1], colour, columns)
+    return Stream(base, sides[0], sides[1], colour, columns, gap_reach)
 
 
-def _settled(valid: Mask) -> Mask:
-    """Valid rows with nothing but such ones within `REACH`, which neither the ends of a part nor gaps reach."""
-    around = np.pad(~valid, REACH, constant_values=True)
-    return np.asarray(np.convolve(around, np.ones(2 * REACH + 1), "valid") == 0)
+def _settled(valid: Mask, gap_reach: int) -> Mask:
+    """Valid rows that neither the ends of a part nor gaps before them reach."""
+    kept = np.array(np.convolve(~valid, np.ones(gap_reach + 1))[: len(valid)] == 0)
+    places = np.flatnonzero(valid)
+    if len(places):
+        kept[: places[0] + REACH] = False
+        kept[max(places[-1] + 1 - REACH, 0) :] = False
+    return kept
+
+
+def _reach_of_gaps(valid: Sequence[Mask]) -> int:
+    """The whitening filter's order; 0 where single losses come so often that this would leave less than the main part
+    of the rows: then what was filled in is good enough, for it was filled in over a sample or two."""
+    whole, kept = (sum(int(_settled(mask, reach).sum()) for mask in valid) for reach in (0, CONTRAST_WHITENING_ORDER))
+    return CONTRAST_WHITENING_ORDER if kept >= LEAST_KEPT * whole else 0
 
 
 def _residuals(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: FloatArray) -> list[FloatArray]:
@@ -167,15 +185,16 @@ def rows_with_fault_undone(stream: Stream, side: Side, fault: Fault, variant: Va
         rows = stream.base.rows(undone, side.rows if still else None)
         unit = variant.unit(_step_of(stream.base)) if tells else 1.0
         known = all(a.known is b.known for a, b in zip(undone, side.parts, strict=True))
-        lost = None if known else _lost_rows(stream.base, side, undone)
+        lost = None if known else _lost_rows(stream, side, undone)
         unit *= _spread_ratio(side, rows) if tells and fault.place == "actuator" else 1.0
         found.append(Undone(rows if unit == 1.0 else tuple(unit * part for part in rows), lost))
     return found
 
 
-def _lost_rows(base: Base, side: Side, undone: Sequence[Part]) -> tuple[Mask, ...]:
+def _lost_rows(stream: Stream, side: Side, undone: Sequence[Part]) -> tuple[Mask, ...]:
     """Rows that were known, and that what is unknown now reaches."""
-    return tuple(mask & ~_settled(valid) for mask, valid in zip(side.masks, base.valid_samples(undone), strict=True))
+    valid = stream.base.valid_samples(undone)
+    return tuple(mask & ~_settled(now, stream.gap_reach) for mask, now in zip(side.masks, valid, strict=True))
 
 
 def _step_of(base: Base) -> int:

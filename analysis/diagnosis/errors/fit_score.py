@@ -63,7 +63,10 @@ def signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> FloatArray:
         return np.full(records[0].measured.shape[1], np.nan)
     signals = (records[0].recording.response, records[0].recording.position)
     quantities = [word for signal in signals if signal is not None for word in signal.quantities]
-    places = [DERIVATIVE_OF_QUANTITY.get(word) == 0 for word in quantities[: records[0].measured.shape[1]]]
+    places = [
+        word != "voltage" and DERIVATIVE_OF_QUANTITY.get(word) == 0
+        for word in quantities[: records[0].measured.shape[1]]
+    ]
     whole = np.nanmean(np.concatenate([record.measured[mask] for record, mask in held]), axis=0)
     moved = [
         record.measured[mask] - np.where(places, np.nanmean(record.measured[mask], axis=0), whole)

@@ -18,6 +18,7 @@ from analysis.diagnosis.settings import DERIVATIVE_NEEDED
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
+from equalizer.signals.units import UNSTATED
 
 KNOWN = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) - {"voltage"}
 
@@ -29,7 +30,7 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
     if set(first.response.quantities) & KNOWN:
         return recordings, ""
     if not is_driven(recordings):
-        if set(first.response.quantities) == {"voltage"}:
+        if set(first.response.units) != {UNSTATED}:
             return recordings, ""
         return tuple(_with_quantity(each, "position") for each in recordings), (
             f"Nothing says what {conjoin(list(first.response.channels))} measures: it was taken for a position that "

@@ -1,7 +1,7 @@
 """Recordings of a real device beside clean ones of the same: what sets them apart (`contrast`), or shows by itself."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,6 +38,13 @@ class Contrast:
     comparison: Comparison | None
     """The comparison of all faults by a base model."""
     decision: Decision | None
+
+    def without_name(self, why_not: str) -> "Contrast":
+        """What was named by comparison is a candidate then; what readings, spectra or steps show stays."""
+        if self.decision is None or self.decision.named is None:
+            return self
+        left = ((self.decision.named, why_not), *self.decision.others)
+        return replace(self, decision=Decision(None, (), 0.0, left))
 
     @property
     def left_open(self) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from analysis.diagnosis.document import Errors
 from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
 from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
-from analysis.diagnosis.unit_wording import error_text, share_text
+from analysis.diagnosis.unit_wording import error_of_signal, error_text, share_text
 from analysis.wording import capitalise
 
 SAME = 1e-9
@@ -17,7 +17,7 @@ def black_box_sentence(box: BlackBox | None, named: bool) -> str:
         return ""
     physics = "the physics" if named else "the re-tuned model"
     fitted = f"A black box ({box.kind}, {box.numbers} numbers), fitted to the same samples, leaves"
-    errors = f"{error_text(box.test)} of the signal on the held-out data; {physics} leaves {error_text(box.physics)}"
+    errors = f"{error_of_signal(box.test)} on the held-out data; {physics} leaves {error_text(box.physics)}"
     if black_box_beats(box):
         return f"{fitted} {errors}. The black box predicts better: the data hold something that was not named."
     if box.physics * SAME_TO_READERS < box.test:
@@ -69,7 +69,7 @@ def fall_text(errors: Errors, first: tuple[str, str], last: tuple[str, str], how
         return "how much better it predicts held-out data is not known"
     goes = "falls" if after * SAME_TO_READERS < before else "goes"
     return (
-        f"the error on held-out data {goes} from {error_text(before)} of the signal ({first[1]}) to "
+        f"the error on held-out data {goes} from {error_of_signal(before)} ({first[1]}) to "
         f"{error_text(after)} ({last[1]}){_noise(errors, after, how)}"
     )
 
@@ -77,7 +77,7 @@ def fall_text(errors: Errors, first: tuple[str, str], last: tuple[str, str], how
 def one_error(said: str, error: float | None, errors: Errors, how: str = "") -> str:
     if error is None:
         return "its error on held-out data is not known"
-    return f"{said}, its error on held-out data is {error_text(error)} of the signal{_noise(errors, error, how)}"
+    return f"{said}, its error on held-out data is {error_of_signal(error)}{_noise(errors, error, how)}"
 
 
 def _noise(errors: Errors, error: float, how: str) -> str:
@@ -96,7 +96,7 @@ def confirmation_sentence(fit: Errors, test: Errors) -> str:
     if test.after > test.retuned:
         return (
             "The held-out data do not confirm this: there the re-tuned model alone does better "
-            f"({error_text(test.retuned)} of the signal against {error_text(test.after)})."
+            f"({error_of_signal(test.retuned)} against {error_text(test.after)})."
         )
     there, here = test.after / test.noise, fit.after / fit.noise
     if there > FIT_CONFIRMED * max(here, 1.0):

@@ -10,7 +10,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import SEALED_SURPRISE, STILL_SHARE
+from analysis.diagnosis.settings import SAME_TO_READERS, SEALED_SURPRISE, STILL_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
@@ -56,7 +56,10 @@ def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -
         return whole if np.isfinite(whole) else None
 
     noise = float(np.sqrt(np.mean((measure.noise / size) ** 2)))
-    return Errors(error(found.before), error(found.retuned), error(found.after), noise)
+    before, retuned, after = (error(each) for each in (found.before, found.retuned, found.after))
+    # Noise that is larger than an error refutes its own estimate, such as one from above the driven band.
+    known = all(each is None or noise <= SAME_TO_READERS * each for each in (before, retuned, after))
+    return Errors(before, retuned, after, noise if known else None)
 
 
 def held_out_stands_still(records: Sequence[Observed], noise: FloatArray) -> bool:

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.command_laws import REACHED, slew_laws
+from analysis.diagnosis.balance.command_laws import slew_laws
+from analysis.diagnosis.settings import SLEW_REACHED
 
 RATE_HZ, SPEED = 50.0, 1.5
 
@@ -29,8 +30,12 @@ def followed(recording_of):
     return recording
 
 
-def test_the_limit_is_named_with_its_speed(followed, balance_of):
-    (balance,) = balance_of(followed(SPEED))
+@pytest.mark.parametrize("offset_m", [0.0, 1.5, -10.0])
+def test_the_limit_is_named_with_its_speed(offset_m, followed, balance_of):
+    """Around any place: a servo of 0 to 180 degrees is centred at 90."""
+    given = followed(SPEED)
+    command, response = (replace(each, samples=each.samples + offset_m) for each in (given.command, given.response))
+    (balance,) = balance_of(replace(given, command=command, response=response))
 
     assert balance.named[0].law.effect == "slew_limit"
     assert balance.named[0].values["rate"] == pytest.approx(SPEED, rel=0.2)
@@ -56,4 +61,4 @@ def test_rates_that_never_catch_up_are_not_tried():
     assert rates
     for law in slew_laws([command], 500.0):
         reached = np.abs(law.of(command, command)[:, 0] - command) < law.values["rate"] / 500.0
-        assert reached.mean() > REACHED
+        assert reached.mean() > SLEW_REACHED
