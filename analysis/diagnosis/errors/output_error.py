@@ -179,18 +179,41 @@ def _gauss_newton_step(
     low, high = (bound - now for bound in _bounds(from_.hypothesis, t))
     longest = _longest(from_.hypothesis)
     low[t:], high[t:] = np.maximum(low[t:], -longest), np.minimum(high[t:], longest)
+    found, impossible = _first_better(measure, tuning, from_, (products, pull), (low, high))
+    if found is None and impossible:
+        # A mass that is best below zero must not stop all other numbers: it stays where it is.
+        masses = [place for place, name in enumerate(tuning.names) if name.startswith("mass")]
+        low[masses] = high[masses] = 0.0
+        found, _ = _first_better(measure, tuning, from_, (products, pull), (low, high))
+    return found
+
+
+def _first_better(
+    measure: ErrorMeasure,
+    tuning: Tuning,
+    from_: Fitted,
+    system: tuple[FloatArray, FloatArray],
+    bounds: tuple[FloatArray, FloatArray],
+) -> tuple[Fitted | None, bool]:
+    """The fit after the first of ever shorter steps that lowers the cost, None where none does, and whether any of them
+    led to numbers that no mechanical model has. system: normal matrix and right side."""
+    (products, pull), t, impossible = system, len(from_.deviations), False
+    # From a model that grows by itself no step could be taken, were growing ones refused.
+    grows = is_unstable_within(tuning.tune(from_.deviations), _longest_s(measure))
     for damping in (1e-9, 1e-3, 0.1, 3.0):
-        step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, low, high)
+        step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, *bounds)
         there = replace(from_.hypothesis, point=from_.hypothesis.point + step[t:])
         try:
-            if is_unstable_within(tuning.tune(from_.deviations + step[:t]), _longest_s(measure)):
+            model = tuning.tune(from_.deviations + step[:t])
+            if not grows and is_unstable_within(model, _longest_s(measure)):
                 continue
             tried = evaluate_fit(measure, tuning, from_.deviations + step[:t], there)
         except (MechanicalModelError, np.linalg.LinAlgError):
+            impossible = True
             continue
         if tried.cost < from_.cost * (1 - 1e-9):
-            return tried
-    return None
+            return tried, impossible
+    return None, impossible
 
 
 def _longest_s(measure: ErrorMeasure) -> float:
