@@ -47,6 +47,8 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 ROUNDS = 8
 NEEDLESS = "a law of the command leaves as little without it"
+CURVED = "quadratic_damping"
+"""The law of the motion that an actuator's curve looks like, where speeds settle."""
 HOLDS_AT_REST = (*SLIDING, "presliding_hysteresis")
 
 
@@ -60,6 +62,8 @@ class Actuator:
     """Without laws of the motion, it leaves as little."""
     instead: bool = False
     """By itself it leaves less than the named laws of the motion."""
+    suffices: bool = False
+    """By itself it leaves no more than the best sum of laws of the motion beside the command as it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +97,18 @@ def find_balance(
     if judged.gain_low <= 0 or judged.gain < FURTHER_LAW_OF_ALL:
         return balance
     if judged.gain < COMMAND_LAW_LEAVES and not actuator.instead:
-        return replace(balance, others=tuple(sorted((*balance.others, judged), key=lambda each: -each.gain)))
+        kept = tuple(_unless_curved(law, actuator) for law in balance.laws)
+        others = tuple(sorted((*balance.others, judged), key=lambda each: -each.gain))
+        return replace(balance, laws=kept, others=others)
     laws = (
         [replace(each, why_not=each.why_not or NEEDLESS) for each in balance.laws] if actuator.alone else balance.laws
     )
     return replace(balance, laws=(judged, *laws))
+
+
+def _unless_curved(law: JudgedLaw, actuator: Actuator) -> JudgedLaw:
+    needless = law.named and law.law.effect == CURVED and actuator.suffices
+    return replace(law, why_not=NEEDLESS) if needless else law
 
 
 def _pass_through_law(motion: Motion, axis: int, own: int, law: CommandLaw) -> Motion:
@@ -133,7 +144,8 @@ def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str],
     rivals = [other for _, other in best if other is not law]
     law = _scaled_to_command(law, search.regression)
     judged = _judge_law(turned, law, rivals, (beside, beside))
-    return Actuator(law, judged, bool(beside) and alone <= held / (1 - COMMAND_RIVAL_LEAVES_MORE))
+    as_little = alone <= held / (1 - COMMAND_RIVAL_LEAVES_MORE)
+    return Actuator(law, judged, bool(beside) and as_little, suffices=as_little and alone <= plain)
 
 
 Kinds = Sequence[tuple[AnyCommandLaw | None, Sequence[CommandLaw]]]

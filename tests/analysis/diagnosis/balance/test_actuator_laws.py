@@ -121,6 +121,36 @@ def test_a_drag_is_none_of_the_actuator(of_speed):
     assert set(named(of_speed(lambda u: u, 2.0))) == {"quadratic_damping"}
 
 
+def noisy_speed(curve, drag, seed=3, rate_hz=10.0, count=4000):
+    """Of a motor with a time constant of 1 s, through steps of 5 s, with a noise of a fifth of it. curve: power of the
+    command, with a dead band of 0.04 where it is no straight line."""
+    from equalizer.signals.recording import Hold, Recording
+    from equalizer.signals.signal import Signal
+
+    random = np.random.default_rng(seed)
+    command = np.repeat(random.uniform(-1.0, 1.0, count // 50), 50)
+    width = 0.0 if curve == 1.0 else 0.04
+    given = 10 * np.sign(command) * np.maximum(np.abs(command) - width, 0.0) ** curve
+    speed, v = np.empty(count), 0.0
+    for k, push in enumerate(given):
+        speed[k] = v
+        for _ in range(10):
+            v += (push - v - drag * v * abs(v)) / (10 * rate_hz)
+    speed += 0.2 * speed.std() * random.standard_normal(count)
+    signals = (
+        Signal(command[:, None], rate_hz, "force", "N", ("fx",)),
+        Signal(speed[:, None], rate_hz, "velocity", "m/s", ("x",)),
+    )
+    return Recording("invented", *signals, hold=Hold.ZERO_ORDER)
+
+
+@pytest.mark.parametrize(("curve", "drag", "drags"), [(0.55, 0.0, False), (1.0, 0.1, True)])
+def test_a_drag_is_named_only_where_no_curve_of_the_command_does_as_well(balance_of, curve, drag, drags):
+    """Though noise hides which of both leaves less by far."""
+    balance = balance_of(noisy_speed(curve, drag))[0]
+    assert ("quadratic_damping" in named(balance)) == drags
+
+
 @pytest.mark.parametrize("lag_s", [0.06, 0.01])
 def test_a_valve_whose_speed_falls_behind_its_command_is_no_drag(balance_of, lag_s):
     """lag_s: of the speed behind the valve; below the sample period, no inertia shows."""
