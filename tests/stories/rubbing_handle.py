@@ -42,12 +42,12 @@ class RubbingHandle:
         wanted = Signal(_wanted(self.seed), RATE_HZ, "acceleration", "m/s^2", ACCELERATIONS)
         write_trajectory(self.folder / "wanted.csv", Trajectory(wanted))
 
-    def diagnose(self, without: tuple[str, ...]) -> Path:
+    def diagnose(self, without: tuple[str, ...], *options: str) -> Path:
         """The folder of the diagnosis, from the command line."""
         sources = [str(self.folder / f"diagnose_{third}.h5") for third in range(3)]
         left_out = [part for name in without for part in ("--without", name)]
         out, model = self.folder / "found", self.folder / "nominal.toml"
-        assert main(["diagnose", *sources, "--model", str(model), "--out", str(out), *left_out]) == 0
+        assert main(["diagnose", *sources, "--model", str(model), "--out", str(out), *left_out, *options]) == 0
         return out
 
     def first_play(self, name: str, *options: str) -> tuple[FloatArray, float]:

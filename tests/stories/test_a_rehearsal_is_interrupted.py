@@ -13,6 +13,7 @@ from terminal import Terminal
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(200)
 def test_the_same_command_continues(small_file, tmp_path):
     command = (

@@ -29,10 +29,10 @@ def rubbing_handle(module_at, plants, rubbing):
     return lambda folder, seed: kind(plants, rubbing, folder, seed)
 
 
-def closed_loop(handle, considered):
+def closed_loop(handle, considered, *options):
     """Errors without and with the friction that was named, largest forces alike, and the diagnosis."""
     handle.prepare()
-    found = handle.diagnose(tuple(name for name in EFFECTS_BY_NAME if name not in considered))
+    found = handle.diagnose(tuple(name for name in EFFECTS_BY_NAME if name not in considered), *options)
     diagnosis = read_diagnosis(found / "diagnosis.json")
     plain, without_n = handle.first_play("plain")
     freed, with_n = handle.first_play("freed", "--physics", str(found / "improved.toml"))
@@ -48,7 +48,7 @@ def named_right(diagnosis):
 @pytest.fixture(scope="module")
 def once(rubbing_handle, tmp_path_factory):
     handle = rubbing_handle(tmp_path_factory.mktemp("loop"), 3)
-    return handle, closed_loop(handle, QUICKLY)
+    return handle, closed_loop(handle, QUICKLY, "--no-discovery")
 
 
 @pytest.mark.timeout(300)

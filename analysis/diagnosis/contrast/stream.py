@@ -20,7 +20,7 @@ from equalizer.signals.signal import FloatArray
 
 Base = ForceBase | AutoregressiveBase | SensorBase
 REACH = 2 * CONTRAST_WHITENING_ORDER
-"""Rows that the ends of a part reach: by the filter that whitens, which begins from rest, and by what is left of those
+"""Rows that the ends of a part, and rare gaps, reach: by the filter that whitens, which begins from rest, and by what is left of those
 that differentiate. On real recordings, errors there were up to 20 times the rms."""
 
 
@@ -64,7 +64,7 @@ class Stream:
     columns: FloatArray
     """(1 + columns,): rms of each."""
     gap_reach: int
-    """Rows after a gap that are left out, for the whitening filter reaches back into it; see `_reach_of_gaps`."""
+    """Rows beside a gap that are left out; see `_reach_of_gaps`."""
 
     def grams(self, side: Side, changed: Sequence[Undone]) -> Grams:
         """Products of a side's rows and of their changes by undone faults; see `Grams`."""
@@ -124,8 +124,9 @@ def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Strea
 
 
 def _settled(valid: Mask, gap_reach: int) -> Mask:
-    """Valid rows that neither the ends of a part nor gaps before them reach."""
-    kept = np.array(np.convolve(~valid, np.ones(gap_reach + 1))[: len(valid)] == 0)
+    """Valid rows that neither the ends of a part nor gaps reach."""
+    around = np.pad(~valid, gap_reach)
+    kept = np.array(np.convolve(around, np.ones(2 * gap_reach + 1), "valid") == 0)
     places = np.flatnonzero(valid)
     if len(places):
         kept[: places[0] + REACH] = False
@@ -134,10 +135,10 @@ def _settled(valid: Mask, gap_reach: int) -> Mask:
 
 
 def _reach_of_gaps(valid: Sequence[Mask]) -> int:
-    """The whitening filter's order; 0 where single losses come so often that this would leave less than the main part
-    of the rows: then what was filled in is good enough, for it was filled in over a sample or two."""
-    whole, kept = (sum(int(_settled(mask, reach).sum()) for mask in valid) for reach in (0, CONTRAST_WHITENING_ORDER))
-    return CONTRAST_WHITENING_ORDER if kept >= LEAST_KEPT * whole else 0
+    """`REACH`; 0 where single losses come so often that this would leave less than the main part of the rows: what was
+    filled in over a sample or two is good enough then."""
+    whole, kept = (sum(int(_settled(mask, reach).sum()) for mask in valid) for reach in (0, REACH))
+    return REACH if kept >= LEAST_KEPT * whole else 0
 
 
 def _residuals(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: FloatArray) -> list[FloatArray]:

@@ -65,6 +65,7 @@ def folder(tmp_path):
     return whole
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_real_recordings_are_answered_on_a_cluster_as_they_are_here(folder, local, kill_a_worker, tmp_path):
     here = diagnose_folder(RealPlan(folder, tmp_path / "here"), lambda *_: None)

@@ -61,6 +61,7 @@ def test_a_cluster_plays_the_same_sessions_and_keeps_those_that_are_there(rehear
     assert {path.stat().st_mode & 0o077 for path in there.data.rglob("*")} == {0}
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_worker_that_dies_loses_no_session(rehearsal, local, here, kill_a_worker, tmp_path):
     there = elsewhere(rehearsal, tmp_path)

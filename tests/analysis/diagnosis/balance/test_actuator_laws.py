@@ -62,13 +62,13 @@ def test_the_error_before_is_that_of_the_force_as_commanded(dead_band):
     assert dead_band.error < 0.5 * dead_band.linear
 
 
-@pytest.mark.parametrize("physics", [{"coulomb": 0.8}, {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}])
+@pytest.mark.parametrize("physics", [pytest.param({"coulomb": 0.8}, marks=pytest.mark.slow), {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}])
 def test_a_linear_actuator_has_no_deadband_saturation_or_nonlinearity(found, axes, physics):
     balance = found(lambda u: u, replace(axes.Physics(), **physics))
     assert not {"force_deadband", "force_saturation", "force_nonlinearity"} & set(named(balance))
 
 
-@pytest.mark.parametrize("square", [-0.5, 0.4])
+@pytest.mark.parametrize("square", [-0.5, pytest.param(0.4, marks=pytest.mark.slow)])
 def test_a_gain_that_changes_with_the_command_is_recovered_with_its_size(found, square):
     balance = found(lambda u: u * (1 - square + square * np.abs(u) / np.abs(u).max()))
     assert set(named(balance)) == {"force_nonlinearity"}
@@ -151,7 +151,7 @@ def test_a_drag_is_named_only_where_no_curve_of_the_command_does_as_well(balance
     assert ("quadratic_damping" in named(balance)) == drags
 
 
-@pytest.mark.parametrize("lag_s", [0.06, 0.01])
+@pytest.mark.parametrize("lag_s", [0.06, pytest.param(0.01, marks=pytest.mark.slow)])
 def test_a_valve_whose_speed_falls_behind_its_command_is_no_drag(balance_of, lag_s):
     """lag_s: of the speed behind the valve; below the sample period, no inertia shows."""
     from equalizer.signals.recording import Recording

@@ -41,7 +41,7 @@ def test_a_late_reading_is_a_class_and_not_explained_without_repeats(said):
         assert {"transport_delay", "logger_offset"} <= set(effect.class_)
 
 
-@pytest.mark.parametrize("cubic", [2e5, -1200.0])
+@pytest.mark.parametrize("cubic", [pytest.param(2e5, marks=pytest.mark.slow), -1200.0])
 def test_a_spring_that_hardens_or_softens_is_named_and_not_explained_without_repeats(said, cubic):
     diagnosis = said(lambda read: read, cubic=cubic)
     assert diagnosis.verdict == "partly_explained"

@@ -16,10 +16,10 @@ from equalizer.signals.signal import FloatArray
     ("change", "level", "number", "place"),
     [
         ("added_mass", 0.3, "mass", "mechanism"),
-        ("viscous_damping", 2.0, "damping", "mechanism"),
+        pytest.param("viscous_damping", 2.0, "damping", "mechanism", marks=pytest.mark.slow),
         ("coulomb_friction", 0.6, "level", "mechanism"),
         ("force_gain", 0.75, "gain", "actuator"),
-        ("sensor_gain", 1.3, "gain", "sensor"),
+        pytest.param("sensor_gain", 1.3, "gain", "sensor", marks=pytest.mark.slow),
     ],
 )
 def test_what_came_since_is_named_with_its_place_and_number(rig, change, level, number, place):

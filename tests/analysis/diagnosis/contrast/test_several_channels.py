@@ -32,7 +32,7 @@ def two_drives(seed: int, gain: float = 1.0) -> Recording:
     )
 
 
-@pytest.mark.parametrize("gain", [0.6, 1.4])
+@pytest.mark.parametrize("gain", [0.6, pytest.param(1.4, marks=pytest.mark.slow)])
 def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(rig, gain):
     faulty = two_drives(3, gain)
     found = compare([faulty], [two_drives(4)], frozenset(), rig.time_left)
@@ -74,6 +74,7 @@ def test_a_logger_that_reads_all_channels_late_is_named_once(rig):
     assert answer.named.values["offset"] == pytest.approx(2 / RATE_HZ, rel=0.25)
 
 
+@pytest.mark.slow
 def test_a_logger_that_is_late_now_and_then_in_both_sets_is_not_named(rig):
     faulty, clean = in_turns(2, np.array([0, 2, 1, 2, 0, 2.0])), in_turns(1, np.array([0, 0, 2, 0, 1, 0.0]))
     found = compare([faulty], [clean], frozenset(), rig.time_left)

@@ -25,7 +25,7 @@ def test_nothing_is_left_open_where_a_fault_is_named(rig):
     assert found.comparison is not None and found.comparison.complete
 
 
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_nothing_is_left_open_between_recordings_of_the_same_device(rig, seed):
     assert not rig.contrast(seed=seed).left_open
 

@@ -111,6 +111,7 @@ def test_where_nothing_repeats_peaks_give_rattle_away(diagnosed):
     assert not is_irregular(*searched(diagnosed, (), repeats=False))
 
 
+@pytest.mark.slow
 def test_the_whole_diagnosis_says_what_was_compared(diagnosed):
     kept = ("backlash", "loose_joint", "extra_mode")
     others = tuple(each.name for each in CATALOGUE if each.name not in kept)

@@ -110,6 +110,7 @@ def log(order) -> Path:
     return Path(order.data) / "P01_001" / "events.jsonl"
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_from_the_start_screen_to_the_report_and_back(order, tmp_path):
     path = tmp_path / "short.toml"
@@ -233,7 +234,7 @@ def test_a_pause_a_note_and_the_watchers_view_in_one_terminal(sitting, log):
     assert "pause_taken" in log.read_text()
 
 
-@pytest.mark.parametrize("way", ["key", "command"])
+@pytest.mark.parametrize("way", ["key", pytest.param("command", marks=pytest.mark.slow)])
 def test_a_participant_does_not_open_the_experimenters_view_by_accident(sitting, log, way):
     async def story(person: Person) -> None:
         await person.until("TrialScreen")
