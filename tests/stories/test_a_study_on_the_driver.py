@@ -203,6 +203,7 @@ class Trouble:
             self._stub.set(name, value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("switches", "healthy"),
     [

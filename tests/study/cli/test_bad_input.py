@@ -156,7 +156,7 @@ def compiled(tmp_path_factory) -> None:
 
 
 @pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("size_kib", [8, 30])
+@pytest.mark.parametrize("size_kib", [pytest.param(8, marks=pytest.mark.slow), 30])
 def test_a_disk_that_fills_up_says_how_many_answers_are_safe_and_the_session_continues(tmp_path, small_file, size_kib):
     """A limit on the size of one file stands for a full disk: with 8 KiB recordings fail first, with 30 KiB the log."""
     script = (

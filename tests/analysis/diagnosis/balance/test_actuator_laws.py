@@ -62,7 +62,9 @@ def test_the_error_before_is_that_of_the_force_as_commanded(dead_band):
     assert dead_band.error < 0.5 * dead_band.linear
 
 
-@pytest.mark.parametrize("physics", [pytest.param({"coulomb": 0.8}, marks=pytest.mark.slow), {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}])
+@pytest.mark.parametrize(
+    "physics", [pytest.param({"coulomb": 0.8}, marks=pytest.mark.slow), {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}]
+)
 def test_a_linear_actuator_has_no_deadband_saturation_or_nonlinearity(found, axes, physics):
     balance = found(lambda u: u, replace(axes.Physics(), **physics))
     assert not {"force_deadband", "force_saturation", "force_nonlinearity"} & set(named(balance))
@@ -75,6 +77,7 @@ def test_a_gain_that_changes_with_the_command_is_recovered_with_its_size(found, 
     assert named(balance)["force_nonlinearity"].values["square"] == pytest.approx(square, rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_gain_that_grows_with_the_square_of_the_command_grows_with_its_size(found):
     law = named(found(lambda u: u * (1 + 0.02 * u**2)))["force_nonlinearity"]
     assert 0 < law.values["square"] <= 1

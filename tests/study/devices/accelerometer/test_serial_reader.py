@@ -95,7 +95,7 @@ def test_a_board_that_falls_silent_reads_nothing(board, sensor):
     assert within(FRESH_S + 5.0, lambda: bool(np.isnan(sensor.latest()[0]).all()))
 
 
-@pytest.mark.parametrize("rate_hz", [1000.0, 4000.0, 10_000.0])
+@pytest.mark.parametrize("rate_hz", [1000.0, pytest.param(4000.0, marks=pytest.mark.slow), 10_000.0])
 def test_every_rate_is_followed_and_what_is_lost_is_counted(rate_hz):
     with contextlib.closing(Board(rate_hz)) as board:
         random = np.random.default_rng(1)

@@ -34,7 +34,7 @@ def fuzz(lying, ticks: int, first_seed: int) -> Counter:
 
 
 def test_false_readings_and_late_ticks_never_exceed_the_force_limits(lying):
-    met = fuzz(lying, 400_000, first_seed=0)
+    met = fuzz(lying, 200_000, first_seed=0)
     assert {fault for _, fault in met} >= ENCODERS | {Fault.NONE, Fault.STALLED}
     assert {lie for lie, _ in met} >= set(lying.LIES)
 

@@ -164,6 +164,7 @@ def test_an_error_that_is_not_known_is_read(copied):
     assert len(reveal_cases(copied, 100)) == len(drawable_cases(PLAN))
 
 
+@pytest.mark.slow
 def test_an_answer_that_was_removed_is_given_again(copied):
     path = next(copied.open.glob(f"*/{ANSWER}"))
     before = json.loads(path.read_text())

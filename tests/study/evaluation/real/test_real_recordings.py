@@ -169,12 +169,12 @@ def test_an_unknown_model_is_refused_with_the_names_of_known_ones(tmp_path: Path
 
 def test_faults_are_injected_under_a_seal_and_counted(folder: Path, tmp_path: Path) -> None:
     # What the answers are is not asked here.
-    plan = RealPlan(folder, tmp_path / "out", inject=2, seed=6, seconds=1.0)
+    plan = RealPlan(folder, tmp_path / "out", inject=1, seed=6, seconds=1.0)
     done = diagnose_folder(plan, silent)
-    assert len(done.results.injected) == 2
+    assert len(done.results.injected) == 1
     sealed = sorted((tmp_path / "out" / "injected" / "sealed").glob("*.json"))
-    assert len(sealed) == 2
-    assert len((tmp_path / "out" / "injected" / "labels.sha256").read_text().splitlines()) == 2
+    assert len(sealed) == 1
+    assert len((tmp_path / "out" / "injected" / "labels.sha256").read_text().splitlines()) == 1
     assert not any(each.failed for each in done.results.injected)
     assert "Faults injected into real recordings" in done.page.read_text()
     assert any(line.startswith("Injected: ") for line in real_lines(done))

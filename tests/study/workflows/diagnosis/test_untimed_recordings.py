@@ -76,7 +76,7 @@ def test_no_place_is_reported_in_hertz(first):
 def test_a_speed_without_a_clock_is_diagnosed_with_samples_as_its_time():
     """A motor with dry friction, in random steps of its command."""
     random = np.random.default_rng(3)
-    command = np.repeat(random.uniform(-5.0, 5.0, 150), 40)
+    command = np.repeat(random.uniform(-5.0, 5.0, 75), 40)
     speed, v = np.empty(len(command)), 0.0
     for k, push in enumerate(command.tolist()):
         speed[k] = v

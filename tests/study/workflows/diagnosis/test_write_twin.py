@@ -20,7 +20,7 @@ role = "fit"
 along = "{along}"
 from_hz = 1.0
 to_hz = {to_hz}
-duration_s = 4.0
+duration_s = {duration_s}
 periods = 2
 realisations = 2
 odd_only = true
@@ -48,7 +48,9 @@ total_cap_n = 4.5
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("twin") / "short.toml"
-    path.write_text(SHORT + "".join(SEGMENT.format(along=a, to_hz=60.0, seed=i) for i, a in enumerate("xyz")))
+    path.write_text(
+        SHORT + "".join(SEGMENT.format(along=a, to_hz=60.0, duration_s=4.0, seed=i) for i, a in enumerate("xyz"))
+    )
     return path
 
 
@@ -113,7 +115,7 @@ def test_a_band_that_falls_is_refused_before_anything_moves(protocol, tmp_path):
 
 def test_a_protocol_that_leaves_an_axis_still_is_refused(tmp_path):
     path = tmp_path / "x.toml"
-    path.write_text(SHORT + SEGMENT.format(along="x", to_hz=40.0, seed=1))
+    path.write_text(SHORT + SEGMENT.format(along="x", to_hz=40.0, duration_s=4.0, seed=1))
     with pytest.raises(WrongUseError, match="multisines along x, y and z"):
         write_twin(TwinPlan(tmp_path / "m.toml", protocol=str(path)), lambda share: None)
 
@@ -125,8 +127,10 @@ def test_a_band_without_lines_is_refused_and_nothing_is_written(protocol, tmp_pa
     assert not out.exists()
 
 
-def test_the_command_writes_a_model_and_says_what_it_is(protocol, tmp_path, capsys):
-    out = tmp_path / "m.toml"
+def test_the_command_writes_a_model_and_says_what_it_is(tmp_path, capsys):
+    protocol, out = tmp_path / "shorter.toml", tmp_path / "m.toml"
+    segments = (SEGMENT.format(along=a, to_hz=26.0, duration_s=2.0, seed=i) for i, a in enumerate("xyz"))
+    protocol.write_text(SHORT + "".join(segments))
     arguments = ["twin", "--out", str(out), "--protocol", str(protocol), "--band", "2", "25", "--seed", "2", "--json"]
     assert main(arguments) == ExitCode.DONE
     said = json.loads(capsys.readouterr().out)

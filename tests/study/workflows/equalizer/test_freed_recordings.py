@@ -75,6 +75,7 @@ def error(device, folder, name, *options) -> float:
     return rms(band_part(played - wanted, RATE_HZ, BAND_HZ)) / rms(wanted)
 
 
+@pytest.mark.slow
 def test_a_model_of_freed_recordings_plays_with_the_friction_compensated_wholly(device, folder, capsys):
     plain = error(device, folder, "plain")
     freed = error(device, folder, "freed", "--physics", str(folder / "improved.toml"))

@@ -212,7 +212,14 @@ def test_the_written_stiffness_is_the_springs_also_without_one(tmp_path):
     assert np.array_equal(recording.command.samples, recording.excitation.samples)
 
 
-@pytest.mark.parametrize("name", ["sweep", "sweep_band", "sweep_study", "sweep_hand", "multisine"])
+SHIPPED = (
+    "sweep",
+    "multisine",
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("sweep_band", "sweep_study", "sweep_hand")),
+)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_recordings_are_played_as_they_are_asked_for_in_seconds(tmp_path, name):
     """No cap, no sensor and no slew limit is in their way, and a simulated device waits for no answer."""
     shipped = load_protocol(files("protocols").joinpath(f"{name}.toml").read_text("utf-8"), name)

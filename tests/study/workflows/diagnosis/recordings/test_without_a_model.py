@@ -16,8 +16,8 @@ pytestmark = pytest.mark.usefixtures("sketched")
 
 
 def test_where_no_model_can_be_fitted_it_is_asked_for(files, findings, tmp_path, recording):
-    # An eighth of it: three commands and two responses are weighed for long before nothing holds.
-    count = len(recording) // 8
+    # A sixteenth of it: three commands and two responses are weighed for long before nothing holds.
+    count = len(recording) // 16
     pushed, moved = recording.command.samples[:count], recording.response.samples[:count]
     three = replace(
         recording,
