@@ -57,6 +57,8 @@ class Stub:
         self._library.stub_set.argtypes = [ctypes.c_char_p, ctypes.c_double]
         self._library.stub_get.argtypes, self._library.stub_get.restype = [ctypes.c_char_p], ctypes.c_double
         self._library.stub_peek.argtypes, self._library.stub_peek.restype = [ctypes.c_char_p], ctypes.c_double
+        self.read = self._library.stub_get
+        """As `get`, for names in bytes, at each tick."""
         self._library.stub_advance.argtypes = [ctypes.c_double]
         self._library.stub_move.argtypes = [ctypes.c_double] * 3
 
@@ -112,12 +114,16 @@ def accept(
 
 
 class TrueSensor:
+    _NAMES = (b"ax", b"ay", b"az")
+
     def __init__(self, stub: Stub) -> None:
         self._stub = stub
         self.closed = False
+        for name in self._NAMES:
+            stub.get(name.decode())  # which it knows: asked for at each tick
 
     def latest(self) -> tuple[FloatArray, bool]:
-        true_mps2 = np.array([self._stub.get(f"a{axis}") for axis in "xyz"])
+        true_mps2 = np.array([self._stub.read(name) for name in self._NAMES])
         return true_mps2 + self._stub.noise_mps2 * self._stub.random.standard_normal(3), False
 
     def close(self) -> None:

@@ -31,8 +31,8 @@ NUMBERS = {
 PD = (600.0, 10.0)
 BY_FEW_GRIPS = ("stribeck_friction", "position_dependent_friction")
 """In an open loop the axis sticks at each turn: they are then told from dry friction as a class alone."""
-OPEN = ("coulomb_friction", "presliding_hysteresis", "quadratic_damping", "cogging", "pose_dependent_inertia")
-CLOSED = ("hardening_stiffness", "end_stop")
+OPEN = ("coulomb_friction", "cogging")
+CLOSED = ("hardening_stiffness",)
 IMPOSED = ("stribeck_friction", "position_dependent_friction")
 
 

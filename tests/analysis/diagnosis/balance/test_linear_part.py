@@ -25,7 +25,9 @@ def _force(seed=3, top_hz=5.0):
 
 def _moved(times_s, slopes, size):
     fine = np.arange(0, times_s[-1] + 1e-3, 1e-3)
-    found = solve_ivp(slopes, (0, fine[-1]), np.zeros(size), t_eval=fine, max_step=2e-3, rtol=1e-7, atol=1e-9)
+    found = solve_ivp(
+        slopes, (0, fine[-1]), np.zeros(size), t_eval=fine, method="LSODA", max_step=2e-3, rtol=1e-7, atol=1e-9
+    )
     return interp1d(found.t, found.y, axis=1, fill_value="extrapolate")(times_s).T
 
 
@@ -128,7 +130,9 @@ def test_where_only_accelerations_were_measured_a_hardening_spring_is_found(reco
         q, v = state
         return [v, (3 * at(t) - damping * v - stiffness * q - cubic * q**3) / mass]
 
-    found = solve_ivp(slopes, (0, 16), np.zeros(2), t_eval=times_s, max_step=1e-3, rtol=1e-7, atol=1e-10).y
+    found = solve_ivp(
+        slopes, (0, 16), np.zeros(2), t_eval=times_s, method="LSODA", max_step=1e-3, rtol=1e-7, atol=1e-10
+    ).y
     seen = np.array([slopes(t, state)[1] for t, state in zip(times_s, found.T, strict=True)])
     seen += 0.01 * seen.std() * np.random.default_rng(1).standard_normal(len(seen))
 

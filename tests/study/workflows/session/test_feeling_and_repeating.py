@@ -42,7 +42,7 @@ def test_the_same_seed_feels_the_same(sitter):
     assert [(t.level_n, t.answer) for t in conducted(sitter, "delivered").state.trials] == first
 
 
-@pytest.mark.parametrize("seed", [11, 12, 13])
+@pytest.mark.parametrize("seed", [11, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (12, 13))])
 def test_who_asks_again_when_unsure_is_flagged_and_within_the_limit(sitter, seed):
     state = conducted(sitter, "repeating", seed).state
     tested = [t for t in state.trials if t.phase is Phase.TEST]
@@ -51,7 +51,14 @@ def test_who_asks_again_when_unsure_is_flagged_and_within_the_limit(sitter, seed
     assert f"REPE{seed}" in repeat_warning(state.trials)
 
 
-@pytest.mark.parametrize("observer", ["ideal", "lapsing", "guesser", "criterion_drift"])
+@pytest.mark.parametrize(
+    "observer",
+    [
+        "ideal",
+        "guesser",
+        *(pytest.param(observer, marks=pytest.mark.slow) for observer in ("lapsing", "criterion_drift")),
+    ],
+)
 def test_who_asks_for_nothing_is_not_flagged(sitter, observer):
     assert repeat_warning(conducted(sitter, observer).state.trials) == ""
 
