@@ -52,6 +52,7 @@ def answer_until_finished(terminal: Terminal) -> int:
         answers += 1
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(240)
 def test_from_the_code_to_the_report_with_a_kill_in_the_middle(study, small_file, tmp_path):
     terminal = begin(study, small_file)

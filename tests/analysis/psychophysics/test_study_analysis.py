@@ -98,6 +98,7 @@ def test_two_kinds_of_participants_are_refused(simulate_study, protocol):
         analyse_study([*simulate_study(subjects=1), *people], protocol)
 
 
+@pytest.mark.slow
 def test_the_order_of_the_rows_does_not_matter_within_a_study(simulate_study, protocol):
     trials = simulate_study(subjects=2)
     assert analyse_study(trials[::-1], protocol).anova.f == pytest.approx(analyse_study(trials, protocol).anova.f)

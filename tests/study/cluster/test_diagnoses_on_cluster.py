@@ -29,8 +29,9 @@ def answers(path):
 
 
 @pytest.mark.timeout(600)
-def test_a_bank_is_answered_on_a_cluster_as_it_is_here(local, kill_a_worker, tmp_path):
-    plan = BankPlan(51_404, 3, brief=True)
+@pytest.mark.parametrize("cases", [1, pytest.param(3, marks=pytest.mark.slow)])
+def test_a_bank_is_answered_on_a_cluster_as_it_is_here(local, kill_a_worker, tmp_path, cases):
+    plan = BankPlan(51_404, cases, brief=True)
     here = prove(tmp_path / "here", plan, BankOptions(keep=True), lambda *_: None)
     shutil.copytree(tmp_path / "here", tmp_path / "there")
     for path in (tmp_path / "there" / "open").glob(f"*/{ANSWER}"):

@@ -71,6 +71,7 @@ def test_a_worker_that_dies_loses_no_session(rehearsal, local, here, kill_a_work
     assert tables(there.data) == here
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_session_that_was_begun_here_is_finished(rehearsal, local, here, session_logs, tmp_path):
     there = elsewhere(rehearsal, tmp_path)

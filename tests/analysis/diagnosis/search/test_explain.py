@@ -123,6 +123,7 @@ def turned(signal: Signal, factor: float) -> Signal:
     return replace(signal, samples=factor * signal.samples)
 
 
+@pytest.mark.slow
 def test_where_axes_change_places_the_answer_does(diagnosed):
     among = ("coulomb_friction", "hardening_stiffness")
     two = diagnosed.recorded(2)
