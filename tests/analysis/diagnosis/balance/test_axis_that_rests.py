@@ -8,7 +8,7 @@ from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME
 RATE_HZ, LEVEL, MASS, DAMPING = 100.0, 0.4, 0.05, 0.8
 
 
-def _hunt(friction, seconds=60.0, fine=20):
+def _hunt(friction, seconds=120.0, fine=20):
     """Force and position (n, 1) of an axis that an integrating controller leads after a slow target; it waits for half
     of the time, while its force wanders below what moves the axis."""
     rng, n, step_s = np.random.default_rng(3), int(seconds * RATE_HZ), 1 / (RATE_HZ * fine)
@@ -48,6 +48,6 @@ def test_friction_of_an_axis_that_mostly_rests_is_named(held):
 
 
 def test_an_axis_that_rests_without_friction_gets_no_name(recording_of, balance_of):
-    (balance,) = balance_of(recording_of(*_hunt(0.0), RATE_HZ))
+    (balance,) = balance_of(recording_of(*_hunt(0.0, seconds=60.0), RATE_HZ))
 
     assert not balance.named
