@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from study.importing.arrays.array_groups import groups_in
-from study.importing.arrays.arrays import Arrays
+from study.importing.arrays.arrays import WORKBOOKS, Arrays
 from study.importing.imposed_roles import IMPOSED, NOT_IMPOSED, turn_imposed
 from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap, PartMap
 from study.importing.map_format.signal_words import (
@@ -26,6 +26,8 @@ _TIME = re.compile(
     r"(_?(s|ms|us))?",
     re.IGNORECASE,
 )
+_NUMBER = re.compile(r"\d+")
+_NAMED = 3
 
 
 def header_map(arrays: Arrays) -> ImportMap | None:
@@ -55,10 +57,12 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     """Sentences about what was taken from the header, what was left out, and what names leave open."""
     table, _ = _table(arrays)
     told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
+    parts = ", ".join(f"'{part.prefix.rstrip('/_')}'" for part in wanted.part)
+    joined = [f"Put one after another, as parts of one recording: {parts}."] if parts else []
     left_out = [f"Left out: '{name}' {why}." for name, why in surplus_arrays(table).items()]
     others = [name for name, array in arrays.by_name.items() if not array.ndim and name != wanted.clock[0].rate]
     left_out += [f"Left out: '{name}' is no column." for name in others]
-    return (f"Taken from the header: {told}.", *left_out, *_direction_notes(table, wanted))
+    return (f"Taken from the header: {told}.", *joined, *left_out, *_direction_notes(table, wanted))
 
 
 def _direction_notes(table: Arrays, wanted: ImportMap) -> tuple[str, ...]:
@@ -93,7 +97,13 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
             f"'{name}' is {array.item()}" for name, array in others if array.dtype.kind == "O" and array.item()
         )
         return (f"it holds no arrays of numbers{f' ({kinds})' if kinds else ''}",)
-    table, _ = _table(arrays)
+    table, prefixes = _table(arrays)
+    if len({_NUMBER.sub("", prefix) for prefix in prefixes}) > 1:
+        names = " and ".join(f"'{prefix.rstrip('/_')}'" for prefix in prefixes[:_NAMED])
+        return (
+            f"its {len(prefixes)} parts are alike ({names}), but not numbered as repeats are: keep the [[part]] of one "
+            f'in the map{", or name its sheet, as in sheet = ... under [csv]" if arrays.path.suffix in WORKBOOKS else ""}',
+        )
     if len({array.shape for array in table.by_name.values()}) != 1:
         return ("its arrays have several lengths",)
     if next(iter(table.by_name.values())).ndim != 1:

@@ -54,8 +54,9 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
         raise ValueError(f"it has {len(layout.names)} columns; up to {MOST_COLUMNS} are read")
     if doubled := sorted(name for name, count in Counter(layout.names).items() if count > 1):
         raise ValueError(f"its header names '{doubled[0]}' twice; give the columns names of their own in [csv] names")
-    body = [line for line in layout.body if not is_comment(line[1])]
+    body = list(layout.body)
     _require_equal_rows(body, layout)
+    comments = _comments(lines, layout)
     text = "\n".join(line for _, line in body)
     words = {name for place, name in enumerate(layout.names) if place in layout.texts}
     first = next((fields for _, line in body if all(fields := split_row(line, layout.delimiter))), [])
@@ -66,11 +67,14 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
         found = _read(text, layout, {"dtype": kinds, "na_values": _MISSING})
     except ValueError:
         found = _read(text, layout, {"dtype": str})  # slower, and it tells which field is wrong
+    if len(found) != len(body):
+        number = next((number for number, line in body if line.count('"') % 2), body[0][0])
+        raise ValueError(f"line {number}: a quote is opened and not closed in its line; take it out, or close it")
     made = _table({name: found[name] for name in wanted}, body, layout)
     for name in words:
         _require_words(found[name], name, body, layout)
     left_out = tuple(f"Left out: '{name}' holds words, not numbers." for name in layout.names if name in words)
-    return replace(made, notes=(*made.notes, *left_out, *layout.notes))
+    return replace(made, notes=(*made.notes, *left_out, *comments, *layout.notes))
 
 
 def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
@@ -149,6 +153,21 @@ def _lines(text: str, settings: CsvMap) -> list[Line]:
         if number > settings.skip_lines and line.strip():
             kept.append((number, line))
     return kept
+
+
+def _comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
+    """How many lines between the rows are comments. Raises ValueError for one that has as many fields as a row."""
+    first, width = layout.body[0][0], len(layout.names)
+    found = [line for line in lines if line[0] > first and is_comment(line[1])]
+    for number, line in found if layout.delimiter != " " else ():
+        fields = split_row(line, layout.delimiter)
+        if len(fields) >= width > 1 and any(fields[1:]):
+            raise ValueError(
+                f"line {number} begins with '{line.lstrip()[0]}' as a comment does, but has the fields of a row; "
+                "correct it, or take it out"
+            )
+    count = f"{len(found)} comment line{'s' if len(found) > 1 else ''}"
+    return (f"Left out: {count} below the first row (line {found[0][0]}).",) if found else ()
 
 
 def _require_equal_rows(body: list[Line], layout: TableLayout) -> None:

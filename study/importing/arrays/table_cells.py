@@ -16,13 +16,16 @@ EMPTY = (
     "1.#ind", "-1.#ind", "nan(ind)", "-nan(ind)",
 )  # fmt: skip
 COMMENTS = ("#", "%")
+_ERRORS = (NOT_AVAILABLE, "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#null!")
+"""Cells of a spreadsheet that begin like a comment, but are none."""
+_LONGEST_ERROR = 8
 _LIKE_A_NUMBER = re.compile(r"[-+]?[.,]?\d[\d.,:/' \u00a0\u202f-]*(?:[dDeE][-+]?\d+)?(?P<rest>.*)")
 _BRACKETED = re.compile(r"[\[(].*[\])]")
 
 
 def is_comment(line: str) -> bool:
     begin = line.lstrip()
-    return begin.startswith(COMMENTS) and not begin.lower().startswith(NOT_AVAILABLE)
+    return begin.startswith(COMMENTS) and not begin[:_LONGEST_ERROR].lower().startswith(_ERRORS)
 
 
 def split_row(line: str, delimiter: str) -> list[str]:

@@ -1,6 +1,6 @@
 """Read the sheets of a workbook (.xlsx) as tables: their cells are written as lines, and read as those of a text file.
 
-A sheet that holds no rows of numbers is left out. Of several others each is named (`Run 1/force [N]`), as a part.
+A sheet that is hidden or holds no rows of numbers is left out. Of several others each is named (`Run 1/force [N]`), as a part.
 """
 
 import io
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from study.importing.arrays.csv_arrays import MOST_ROWS, Table, read_lines
-from study.importing.arrays.table_cells import Line
+from study.importing.arrays.table_cells import Line, is_comment
 from study.importing.map_format.import_map import CsvMap
 from study.regular_file import read_regular
 from study.store.disk.declared_size import SizeLimit
@@ -29,16 +29,19 @@ def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
     """Raises OSError; ValueError with the sheet and what is wrong in it."""
     book = _open(read_regular(path))
     try:
-        sheets = {sheet.title: list(_rows(sheet)) for sheet in book.worksheets if settings.sheet in ("", sheet.title)}
+        hidden = [sheet.title for sheet in book.worksheets if sheet.sheet_state != "visible" and not settings.sheet]
+        read = [sheet for sheet in book.worksheets if sheet.title not in hidden]
+        sheets = {sheet.title: list(_rows(sheet)) for sheet in read if settings.sheet in ("", sheet.title)}
     finally:
         book.close()
-    if not sheets:
+    if not sheets and settings.sheet:
         raise ValueError(f"it has no sheet '{settings.sheet}'; there are {', '.join(book.sheetnames) or 'none'}")
     wanted = {name: rows for name, rows in sheets.items() if any(_is_of_numbers(cells) for _, cells in rows)}
     if not wanted:
-        raise ValueError("no sheet of it holds rows of numbers")
+        raise ValueError(f"no sheet of it{' that is not hidden' if hidden else ''} holds rows of numbers")
     tables = {name: _table(name, rows, settings) for name, rows in wanted.items()}
     left_out = tuple(f"Left out: the sheet '{name}' holds no rows of numbers." for name in sheets if name not in wanted)
+    left_out += tuple(f"Left out: the sheet '{name}' is hidden." for name in hidden)
     if len(tables) == 1:
         (only,) = tables.values()
         return replace(only, notes=(*left_out, *only.notes))
@@ -118,4 +121,5 @@ def _field(cell: Any) -> str:
         case timedelta():
             minutes, seconds = divmod(cell.total_seconds(), 60)
             return f"{int(minutes // 60)}:{int(minutes % 60):02d}:{seconds:09.6f}"
-    return " ".join(str(cell).replace('"', "").split())
+    text = " ".join(str(cell).replace('"', "").split())
+    return f'"{text}"' if is_comment(text) else text  # a sheet has no comments

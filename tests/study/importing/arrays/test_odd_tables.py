@@ -1,5 +1,7 @@
 """Tables as loggers really write them: delimiters at line ends, words beside numbers, cells that say "nothing"."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -153,3 +155,27 @@ def test_points_that_may_separate_thousands_are_refused_until_the_map_states_the
 def test_a_first_row_with_a_wrong_cell_does_not_become_the_header(tmp_path):
     with pytest.raises(ImportRefusedError, match="Line 3, column 'u \\[N\\]': '1'234' is not a number"):
         read(tmp_path, "t;u\ns;N\n0;1'234\n1;2'345\n2;300\n")
+
+
+@pytest.mark.parametrize("error", ["#DIV/0!", "#REF!", "#VALUE!", "#NAME?", "#NUM!", "#NULL!"])
+@pytest.mark.parametrize("row", [0, 2])
+def test_an_error_of_a_spreadsheet_is_no_comment(tmp_path, error, row):
+    rows = [f"{k / 8},{k}" for k in range(40)]
+    rows[row] = f"{error},{row}"
+    with pytest.raises(ImportRefusedError, match=f"(?i)line {row + 2}, column 'u': '{re.escape(error)}'"):
+        read(tmp_path, "\n".join(["u,v", *rows]))
+
+
+def test_comments_between_rows_are_counted_and_a_row_is_none(tmp_path):
+    found = read(tmp_path, "# made by hand\nt,u\n0,1.5\n# restarted,\n# again\n1,2.5\n2,3.5\n")
+    np.testing.assert_array_equal(found.by_name["u"], [1.5, 2.5, 3.5])
+    assert found.notes == ("Left out: 2 comment lines below the first row (line 4).",)
+    with pytest.raises(ImportRefusedError, match="Line 4 begins with '%' as a comment does, but has the fields"):
+        read(tmp_path, "t,u\n0,1.5\n1,2.5\n%2,3.5\n3,3.5\n")
+
+
+def test_a_quote_that_is_not_closed_swallows_no_rows(tmp_path):
+    rows = [f"{k},{k % 3},ok" for k in range(40)]
+    rows[10], rows[15] = '10,1,"start', '15,0,end"'
+    with pytest.raises(ImportRefusedError, match="Line 12: a quote is opened and not closed"):
+        read(tmp_path, "\n".join(["t,u,said", *rows]))

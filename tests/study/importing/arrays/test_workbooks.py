@@ -5,11 +5,11 @@ from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
-from openpyxl import Workbook
+from openpyxl import Workbook, load_workbook
 
 from study.importing.arrays.arrays import read_arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import header_map
+from study.importing.header_map import header_map, header_notes, header_problems
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 
@@ -68,6 +68,28 @@ def test_sheets_that_are_alike_are_parts_and_one_without_numbers_is_left_out(boo
     assert [part["prefix"] for part in made.recording.meta["parts"]] == ["Run1/", "Run2/"]
     expected = [row[2] / 1000 for row in (*ROWS, *second)]
     np.testing.assert_allclose(made.recording.response.samples[:, 0], expected)
+
+
+@pytest.mark.parametrize(("names", "joined"), [(("Run1", "Run2"), True), (("Raw", "Filtered"), False)])
+def test_only_numbered_sheets_are_put_one_after_another_and_it_is_said(book, names, joined):
+    arrays = read_arrays(book(**{name: [NAMES, *ROWS] for name in names}), CsvMap())
+    wanted = header_map(arrays)
+    assert (wanted is not None) == joined
+    if wanted is None:
+        assert "2 parts are alike ('Raw' and 'Filtered')" in header_problems(arrays)[0]
+    else:
+        assert "Put one after another, as parts of one recording: 'Run1', 'Run2'." in header_notes(arrays, wanted)
+
+
+def test_a_hidden_sheet_is_left_out_with_a_note(book):
+    path = book(Run1=[NAMES, *ROWS], Run2=[NAMES, *ROWS])
+    whole = load_workbook(path)
+    whole["Run2"].sheet_state = "hidden"
+    whole.save(path)
+    found = read_arrays(path, CsvMap())
+    assert list(found.by_name) == NAMES
+    assert found.notes == ("Left out: the sheet 'Run2' is hidden.",)
+    assert list(read_arrays(path, CsvMap(sheet="Run2")).by_name) == NAMES
 
 
 def test_the_map_may_name_the_only_sheet(book):
