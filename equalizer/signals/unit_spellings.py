@@ -56,15 +56,20 @@ _WHOLE = {
     "deg. C": "degC", "degree C": "degC", "degrees C": "degC", "% RH": "%", "%RH": "%", "%rh": "%",
     "ozin": "ozf in", "inoz": "ozf in", "lbin": "lbf in", "inlb": "lbf in", "lbft": "lbf ft", "ftlb": "lbf ft",
     "lbfin": "lbf in", "lbfft": "lbf ft", "ozfin": "ozf in", "kgfcm": "kgf cm", "kgcm": "kgf cm", "gfcm": "gf cm",
-    "gcm": "gf cm", "N_m": "N m",
+    "gcm": "gf cm", "N_m": "N m", "kg f": "kgf", "lb f": "lbf", "g f": "gf",
 }  # fmt: skip
 _TORQUES = {
     "oz in": "ozf in", "in oz": "ozf in", "lb in": "lbf in", "in lb": "lbf in", "lb ft": "lbf ft", "ft lb": "lbf ft",
     "kg cm": "kgf cm", "g cm": "gf cm",
 }  # fmt: skip
 """A weight on a lever: a mass times a length is no signal, and its square (`oz in^2`) is an inertia."""
-_OFTEN_MEANT = {"pound": "lbf", "pounds": "lbf", "gram": "gf", "grams": "gf", "gs": "g", "c": "degC", "f": "degF"}
-"""Suggested only: pounds and grams are masses too."""
+_OFTEN_MEANT = {"pound": "lbf", "pounds": "lbf", "gram": "gf", "grams": "gf", "gs": "g", "nm": "N m"}
+_ALONE = {"c": "degC", "f": "degF", "g": "g"}
+"""Suggested only: pounds and grams are masses too, and a capital alone is another symbol than a small letter."""
+_ALIKE, _ALIKE_IN_PRODUCT = 0.8, 0.9
+"""Letters in common: of a unit that is suggested, and of each that was guessed in a product."""
+_RATE = re.compile(r"(m|mm|cm|um|rad|mrad|deg|rev)s\^-([12])")
+"""`ms-2` is written for m/s^2, never for one over milliseconds squared."""
 _PEAK = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.IGNORECASE)
 
 
@@ -76,16 +81,21 @@ def respell(text: str, known: Collection[str]) -> str:
     plain = _in_ascii(unicodedata.normalize("NFKC", _in_ascii(plain.replace("**", "^").replace("⁻", "-"))))
     plain = re.sub(r"\s*/\s*", "/", plain.strip().rstrip("."))
     plain = re.sub(r"(?<=[A-Za-z])(-[1-9]|[2-9])(?![A-Za-z0-9])", r"^\1", plain)
-    plain = _WHOLE.get(plain, plain)
+    plain = _RATE.sub(lambda rate: f"{rate[1]}/s" + ("^2" if rate[2] == "2" else ""), plain)
+    plain = _WHOLE.get(plain.replace("lbs", "lb"), plain)
     plain = re.sub(r"(?<=[A-Za-z0-9])[.-](?=[A-Za-z])", " ", plain)
     plain = re.sub(r"[A-Za-z]+", lambda word: _respell_symbol(word[0], known), plain)
     return _TORQUES.get(plain, plain)
 
 
 def nearest_unit(text: str, known: Collection[str]) -> str:
-    """The unit with each unknown symbol replaced by the nearest known one; empty where one has none."""
-    plain = respell(text, known)
-    near = {word: _nearest(word, known) for word in re.findall(r"[A-Za-z%]+", plain)}
+    """The unit with each unknown symbol replaced by the nearest known one, and without a minus behind a stroke; empty
+    where a symbol has none."""
+    plain = re.sub(
+        r"(/[A-Za-z]+)\^-([1-9])", lambda under: under[1] + f"^{under[2]}".removesuffix("^1"), respell(text, known)
+    )
+    words = re.findall(r"[A-Za-z%]+", plain)
+    near = {word: _nearest(word, known, len(words) == 1) for word in words}
     return re.sub(r"[A-Za-z%]+", lambda word: near[word[0]], plain) if all(near.values()) else ""
 
 
@@ -98,11 +108,15 @@ def _respell_symbol(word: str, known: Collection[str]) -> str:
     return word if word in known else _SPELLED.get(word.lower() if len(word) > 2 else word, word)
 
 
-def _nearest(word: str, known: Collection[str]) -> str:
+def _nearest(word: str, known: Collection[str], alone: bool) -> str:
+    """alone: whether it is the whole unit."""
     if word in known:
         return word
+    if len(word) == 1 and word.isupper():
+        return _ALONE.get(word.lower(), "") if alone else ""
     by_size = sorted(known, key=lambda symbol: (len(symbol), symbol.islower(), symbol[0] == word[0], symbol))
     # The last of a spelling counts: `mm` for `MM`, not `Mm`; `MPa` for `Mpa`.
     spelled = {**_SPELLED, **{symbol.lower(): symbol for symbol in by_size}, **_OFTEN_MEANT}
-    close = get_close_matches(word.lower(), spelled, n=1, cutoff=0.75)
+    spelled |= _ALONE if alone else {}
+    close = get_close_matches(word.lower(), spelled, n=1, cutoff=_ALIKE if alone else _ALIKE_IN_PRODUCT)
     return spelled[close[0]] if close else ""

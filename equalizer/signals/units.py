@@ -12,6 +12,17 @@ class UnknownUnitError(ValueError):
     """A unit that cannot be read, or that does not fit its quantity."""
 
 
+class _NotAUnitError(UnknownUnitError):
+    """Of the text and why; the suggestion takes long, and is made only where the error is shown."""
+
+    def __str__(self) -> str:
+        text, why = self.args
+        near = suggest_unit(text)
+        return (
+            f"'{text}' is not a unit known here{why}" + (f" (did you mean '{near}'?)" if near else "") + f"; {ALLOWED}"
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class Unit:
     """What a unit means: a value in it, times `factor`, plus `offset`, is in `si`."""
@@ -122,6 +133,8 @@ def parse_unit(text: str) -> Unit:
         raise UnknownUnitError(f"the unit is missing; {ALLOWED}")
     if text.strip() in _FIXED:
         return _FIXED[text.strip()]
+    if re.fullmatch(r"ms\^-[12]", text.strip()):  # meant is m/s, not one over milliseconds
+        raise _NotAUnitError(text, "")
     symbols: dict[str, int] = {}
     factor = 1.0
     dimension: Dimension = (0,) * 6
@@ -147,9 +160,12 @@ def check_quantity(quantity: str, unit: Unit) -> None:
 
 def force_hint(quantity: str, unit: Unit) -> str:
     """What to write for a force that is stated as a mass, or in grams; empty for others."""
-    if quantity not in ("force", "torque") or unit.si not in ("kg", "m/s^2"):
-        return ""
-    return "; as a force write lbf, ozf or kgf" if unit.si == "kg" else "; grams as a force are written gf"
+    grams = unit.si == "m/s^2" and unit.factor == _FIXED["g"].factor
+    if quantity == "force" and (grams or unit.si == "kg"):
+        return "; grams as a force are written gf" if grams else "; as a force write lbf, ozf or kgf"
+    if quantity == "torque" and (grams or unit.si in ("kg", "kg m")):
+        return "; as a torque write ozf in, lbf ft, gf cm or kgf cm"
+    return ""
 
 
 def quantity_of(si: str) -> str:
@@ -170,17 +186,19 @@ def _parse_factors(text: str) -> list[tuple[str, int]]:
     found = [_parse_power(factor, 1, text) for factor in numerator.split()]
     for part in denominators:
         if len(part.split()) != 1:
-            raise _unknown_unit_error(text, " (after each stroke stands exactly one symbol, as in N m s/rad or m/s/V)")
+            raise _NotAUnitError(text, " (after each stroke stands exactly one symbol, as in N m s/rad or m/s/V)")
+        if "-" in part:
+            raise _NotAUnitError(text, " (after a stroke an exponent has no minus, as in m/s^2)")
         found.append(_parse_power(part.strip(), -1, text))
     if not numerator.strip():
-        raise _unknown_unit_error(text)
+        raise _NotAUnitError(text, "")
     return found
 
 
 def _parse_power(factor: str, sign: int, text: str) -> tuple[str, int]:
     match = re.fullmatch(r"([A-Za-z%]+|1)(?:\^(-?[1-9]))?", factor)
     if not match:
-        raise _unknown_unit_error(text)
+        raise _NotAUnitError(text, "")
     return match[1], sign * int(match[2] or 1)
 
 
@@ -192,7 +210,7 @@ def _parse_symbol(symbol: str, text: str) -> Unit:
     prefix, base = symbol[0], symbol[1:]
     if prefix in _PREFIXES and base in _PREFIXABLE:
         return Unit(base, _PREFIXES[prefix], _PREFIXABLE[base])
-    raise _unknown_unit_error(text)
+    raise _NotAUnitError(text, "")
 
 
 def _format_symbols(symbols: dict[str, int]) -> str:
@@ -203,15 +221,6 @@ def _format_symbols(symbols: dict[str, int]) -> str:
 
 def _format_power(symbol: str, power: int) -> str:
     return symbol if power == 1 else f"{symbol}^{power}"
-
-
-def _unknown_unit_error(text: str, why: str = "") -> UnknownUnitError:
-    return UnknownUnitError(f"'{text}' is not a unit known here{why}{_suggest_unit(text)}; {ALLOWED}")
-
-
-def _suggest_unit(text: str) -> str:
-    near = suggest_unit(text)
-    return f" (did you mean '{near}'?)" if near else ""
 
 
 def suggest_unit(text: str) -> str:

@@ -11,6 +11,7 @@ from study.importing.imposed_roles import IMPOSED, NOT_IMPOSED, turn_imposed
 from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap, PartMap
 from study.importing.map_format.signal_words import (
     ParsedName,
+    is_peak_value,
     may_be_imposed,
     name_signal,
     open_roles,
@@ -62,7 +63,13 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     left_out = [f"Left out: '{name}' {why}." for name, why in surplus_arrays(table).items()]
     others = [name for name, array in arrays.by_name.items() if not array.ndim and name != wanted.clock[0].rate]
     left_out += [f"Left out: '{name}' is no column." for name in others]
+    peaks = [f"'{channel.value}'" for channel in wanted.channel if is_peak_value(_bracketed(channel.value))]
+    joined += [f"Rms or peak values by their unit, kept as they are: {', '.join(peaks)}."] if peaks else []
     return (f"Taken from the header: {told}.", *joined, *left_out, *_direction_notes(table, wanted))
+
+
+def _bracketed(header: str) -> str:
+    return header.partition("[")[2].removesuffix("]") or header.partition("(")[2].removesuffix(")")
 
 
 def _direction_notes(table: Arrays, wanted: ImportMap) -> tuple[str, ...]:
@@ -102,7 +109,7 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
         names = " and ".join(f"'{prefix.rstrip('/_')}'" for prefix in prefixes[:_NAMED])
         return (
             f"its {len(prefixes)} parts are alike ({names}), but not numbered as repeats are: keep the [[part]] of one "
-            f'in the map{", or name its sheet, as in sheet = ... under [csv]" if arrays.path.suffix in WORKBOOKS else ""}',
+            f"in the map{', or name its sheet, as in sheet = ... under [csv]' if arrays.path.suffix in WORKBOOKS else ''}",
         )
     if len({array.shape for array in table.by_name.values()}) != 1:
         return ("its arrays have several lengths",)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from equalizer.signals.units import KNOWN_UNITS, UnknownUnitError, parse_unit, plain_unit, suggest_unit
+from equalizer.signals.units import KNOWN_UNITS, UnknownUnitError, check_quantity, parse_unit, plain_unit, suggest_unit
 
 
 @pytest.mark.parametrize(
@@ -17,7 +17,8 @@ from equalizer.signals.units import KNOWN_UNITS, UnknownUnitError, parse_unit, p
         ("lbf-in", "lbf in"), ("lb-ft", "lbf ft"), ("ft-lb", "lbf ft"), ("N·m", "N m"), ("N⋅m", "N m"),
         ("N-m", "N m"), ("N.m", "N m"), ("Newtons", "N"), ("lbs", "lb"), ("msec", "ms"), ("Sec", "s"),
         ("Volts", "V"), ("amps", "A"), ("A (peak)", "A"), ("Arms", "A"), ("° C", "deg C"), ("°C", "degC"),
-        ("㎜", "mm"), ("Upm", "rpm"), ("mm/sek", "mm/s"), ("㎏", "kg"), ("%", "%"),
+        ("ms-1", "m/s"), ("ms-2", "m/s^2"), ("ms^-1", "m/s"), ("ms^-2", "m/s^2"), ("rads-1", "rad/s"),
+        ("rads-2", "rad/s^2"), ("ftlbs", "lbf ft"), ("kg f", "kgf"), ("㎜", "mm"), ("Upm", "rpm"), ("mm/sek", "mm/s"), ("㎏", "kg"), ("%", "%"),
     ],
 )  # fmt: skip
 def test_a_spelling_of_others_is_understood(spelled, unit):
@@ -35,7 +36,8 @@ def test_what_is_written_here_stays(unit):
     ("unknown", "near"),
     [
         ("MM", "mm"), ("Mpa", "MPa"), ("newt", "N"), ("pound", "lbf"), ("grams", "gf"), ("mm/secnd", "mm/s"),
-        ("furlong", ""), ("a.u.", ""), ("V/N/furlong", ""),
+        ("m/s-2", "m/s^2"), ("rad/s-1", "rad/s"), ("cm/min-1", "cm/min"), ("N/mm-1", "N/mm"), ("NM", "N m"),
+        ("inHg", ""), ("H", ""), ("in.Hg", ""), ("kg F", ""), ("C", "degC"), ("furlong", ""), ("a.u.", ""), ("V/N/furlong", ""),
     ],
 )  # fmt: skip
 def test_an_unknown_unit_is_refused_with_the_nearest_known(unknown, near):
@@ -51,3 +53,23 @@ def test_a_gram_force_is_a_thousandth_of_a_kilopond():
     assert parse_unit("gf").factor == pytest.approx(parse_unit("kgf").factor / 1000)
     assert parse_unit(plain_unit("kgf·cm")).factor == pytest.approx(9.80665 / 100)
     assert parse_unit(plain_unit("oz-in")).factor == pytest.approx(0.0070615518142260)
+
+
+@pytest.mark.parametrize("unit", ["ms^-1", "ms^-2", "m/s^-2", "N m/rad^-1"])
+def test_an_exponent_that_says_the_contrary_of_what_is_meant_is_refused(unit):
+    with pytest.raises(UnknownUnitError, match="is not a unit known here"):
+        parse_unit(unit)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "hint"),
+    [
+        ("force", "g", "grams as a force are written gf"), ("force", "lb", "as a force write lbf"),
+        ("torque", "oz in", "as a torque write ozf in, lbf ft"), ("force", "m/s^2", ""), ("force", "V", ""),
+    ],
+)  # fmt: skip
+def test_a_mass_is_no_force_and_the_unit_of_force_is_said(quantity, unit, hint):
+    with pytest.raises(UnknownUnitError) as refused:
+        check_quantity(quantity, parse_unit(unit))
+    assert ("write" in str(refused.value) or "written" in str(refused.value)) == bool(hint)
+    assert hint in str(refused.value)

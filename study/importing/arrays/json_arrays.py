@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from study.importing.arrays.table_cells import is_empty, is_number
+from study.importing.arrays.table_layout import with_units
 from study.regular_file import open_regular, read_regular
 from study.store.disk.strict_json import load_json
 
@@ -88,10 +89,25 @@ def _of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[tup
     units = [value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)]
     lists = [entry for entry in value.values() if isinstance(entry, list)]
     if place and len(units) == 1 and len(lists) == 1:
-        yield (*place[:-1], f"{place[-1]} [{units[0]}]"), _array(lists[0])
+        for key, entry in value.items():
+            if isinstance(entry, list):
+                yield (*place[:-1], with_units([place[-1]], units)[0]), _array(entry)
+            elif key not in _UNIT_KEYS:
+                yield from _beside_values(entry, (*place, key))
         return
     for key, entry in value.items():
         yield from _arrays(entry, (*place, key))
+
+
+def _beside_values(entry: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
+    """Words beside values, as their description. Raises ValueError for what may change them, as a scale does."""
+    if entry is not None and (not isinstance(entry, str) or is_number(entry.strip(), ".")):
+        name = "/".join(place[:-1])
+        raise ValueError(
+            f"'{name}' has '{place[-1]}' beside its values, and whether that changes them is open; write the values as "
+            "they are in their unit, and take it out"
+        )
+    yield place, np.array(None, dtype=object)
 
 
 def _columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:

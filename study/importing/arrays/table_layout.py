@@ -27,7 +27,7 @@ from study.importing.arrays.table_cells import (
 from study.importing.arrays.table_marks import TableMarks, find_marks
 from study.importing.arrays.time_stamps import is_stamp
 from study.importing.map_format.import_map import CsvMap
-from study.importing.map_format.signal_words import name_signal
+from study.importing.map_format.signal_words import is_peak_value, name_signal
 
 _UNITLESS = (*EMPTY, "1")
 # From the text's begin or a bracket on: without that, the time of a search would grow with the square of the length.
@@ -70,7 +70,7 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
         header, units = _header_and_units(named[:-faulty], width, marks.decimal)
         begin -= 0 if header is None else faulty
     if header is not None:
-        names = _with_units(_name_columns(header), units)
+        names = with_units(_name_columns(header), units)
     elif begin == 0 or (len(above[-1]) == 1 < width and all(len(row) != width for row in above)):  # remarks
         names = [f"column{k + 1}" for k in range(width)]
     else:
@@ -197,17 +197,18 @@ def _name_columns(header: Sequence[str]) -> list[str]:
     return [name or f"column{number}" for number, name in enumerate(header, start=1)]
 
 
-def _with_units(header: Sequence[str], units: Sequence[str] | None) -> list[str]:
+def with_units(header: Sequence[str], units: Sequence[str] | None) -> list[str]:
     """Names with their units in brackets. Raises ValueError where a name states another unit."""
     if units is None:
         return list(header)
     found = []
     for name, field in zip(header, units, strict=True):
-        unit, said = plain_unit(_bare(field)), name_signal(name)
+        stated, said = _bare(field), name_signal(name)
+        unit = plain_unit(stated)
         if unit.lower() in _UNITLESS:
             found.append(name)
             continue
         if said.unit and said.sure and is_unit(unit) and parse_unit(said.unit) != parse_unit(unit):
             raise ValueError(f"its header says {said.unit} in '{name}', and its row of units says {unit}")
-        found.append(name if said.unit == unit else f"{name} [{unit}]")
+        found.append(name if said.unit == unit else f"{name} [{stated if is_peak_value(stated) else unit}]")
     return found

@@ -44,7 +44,7 @@ def is_stamp(field: str) -> bool:
 
 def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
     """None unless each field is a stamp or missing, and they are of one kind. Raises ValueError for dates whose order
-    is open, or that do not exist."""
+    is open, for stamps that do not exist, or that have a zone only in part."""
     given = fields.notna()
     text = fields[given].str.strip()
     if text.empty or not text.map(is_stamp).all():
@@ -55,7 +55,7 @@ def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
         return None
     values = np.zeros(len(text))
     if has_clock.all():
-        values += _of_clock(parts)
+        values += _of_clock(text, parts)
     if has_date.all():
         values += _of_dates(parts["date"])
     every = np.full(len(fields), np.nan)
@@ -63,7 +63,11 @@ def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
     return StampColumn(every, bool(has_date.all()), bool(has_clock.all()), str(text.iloc[0]))
 
 
-def _of_clock(parts: "pd.DataFrame") -> Seconds:
+def _of_clock(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
+    for place in np.flatnonzero((parts["minute"].astype(int) > 59) | (parts["second"].str[:2].astype(int) > 59)):
+        raise ValueError(f"'{text.iloc[place]}' is no clock time, with more than 59 minutes or seconds")
+    if parts["zone"].isna().any() != parts["zone"].isna().all():
+        raise ValueError("some of its clock times have a zone, others none; write all with it, or all without")
     second = parts["second"].str.replace(r"[,:]", ".", regex=True).astype(float)
     hour = parts["hour"].astype(float)
     half = parts["half"].fillna("").str.lower().str[:1]

@@ -4,15 +4,16 @@ A sheet that is hidden or holds no rows of numbers is left out. Of several other
 """
 
 import io
+import re
 import warnings
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from study.importing.arrays.csv_arrays import MOST_ROWS, Table, read_lines
+from study.importing.arrays.csv_arrays import Table, read_lines
 from study.importing.arrays.table_cells import Line, is_comment
 from study.importing.map_format.import_map import CsvMap
 from study.regular_file import read_regular
@@ -23,6 +24,14 @@ if TYPE_CHECKING:
 
 _BEGIN_OF_OLD = b"\xd0\xcf\x11\xe0"
 _DELIMITER = "\t"
+_MOST_ROWS, _MOST_COLUMNS = 2**20, 2**14
+"""Of a sheet, by the standard."""
+_MOST_CELLS = 2**24
+_PERCENT = re.compile(r"%|percent|pct", re.IGNORECASE)
+
+
+class _Percent(float):
+    """A number that its sheet shows times 100, with a percent sign."""
 
 
 def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
@@ -70,13 +79,26 @@ def _open(data: bytes) -> "Workbook":
 def _rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
     """Rows that hold something, with their numbers."""
     sheet.reset_dimensions()  # some programs state fewer rows than they write
+    filled = 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for number, cells in enumerate(sheet.iter_rows(values_only=True), start=1):
-            if number > MOST_ROWS:
-                raise ValueError(f"it has more than {MOST_ROWS} rows; save it as .npz or .h5")
-            if any(cell is not None for cell in cells):
-                yield number, cells
+        for number, cells in enumerate(sheet.iter_rows(), start=1):
+            if number > _MOST_ROWS or len(cells) > _MOST_COLUMNS:
+                raise ValueError(
+                    f"sheet '{sheet.title}' has cells beyond the {_MOST_ROWS} rows and {_MOST_COLUMNS} columns of a sheet"
+                )
+            row = tuple(_value(cell) for cell in cells)
+            width = _width(row)
+            filled += width
+            if filled > _MOST_CELLS:
+                raise ValueError(f"it has more than {_MOST_CELLS} cells; save its sheets as .csv")
+            if width:
+                yield number, row[:width]
+
+
+def _value(cell: Any) -> Any:
+    value = cell.value
+    return _Percent(value) if isinstance(value, int | float) and "%" in cell.number_format else value
 
 
 def _is_of_numbers(cells: Sequence[Any]) -> bool:
@@ -87,10 +109,16 @@ def _is_of_numbers(cells: Sequence[Any]) -> bool:
 
 
 def _table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: CsvMap) -> Table:
-    width = max(_width(cells) for _, cells in rows)
+    width = max(len(cells) for _, cells in rows)
+    percents = {
+        place
+        for _, cells in rows
+        for place, cell in enumerate(cells)
+        if isinstance(cell, str) and _PERCENT.search(cell)
+    }
     try:
         return read_lines(
-            [_line(number, cells, width) for number, cells in rows], replace(settings, delimiter=_DELIMITER)
+            [_line(number, cells, width, percents) for number, cells in rows], replace(settings, delimiter=_DELIMITER)
         )
     except ValueError as problem:
         said = "" if settings.sheet else "; to read another sheet alone, the map names it: sheet = ... under [csv]"
@@ -101,8 +129,12 @@ def _width(cells: Sequence[Any]) -> int:
     return max((place for place, cell in enumerate(cells, start=1) if cell is not None), default=0)
 
 
-def _line(number: int, cells: Sequence[Any], width: int) -> Line:
-    fields = [_field(cell) for cell in cells[:width]]
+def _line(number: int, cells: Sequence[Any], width: int, percents: Collection[int]) -> Line:
+    """percents: columns of which some cell says percent; their numbers are taken as they are shown."""
+    fields = [
+        f"{cell * 100:.15g}" if isinstance(cell, _Percent) and place in percents else _field(cell)
+        for place, cell in enumerate(cells)
+    ]
     return number, _DELIMITER.join([*fields, *[""] * (width - len(fields))])
 
 
@@ -113,7 +145,7 @@ def _field(cell: Any) -> str:
         case bool():
             return str(int(cell))
         case int() | float():
-            return repr(cell)
+            return float.__repr__(cell) if isinstance(cell, float) else repr(cell)
         case datetime():
             return cell.isoformat(" ")
         case date() | time():

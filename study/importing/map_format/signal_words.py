@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from equalizer.signals.units import (
+    QUANTITY_UNITS,
+    UNSTATED,
     UnknownUnitError,
     check_quantity,
     force_hint,
@@ -20,6 +22,8 @@ from study.importing.map_format.import_map import SignalRole
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+(?:\([^\[\]()]*\))?)[\])]\s*")
 _SAID_BEHIND = re.compile(r"(?<=\w)(?:\s*/\s*|\s*,\s+|\s+in\s+)(?=\S)")
 """`force / N`, `force, N`, `Kraft in N`: as standards and testing machines write it."""
+_NO_UNITS = ("n/a", "na", "none", "-", "--")
+_PEAK = re.compile(r"(?<![a-z])(peak|pk|rms)\b|(?<=[av])(peak|pk|rms)\b", re.IGNORECASE)
 LONGEST_NAME = 300
 """Characters; no channel is called by more, and to search for a unit in them takes time by the square."""
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
@@ -101,7 +105,13 @@ def unit_in(header: str) -> tuple[str, str]:
     match = _BRACKETED.fullmatch(header) if len(header) <= LONGEST_NAME else None
     if not match or not match["name"].strip():
         return header, ""
-    return match["name"].strip(), plain_unit(match["unit"].strip())
+    unit = match["unit"].strip()
+    return match["name"].strip(), "" if unit.lower() in _NO_UNITS else plain_unit(unit)
+
+
+def is_peak_value(unit: str) -> bool:
+    """Whether a unit as a file states it says that its numbers are rms or peak values (`A (peak)`, `mV_rms`)."""
+    return plain_unit(unit) != unit and _PEAK.search(unit) is not None
 
 
 def name_signal(header: str) -> ParsedName:
@@ -117,6 +127,8 @@ def name_signal(header: str) -> ParsedName:
     except UnknownUnitError:
         return ParsedName(header, name, "", word, _unknown(unit) if unit else "")
     by_unit = "time" if known.si == "s" else quantity_of(known.si)
+    if by_unit == known.si != UNSTATED and word not in ("setting", *QUANTITY_UNITS):
+        return ParsedName(header, name, told, by_unit, f"what is measured in {told} is not known")
     if not word:
         doubt = "" if unit else f"whether {told} is its unit is not sure, for no word says what it is"
         return ParsedName(header, name, told, by_unit, doubt)

@@ -12,7 +12,13 @@ _LONGEST_NUMBER = 40
 def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
     """Parse JSON. with_nan: NaN is accepted for unknown numbers. Raises only ValueError, with a sentence fragment."""
     try:
-        found = json.loads(text, parse_constant=None if with_nan else _refuse, parse_float=_finite, parse_int=_whole)
+        found = json.loads(
+            text,
+            parse_constant=None if with_nan else _refuse,
+            parse_float=_finite,
+            parse_int=_whole,
+            object_pairs_hook=_without_doubles,
+        )
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     _check(found)
@@ -34,6 +40,14 @@ def _check(found: Any) -> None:
                 value.encode()
             except UnicodeEncodeError:
                 raise ValueError("a text in it has half of a character (a lone surrogate)") from None
+
+
+def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"a record in it has '{max(names, key=names.count)}' twice")
+    return found
 
 
 def _refuse(constant: str) -> None:

@@ -3,7 +3,7 @@ import pytest
 
 from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import header_map, header_problems
+from study.importing.header_map import header_map, header_notes, header_problems
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_toml import parse_map
 from study.importing.map_format.signal_words import name_signal, propose_roles, unit_in
@@ -257,3 +257,26 @@ def test_a_number_in_hertz_is_the_rate_of_an_archive_and_its_runs_are_parts(tmp_
 def test_a_rate_without_a_unit_is_not_guessed_and_of_two_none_is_chosen(tmp_path, beside, problem):
     np.savez(tmp_path / "a.npz", force_N=np.ones(400), displacement_mm=np.ones(400), **beside)
     assert any(problem in said for said in header_problems(read_arrays(tmp_path / "a.npz", CsvMap())))
+
+
+@pytest.mark.parametrize("none", ["N/A", "n/a", "-"])
+def test_no_unit_may_be_said_in_brackets(none):
+    assert (name_signal(f"force [{none}]").unit, name_signal(f"force [{none}]").doubt) == ("", "")
+
+
+@pytest.mark.parametrize("header", ["p [bar g]", "pressure [bar g]", "x [N V]"])
+def test_a_unit_of_nothing_that_is_known_is_doubted(header):
+    assert "what is measured in" in name_signal(header).doubt
+
+
+@pytest.mark.parametrize(("unit", "said"), [("A rms", True), ("A (peak)", True), ("Arms", True), ("A", False)])
+def test_rms_and_peak_values_are_kept_with_a_note(tmp_path, unit, said):
+    for header in (f"time [s],current [{unit}],speed [rpm]", f"time,current,speed\ns,{unit},rpm"):
+        held = arrays(tmp_path, header.partition("\n")[0])
+        text = held.path.read_text().partition("\n")[2]
+        held.path.write_text(f"{header}\n{text}")
+        held = read_arrays(held.path, CsvMap())
+        wanted = header_map(held)
+        assert wanted is not None
+        assert wanted.channel[0].unit == "A"
+        assert any("Rms or peak values" in note for note in header_notes(held, wanted)) == said

@@ -7,7 +7,7 @@ import pytest
 
 from study.importing.arrays.arrays import read_arrays
 from study.importing.arrays.json_arrays import is_own_document
-from study.importing.header_map import header_map
+from study.importing.header_map import header_map, header_notes
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 
@@ -61,14 +61,15 @@ def test_units_beside_values_need_no_map(tmp_path):
         tmp_path,
         {
             "time": {"unit": "ms", "values": values},
-            "force": {"unit": "N", "values": values},
+            "force": {"unit": "N", "values": values, "name": "of the cell"},
             "speed": {"unit": "rad/sec", "values": values},
         },
     )
-    assert list(found.by_name) == ["time [ms]", "force [N]", "speed [rad/sec]"]
+    assert [name for name, array in found.by_name.items() if array.ndim] == ["time [ms]", "force [N]", "speed [rad/s]"]
     wanted = header_map(found)
     assert wanted is not None
     assert [(channel.role, channel.unit) for channel in wanted.channel] == [("command", "N"), ("response", "rad/s")]
+    assert "Left out: 'force/name' is no column." in header_notes(found, wanted)
 
 
 def test_dates_become_seconds(tmp_path):
@@ -88,6 +89,11 @@ def test_dates_become_seconds(tmp_path):
         ("[" * 100 + "]" * 100, "nested"),
         ("[]", "no arrays"),
         ("{}", "no arrays"),
+        ('{"t": [1, 2], "u": [1, 2], "t": [3, 4]}', "has 't' twice"),
+        ('{"t": 1, "t": 2}\n{"t": 3, "t": 4}', "has 't' twice"),
+        ({"f": {"unit": "N", "values": TIME, "scale": 2}, "t": TIME}, "'f' has 'scale' beside its values"),
+        ({"f": {"unit": "N", "values": TIME, "gain": "0.5"}, "t": TIME}, "'f' has 'gain' beside its values"),
+        ({"f [lbf]": {"unit": "N", "values": TIME}, "t": TIME}, "header says lbf in 'f [lbf]'"),
         ({"format": "hapteq.diagnosis/1"}, "a document of ours"),
     ],
 )

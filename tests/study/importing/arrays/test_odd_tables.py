@@ -179,3 +179,16 @@ def test_a_quote_that_is_not_closed_swallows_no_rows(tmp_path):
     rows[10], rows[15] = '10,1,"start', '15,0,end"'
     with pytest.raises(ImportRefusedError, match="Line 12: a quote is opened and not closed"):
         read(tmp_path, "\n".join(["t,u,said", *rows]))
+
+
+@pytest.mark.parametrize(
+    ("stamps", "said"),
+    [
+        (("12:00:00+01:00", "12:00:01"), "some of its clock times have a zone, others none"),
+        (("12:75:00", "12:76:00"), "'12:75:00' is no clock time"),
+        (("12:00:59.5", "12:00:60.5"), "'12:00:60.5' is no clock time"),
+    ],
+)
+def test_clock_times_that_cannot_be_are_refused(tmp_path, stamps, said):
+    with pytest.raises(ImportRefusedError, match=f"(?i){re.escape(said)}"):
+        read(tmp_path, "when,u\n" + "".join(f"{stamp},1.5\n" for stamp in stamps))

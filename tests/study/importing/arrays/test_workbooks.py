@@ -151,3 +151,13 @@ def test_a_workbook_with_a_broken_member_is_a_named_error(book, tmp_path, member
                     spoiled.writestr(name, content)
         with pytest.raises(ImportRefusedError):
             read_arrays(tmp_path / "b.xlsx", CsvMap())
+
+
+@pytest.mark.parametrize(("header", "factor"), [("humidity [%]", 100), ("humidity", 1)])
+def test_percents_are_read_as_they_are_shown_where_the_header_says_percent(book, header, factor):
+    path = book(Data=[[*NAMES, header], *[(*row, 0.07) for row in ROWS]])
+    whole = load_workbook(path)
+    for cell in whole["Data"]["D"][1:]:
+        cell.number_format = "0.0%"
+    whole.save(path)
+    np.testing.assert_allclose(read_arrays(path, CsvMap()).by_name[header], 0.07 * factor, rtol=1e-15)
