@@ -107,9 +107,10 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
     table, prefixes = _table(arrays)
     if len({_NUMBER.sub("", prefix) for prefix in prefixes}) > 1:
         names = " and ".join(f"'{prefix.rstrip('/_')}'" for prefix in prefixes[:_NAMED])
+        sheet = ", or name its sheet, as in sheet = ... under [csv]" if arrays.path.suffix in WORKBOOKS else ""
         return (
             f"its {len(prefixes)} parts are alike ({names}), but not numbered as repeats are: keep the [[part]] of one "
-            f"in the map{', or name its sheet, as in sheet = ... under [csv]' if arrays.path.suffix in WORKBOOKS else ''}",
+            f"in the map{sheet}",
         )
     if len({array.shape for array in table.by_name.values()}) != 1:
         return ("its arrays have several lengths",)

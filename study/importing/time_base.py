@@ -22,6 +22,8 @@ LEFT_OUT = 0.02
 _USUAL_GAP = 3
 """Median steps from which on stamps leave a gap."""
 _HOUR_S = 3600.0
+_COUNTERS = (2**16, 2**24, 2**31, 2**32, 10**6, 10**9)
+"""Counts at which the clocks of loggers begin anew, in units of the file."""
 _PLAIN_DIGITS = (4, 5, 6)
 NUMBERED_HZ = 1.0
 """Nominal rate of samples without known time."""
@@ -106,7 +108,7 @@ def _from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
         raise ImportProblemError(
             f"clock '{clock.name}': {clock.time} has the shape {stamps_s.shape}; stamps are one row of two or more"
         )
-    if problem := _wrong_stamps(stamps_s, clock.time, unit.factor):
+    if problem := _wrong_stamps(stamps_s, _as_expression(clock.time, names), unit.factor):
         raise ImportProblemError(f"clock '{clock.name}': {clock.time} {problem}")
     rate_hz, places = _uniform(stamps_s)
     if places is not None and places[-1] >= MOST_SAMPLES:
@@ -122,8 +124,12 @@ def _from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
     return TimeBase(clock.name, rate_hz, stamps_s, places, gap_s)
 
 
+def _as_expression(time: str, names: Namespace) -> str:
+    return f"array('{time}')" if time in names.arrays and not time.isidentifier() else time
+
+
 def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
-    """Problem with the stamps, and the key that mends it; empty if they increase."""
+    """Problem with the stamps, and the key that mends it; empty if they increase. time: an expression."""
     if not np.isfinite(stamps_s).all():
         first = int(np.argmax(~np.isfinite(stamps_s)))
         return f"is no number at sample {first}; time is never missing"
@@ -132,6 +138,13 @@ def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
         first = int(np.argmax(steps_s < 0)) + 1
         back_s = float(-steps_s[first - 1])
         found = f"runs backwards at sample {first}, from {stamps_s[first - 1]:.9g} to {stamps_s[first]:.9g} s"
+        usual_s = float(np.median(steps_s))
+        turn = next((turn for turn in _COUNTERS if abs(back_s + usual_s - turn * unit_s) < 2 * usual_s), 0)
+        if turn and stamps_s.max() < turn * unit_s and stamps_s.min() >= 0:
+            return (
+                f"{found}, as a counter that begins anew at {turn}; the map's [[clock]] mends it: "
+                f'time = "{time} + {turn} * cumsum(diff({time}) < 0)"'
+            )
         if abs(back_s - _HOUR_S) > _HOUR_S / 60:
             return f"{found}; put the rows in order, or cut the file there into several, which are imported together"
         mended = f"{time} + {_HOUR_S / unit_s:g} * cumsum(diff({time}) < 0)"

@@ -18,7 +18,8 @@ from equalizer.signals.units import KNOWN_UNITS, UnknownUnitError, check_quantit
         ("N-m", "N m"), ("N.m", "N m"), ("Newtons", "N"), ("lbs", "lb"), ("msec", "ms"), ("Sec", "s"),
         ("Volts", "V"), ("amps", "A"), ("A (peak)", "A"), ("Arms", "A"), ("° C", "deg C"), ("°C", "degC"),
         ("ms-1", "m/s"), ("ms-2", "m/s^2"), ("ms^-1", "m/s"), ("ms^-2", "m/s^2"), ("rads-1", "rad/s"),
-        ("rads-2", "rad/s^2"), ("ftlbs", "lbf ft"), ("kg f", "kgf"), ("㎜", "mm"), ("Upm", "rpm"), ("mm/sek", "mm/s"), ("㎏", "kg"), ("%", "%"),
+        ("rads-2", "rad/s^2"), ("ftlbs", "lbf ft"), ("kg f", "kgf"),
+        ("㎜", "mm"), ("Upm", "rpm"), ("mm/sek", "mm/s"), ("㎏", "kg"), ("%", "%"),
     ],
 )  # fmt: skip
 def test_a_spelling_of_others_is_understood(spelled, unit):
@@ -37,7 +38,8 @@ def test_what_is_written_here_stays(unit):
     [
         ("MM", "mm"), ("Mpa", "MPa"), ("newt", "N"), ("pound", "lbf"), ("grams", "gf"), ("mm/secnd", "mm/s"),
         ("m/s-2", "m/s^2"), ("rad/s-1", "rad/s"), ("cm/min-1", "cm/min"), ("N/mm-1", "N/mm"), ("NM", "N m"),
-        ("inHg", ""), ("H", ""), ("in.Hg", ""), ("kg F", ""), ("C", "degC"), ("furlong", ""), ("a.u.", ""), ("V/N/furlong", ""),
+        ("inHg", ""), ("H", ""), ("in.Hg", ""), ("kg F", ""), ("C", "degC"),
+        ("furlong", ""), ("a.u.", ""), ("V/N/furlong", ""),
     ],
 )  # fmt: skip
 def test_an_unknown_unit_is_refused_with_the_nearest_known(unknown, near):

@@ -30,6 +30,8 @@ FOREIGN = (*TABLES, *WORKBOOKS, *RECORDS, ".npz", ".npy", ".mat")
 
 _CHECK = "Check the file; nothing else can be read from it."
 
+_MEND = "Do that, and import again; docs/importing.md lists the keys of a map."
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrays:
@@ -58,7 +60,8 @@ def read_arrays(path: Path, table: CsvMap) -> Arrays:
     except UnusableFileError as refused:
         raise ImportRefusedError(path.name, refused.happened, _CHECK) from refused
     except DAMAGED as problem:
-        raise ImportRefusedError(path.name, str(problem) or type(problem).__name__, _CHECK) from problem
+        words = str(problem) or type(problem).__name__
+        raise ImportRefusedError(path.name, words, _MEND if "; " in words else _CHECK) from problem
     if not found.by_name:
         raise ImportRefusedError(path.name, "it holds no arrays", "Check that it is the right file.")
     return Arrays(path, {name: np.squeeze(array) for name, array in found.by_name.items()}, found.clocks, found.notes)

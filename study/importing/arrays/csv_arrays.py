@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 MOST_ROWS = 20_000_000
 """Five hours at 1 kHz."""
 MOST_COLUMNS = 10_000
+_LONGEST_LINE = 2**20
+"""Characters: a hundred for each of so many columns."""
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
 _MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
 
@@ -146,10 +148,12 @@ def _seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], str] | N
 
 
 def _lines(text: str, settings: CsvMap) -> list[Line]:
+    if max(text.count("\n"), text.count("\r")) > MOST_ROWS:
+        raise ValueError(f"it has more than {MOST_ROWS} lines; save it as .npz or .h5")
     kept: list[Line] = []
     for number, line in enumerate(text.splitlines(), start=1):
-        if len(kept) > MOST_ROWS:
-            raise ValueError(f"it has more than {MOST_ROWS} rows; save it as .npz or .h5")
+        if len(line) > _LONGEST_LINE:
+            raise ValueError(f"line {number} has {len(line)} characters; up to {_LONGEST_LINE} are read")
         if number > settings.skip_lines and line.strip():
             kept.append((number, line))
     return kept

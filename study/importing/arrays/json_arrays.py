@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from study.importing.arrays.csv_arrays import MOST_COLUMNS
 from study.importing.arrays.table_cells import is_empty, is_number
 from study.importing.arrays.table_layout import with_units
 from study.regular_file import open_regular, read_regular
@@ -17,6 +18,8 @@ from study.store.disk.strict_json import load_json
 Array = npt.NDArray[Any]
 JSON_BYTES = 2**26
 """Largest JSON file: parsed, it takes some twenty times its bytes."""
+_MOST_OBJECTS, _MOST_VALUES = 2**21, 2**24
+"""Records take hundreds of bytes each, in memory."""
 _OURS = "hapteq"
 _OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
 _LOOKED_AT = 4096
@@ -48,6 +51,8 @@ def is_own_document(path: Path) -> bool:
 
 
 def _parse(text: str) -> Any:
+    if text.count("{") + text.count("[") > _MOST_OBJECTS or text.count(",") > _MOST_VALUES:
+        raise ValueError(f"it has more than {_MOST_OBJECTS} records or {_MOST_VALUES} values; save it as .csv or .npz")
     try:
         return load_json(text, with_nan=True)
     except ValueError as whole:
@@ -112,9 +117,13 @@ def _beside_values(entry: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[s
 
 def _columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
     """A column for each key of any record, missing where a record does not have it; objects inside a record one level
-    deep, as `imu.x`."""
+    deep, as `imu.x`. Raises ValueError where there are too many."""
     flat = [dict(_fields(record)) for record in records]
     keys = dict.fromkeys(key for record in flat for key in record)
+    if len(keys) > MOST_COLUMNS or len(keys) * len(flat) > _MOST_VALUES:
+        raise ValueError(
+            f"its {len(flat)} records have {len(keys)} keys; up to {MOST_COLUMNS} keys and {_MOST_VALUES} values are read"
+        )
     return {key: [record.get(key) for record in flat] for key in keys}
 
 

@@ -1,5 +1,6 @@
 """Errors of an import, with advice."""
 
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 from itertools import islice
@@ -8,6 +9,7 @@ from study.errors import StudyError, WrongUseError
 
 _LONGEST_WORD = 60
 _MOST_NAMES = 500
+_QUOTED = re.compile(rf"(?<!\w)'([^']{{{_LONGEST_WORD}}})[^']+'(?!\w)")
 
 NOTHING_WRITTEN = "Nothing was written."
 
@@ -22,7 +24,7 @@ class ImportRefusedError(StudyError):
     def __init__(self, what: str, problem: str, do_now: str = "") -> None:
         super().__init__(
             title=f"{what} cannot be imported",
-            happened=f"{problem[:1].upper()}{problem[1:].rstrip('.')}.",
+            happened=_sentence(problem),
             saved=NOTHING_WRITTEN,
             do_now=do_now or "Correct the map (docs/importing.md lists its keys) and import again.",
         )
@@ -34,12 +36,18 @@ class MapNeededError(WrongUseError):
     def __init__(self, file: str, why: str, skeleton: str) -> None:
         super().__init__(
             title=f"{file} needs a map",
-            happened=f"{why[:1].upper()}{why[1:].rstrip('.')}.",
+            happened=_sentence(why),
             saved=NOTHING_WRITTEN,
             do_now="A map for this file follows on the standard output: keep it as MAP.toml, complete it, and import "
             "again with --map MAP.toml.",
         )
         self.skeleton = skeleton
+
+
+def _sentence(problem: str) -> str:
+    """Names and fields shortened: those of a damaged file may have a million letters."""
+    short = _QUOTED.sub(r"'\1…'", problem)
+    return f"{short[:1].upper()}{short[1:].rstrip('.')}."
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

@@ -2,8 +2,9 @@
 of a file's channels."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 from equalizer.signals.units import (
@@ -26,6 +27,8 @@ _NO_UNITS = ("n/a", "na", "none", "-", "--")
 _PEAK = re.compile(r"(?<![a-z])(peak|pk|rms)\b|(?<=[av])(peak|pk|rms)\b", re.IGNORECASE)
 LONGEST_NAME = 300
 """Characters; no channel is called by more, and to search for a unit in them takes time by the square."""
+_REMEMBERED = 2**14
+"""Names: the headers of one file are asked for again and again."""
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _WORDS = {
     "force": ("force", "load", "thrust"),
@@ -65,6 +68,7 @@ _SAID: dict[str, SignalRole] = {
 }  # fmt: skip
 _SHORT: dict[str, SignalRole] = {"u": "command", "y": "response"}
 """Textbook names of input and output, if both exist and no `x`: then `y` would be an axis."""
+_Role = SignalRole | Literal[""]
 _DRIVES, _FEEDS = ("force", "torque"), ("current", "voltage")
 _MOTIONS, _PLACES = ("acceleration", "velocity"), ("position", "angle")
 
@@ -100,6 +104,7 @@ def _without_unit(column: ParsedName) -> str:
     return before if unit and unit == column.unit and not column.doubt else column.name
 
 
+@lru_cache(_REMEMBERED)
 def unit_in(header: str) -> tuple[str, str]:
     """Name and bracketed unit; the unit is empty if there is none."""
     match = _BRACKETED.fullmatch(header) if len(header) <= LONGEST_NAME else None
@@ -114,6 +119,7 @@ def is_peak_value(unit: str) -> bool:
     return plain_unit(unit) != unit and _PEAK.search(unit) is not None
 
 
+@lru_cache(_REMEMBERED)
 def name_signal(header: str) -> ParsedName:
     """Interpret one header."""
     name, unit = unit_in(header)
@@ -150,15 +156,15 @@ def roles_of(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
     command; accelerations and
     velocities are responses, or positions if there are no others; other known quantities are conditions. None if
     something is open or contradicted by a name (`open_roles` says what)."""
-    return None if open_roles(columns) else [role for column in columns if (role := _role(column, columns))]
+    return None if open_roles(columns) else [role for role in _roles(columns, _said_roles(columns)) if role]
 
 
 def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
     """What names and quantities leave open, one clause each; empty if they determine all roles."""
-    roles = [_role(column, columns) for column in columns]
+    every_said = _said_roles(columns)
+    roles = _roles(columns, every_said)
     found = []
-    for column, role in zip(columns, roles, strict=True):
-        said = _said_role(column, columns)
+    for column, role, said in zip(columns, roles, every_said, strict=True):
         if role == "helper" or (role and said not in ("", role)):
             found.append(f"whether '{column.header}' is to be compared, or is only a help to others")
         elif not role and column.quantity in _FEEDS:
@@ -174,40 +180,46 @@ def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def propose_roles(columns: Sequence[ParsedName]) -> list[SignalRole | Literal[""]]:
+def propose_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     """Roles by names, then by quantity; empty if open. A reference is a helper, and so are currents and voltages
     beside a force."""
-    return [_said_role(column, columns) or _role(column, columns) for column in columns]
+    said = _said_roles(columns)
+    return [told or role for told, role in zip(said, _roles(columns, said), strict=True)]
 
 
 def may_be_imposed(columns: Sequence[ParsedName]) -> bool:
     """Whether there are forces and places alone, and no name says which of them is the command."""
     quantities = {column.quantity for column in columns}
-    plain = not any(_said_role(column, columns) in ("command", "helper", "response") for column in columns)
+    plain = not {"command", "helper", "response"} & set(_said_roles(columns))
     return plain and bool(quantities & set(_DRIVES) and quantities & set(_PLACES)) and not quantities & set(_MOTIONS)
 
 
-def _role(column: ParsedName, columns: Sequence[ParsedName]) -> SignalRole | Literal[""]:
-    said = _said_role(column, columns)
+def _roles(columns: Sequence[ParsedName], said: Sequence[_Role]) -> list[_Role]:
+    by_quantity = _by_quantity(columns, said)
+    return [_role(column, told, by_quantity) for column, told in zip(columns, said, strict=True)]
+
+
+def _role(column: ParsedName, said: _Role, by_quantity: Mapping[str, SignalRole]) -> _Role:
     if said == "condition":
         return "condition"
-    if said == "command" and column.quantity in ("", "1") and "command" not in _by_quantity(columns).values():
+    if said == "command" and column.quantity in ("", "1") and "command" not in by_quantity.values():
         return "command"
     known = column.quantity not in ("", "1", "time", *_DRIVES, *_FEEDS, *_MOTIONS, *_PLACES)
-    return _by_quantity(columns).get(column.quantity, "condition" if known else "")
+    return by_quantity.get(column.quantity, "condition" if known else "")
 
 
-def _said_role(column: ParsedName, columns: Sequence[ParsedName]) -> SignalRole | Literal[""]:
-    words = [part.lower() for part in _WORD.findall(column.name)]
-    said: SignalRole | Literal[""] = next((_SAID[word] for word in words if word in _SAID), "")
-    firsts = {other.name.split("_")[0].lower() for other in columns}
-    if said or not {"u", "y"} <= firsts or "x" in firsts or not words:
-        return said
-    return _SHORT.get(words[0], "")
+def _said_roles(columns: Sequence[ParsedName]) -> list[_Role]:
+    firsts = {column.name.split("_")[0].lower() for column in columns}
+    short = _SHORT if {"u", "y"} <= firsts and "x" not in firsts else {}
+    found: list[_Role] = []
+    for column in columns:
+        words = [part.lower() for part in _WORD.findall(column.name)]
+        found.append(next((_SAID[word] for word in words if word in _SAID), short.get(words[0], "") if words else ""))
+    return found
 
 
-def _by_quantity(columns: Sequence[ParsedName]) -> dict[str, SignalRole]:
-    quantities = {column.quantity for column in columns if _said_role(column, columns) != "condition"}
+def _by_quantity(columns: Sequence[ParsedName], said: Sequence[_Role]) -> dict[str, SignalRole]:
+    quantities = {column.quantity for column, told in zip(columns, said, strict=True) if told != "condition"}
     answers = _MOTIONS if quantities & set(_MOTIONS) else _PLACES
     by_quantity: dict[str, SignalRole] = {}
     if quantities & set(_DRIVES):
@@ -219,6 +231,7 @@ def _by_quantity(columns: Sequence[ParsedName]) -> dict[str, SignalRole]:
     return by_quantity
 
 
+@lru_cache(_REMEMBERED)
 def unit_at_end(name: str) -> tuple[str, str]:
     """Name and unit at its end as in `displacement_mm`, `omega_rad_s`, `a_mps2`, `force / N` (the longest that is a
     unit); the whole name and empty if there is none."""

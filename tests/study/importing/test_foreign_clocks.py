@@ -1,5 +1,7 @@
 """Dates, clock times, gaps and equal clocks in files that were not prepared for an import."""
 
+import re
+
 import h5py
 import numpy as np
 import pytest
@@ -151,3 +153,32 @@ def test_a_device_that_moves_freely_has_a_command_of_zeros(files, tmp_path):
     assert all(key in str(refused.value) for key in keys)
     found = built(free + "\n[[computed]]\n" + "\n".join(keys), files()).recording
     assert not found.command.samples.any()
+
+
+@pytest.mark.parametrize(
+    ("time", "unit", "step"),
+    [
+        ((np.arange(200) * 1000) % 65536, "us", 1e-3),
+        ((2**32 - 50_000 + np.arange(100) * 1000) % 2**32, "us", 1e-3),
+        (np.arange(5000) / 1000 + 7200 - 3600 * (np.arange(5000) > 2000), "s", 1e-3),
+        (np.arange(5000) / 1000 + 7200 + 3600 * (np.arange(5000) > 2000), "s", 1e-3),
+    ],
+)
+@pytest.mark.parametrize("name", ["time [{}]", "t_{}"])
+def test_the_mend_that_is_said_of_a_clock_mends_it(tmp_path, time, unit, step, name):
+    header = name.format(unit)
+    path = table(
+        tmp_path, [f"{stamp:.9g}" if unit == "s" else f"{stamp:d}" for stamp in time], f"{header},fx_N,ax_mps2"
+    )
+    with pytest.raises(MapNeededError) as refused:
+        read_foreign((path,), None)
+    mended = re.search('mends it: (time = ".*")', refused.value.happened)
+    assert mended is not None
+    clock = f'[[clock]]\n{mended[1]}\ntime_unit = "{unit}"\n'
+    channels = "".join(
+        f'[[channel]]\nrole = "{role}"\nname = "{column}"\nvalue = "{column}"\nunit = "{of}"\n'
+        for role, column, of in (("command", "fx_N", "N"), ("response", "ax_mps2", "m/s^2"))
+    )
+    (tmp_path / "map.toml").write_text(f'device = "rig"\nhold = "zero-order"\n{clock}{channels}')
+    found = read_foreign((path,), str(tmp_path / "map.toml")).recording
+    assert (found.sample_rate_hz, len(found)) == (pytest.approx(1 / step), len(time))

@@ -108,3 +108,10 @@ def test_a_document_of_ours_is_told_from_a_table(tmp_path):
     (tmp_path / "d.json").write_text(json.dumps({"format": "hapteq-diagnosis", "version": 1}))
     assert not is_own_document(tmp_path / "a.json")
     assert is_own_document(tmp_path / "d.json")
+
+
+def test_records_with_keys_of_their_own_are_refused_at_once(tmp_path):
+    with pytest.raises(ImportRefusedError, match="5000 records have 5000 keys"):
+        read(tmp_path, [{f"k{k}": 1} for k in range(5000)])
+    with pytest.raises(ImportRefusedError, match="more than 2097152 records"):
+        read(tmp_path, "[" + "[]," * 2**21 + "[]]")

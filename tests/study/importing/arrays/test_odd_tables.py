@@ -192,3 +192,19 @@ def test_a_quote_that_is_not_closed_swallows_no_rows(tmp_path):
 def test_clock_times_that_cannot_be_are_refused(tmp_path, stamps, said):
     with pytest.raises(ImportRefusedError, match=f"(?i){re.escape(said)}"):
         read(tmp_path, "when,u\n" + "".join(f"{stamp},1.5\n" for stamp in stamps))
+
+
+def test_a_text_that_is_no_table_is_refused_before_it_takes_memory(tmp_path):
+    for text, said in (
+        ("t,u\n1," + "x" * 2**20, "Line 2 has 1048578 characters"),
+        ("t\n" + "\n" * 20_000_001, "lines"),
+    ):
+        with pytest.raises(ImportRefusedError, match=said):
+            read(tmp_path, text)
+
+
+def test_a_long_field_is_shortened_in_errors(tmp_path):
+    with pytest.raises(ImportRefusedError) as refused:
+        read(tmp_path, f"t,u\n0,1\n1,{'1x' * 500}\n2,3\n")
+    assert f"'{'1x' * 30}…' is not a number" in refused.value.happened
+    assert len(refused.value.happened) < 300

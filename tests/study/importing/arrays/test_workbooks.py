@@ -161,3 +161,29 @@ def test_percents_are_read_as_they_are_shown_where_the_header_says_percent(book,
         cell.number_format = "0.0%"
     whole.save(path)
     np.testing.assert_allclose(read_arrays(path, CsvMap()).by_name[header], 0.07 * factor, rtol=1e-15)
+
+
+def test_formulas_that_nothing_has_computed_are_said(book):
+    rows = [(time, force, f"=B{k}*2") for k, (time, force, _) in enumerate(ROWS, start=2)]
+    with pytest.raises(ImportRefusedError, match="Formulas of sheet 'Data' have no stored value; open it in"):
+        read_arrays(book(Data=[NAMES, *rows]), CsvMap())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (b'r="B5"', b'r="5B"', "Sheet 'Data' is damaged"),
+        (b"</sheetData>", b"", "Sheet 'Data' is damaged"),
+        (b'<row r="21"', b'<row r="99999999999"', "has cells beyond the 1048576 rows"),
+        (b"</row>", b"<c/>" * 20 + b"<c >" * 16385 * 21 + b"</row>", "cells in 21 rows; save the sheet as .csv"),
+    ],
+)
+def test_a_sheet_that_is_damaged_or_too_large_is_refused_in_one_sentence(book, tmp_path, old, new, said):
+    path = book(Data=[NAMES, *ROWS])
+    with zipfile.ZipFile(path) as whole, zipfile.ZipFile(tmp_path / "b.xlsx", "w", zipfile.ZIP_DEFLATED) as spoiled:
+        for name in whole.namelist():
+            content = whole.read(name)
+            spoiled.writestr(name, content.replace(old, new, 1) if "sheet1" in name else content)
+    with pytest.raises(ImportRefusedError) as refused:
+        read_arrays(tmp_path / "b.xlsx", CsvMap())
+    assert said in refused.value.happened
