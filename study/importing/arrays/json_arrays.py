@@ -122,7 +122,7 @@ def _columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
     keys = dict.fromkeys(key for record in flat for key in record)
     if len(keys) > MOST_COLUMNS or len(keys) * len(flat) > _MOST_VALUES:
         raise ValueError(
-            f"its {len(flat)} records have {len(keys)} keys; up to {MOST_COLUMNS} keys and {_MOST_VALUES} values are read"
+            f"its {len(flat)} records have {len(keys)} keys; up to {MOST_COLUMNS} and {_MOST_VALUES} values are read"
         )
     return {key: [record.get(key) for record in flat] for key in keys}
 

@@ -1,7 +1,7 @@
 """Read the sheets of a workbook (.xlsx) as tables: their cells are written as lines, and read as those of a text file.
 
-A sheet that is hidden or holds no rows of numbers is left out. Of several others each is named (`Run 1/force [N]`), as a
-part.
+A sheet that is hidden or holds no rows of numbers is left out. Of several others each is named (`Run 1/force [N]`), as
+a part.
 """
 
 import io

@@ -168,7 +168,9 @@ def test_a_device_that_moves_freely_has_a_command_of_zeros(files, tmp_path):
 def test_the_mend_that_is_said_of_a_clock_mends_it(tmp_path, time, unit, step, name):
     header = name.format(unit)
     path = table(
-        tmp_path, [f"{stamp:.9g}" if unit == "s" else f"{stamp:d}" for stamp in time], f"{header},fx_N,ax_mps2"
+        tmp_path,
+        [f"{stamp:.9g}" if unit == "s" else f"{stamp:d}" for stamp in time],
+        f"{header},force_N,acceleration_mps2",
     )
     with pytest.raises(MapNeededError) as refused:
         read_foreign((path,), None)
@@ -177,7 +179,7 @@ def test_the_mend_that_is_said_of_a_clock_mends_it(tmp_path, time, unit, step, n
     clock = f'[[clock]]\n{mended[1]}\ntime_unit = "{unit}"\n'
     channels = "".join(
         f'[[channel]]\nrole = "{role}"\nname = "{column}"\nvalue = "{column}"\nunit = "{of}"\n'
-        for role, column, of in (("command", "fx_N", "N"), ("response", "ax_mps2", "m/s^2"))
+        for role, column, of in (("command", "force_N", "N"), ("response", "acceleration_mps2", "m/s^2"))
     )
     (tmp_path / "map.toml").write_text(f'device = "rig"\nhold = "zero-order"\n{clock}{channels}')
     found = read_foreign((path,), str(tmp_path / "map.toml")).recording
