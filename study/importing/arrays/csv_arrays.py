@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.table_cells import EMPTY, Line, holds_number, is_comment, split_row
+from study.importing.arrays.table_cells import EMPTY, Line, holds_number, is_comment, is_text, split_row
 from study.importing.arrays.table_layout import TableLayout, find_layout
 from study.importing.arrays.table_marks import NO_THOUSANDS
 from study.importing.arrays.table_text import read_text
@@ -27,6 +27,7 @@ MOST_ROWS = 20_000_000
 MOST_COLUMNS = 10_000
 _LONGEST_LINE = 2**20
 """Characters: a hundred for each of so many columns."""
+_HOLDS_NUMBER = re.compile(r'(?:^|[,;\t|])[\s"]*[-+.]?\d[\d.,:eE+-]*[\s"]*(?:[,;\t|]|$)')
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
 _MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
 
@@ -80,19 +81,23 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
 
 
 def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
-    """Raises ValueError for a field that is neither a number nor, in a column of such, a date or a clock time."""
-    numbers, stamps = {}, {}
+    """Without columns of words alone. Raises ValueError for a field that is neither a number nor, in a column of such,
+    a date or a clock time."""
+    numbers, stamps, words = {}, {}, []
     for name, column in columns.items():
         if column.dtype == np.float64:
             numbers[name] = column.to_numpy()
         elif (found := read_stamps(column.mask(_is_missing(column)))) is not None:
             stamps[name] = found
+        elif all(map(is_text, column[~_is_missing(column)].str.strip())):
+            words.append(name)
         else:
             numbers[name] = _numbers(column, name, body, layout)
     joined = join_stamps(stamps)
     in_seconds = {name: _seconds_name(name, columns) for name in joined}
     every = numbers | {name: stamp.seconds - stamp.seconds[0] for name, stamp in joined.items()}
     notes = tuple(f"{name}: read as seconds since {stamp.first}." for name, stamp in joined.items())
+    notes += tuple(f"Left out: '{name}' holds words, not numbers." for name in words)
     by_name = {in_seconds.get(name, name): every[name] for name in columns if name in every}
     return Table(by_name, tuple(in_seconds.values()), notes)
 
@@ -156,7 +161,20 @@ def _lines(text: str, settings: CsvMap) -> list[Line]:
             raise ValueError(f"line {number} has {len(line)} characters; up to {_LONGEST_LINE} are read")
         if number > settings.skip_lines and line.strip():
             kept.append((number, line))
-    return kept
+    return _with_whole_header(kept)
+
+
+def _with_whole_header(lines: list[Line]) -> list[Line]:
+    """Names in quotes with a line break in them on one line; lines that hold a number stay as they are."""
+    begin = next((place for place, (_, text) in enumerate(lines) if _HOLDS_NUMBER.search(text)), 0)
+    joined: list[Line] = []
+    for number, text in lines[:begin]:
+        if joined and joined[-1][1].count('"') % 2:
+            joined[-1] = (joined[-1][0], f"{joined[-1][1]} {text}")
+        else:
+            joined.append((number, text))
+    closed = not any(text.count('"') % 2 for _, text in joined)
+    return [*joined, *lines[begin:]] if closed and len(joined) < begin else lines
 
 
 def _comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:

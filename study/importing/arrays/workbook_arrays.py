@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from study.importing.arrays.csv_arrays import Table, read_lines
-from study.importing.arrays.table_cells import Line, is_comment
+from study.importing.arrays.table_cells import Line, holds_number, is_comment
 from study.importing.map_format.import_map import CsvMap
 from study.regular_file import read_regular
 from study.store.disk.declared_size import DeclaredSizeError, SizeLimit
@@ -148,8 +148,12 @@ def _value(cell: Any) -> Any:
 def _is_of_numbers(cells: Sequence[Any]) -> bool:
     """Two numbers or more, or nothing else: a name with its value is a setting."""
     filled = [cell for cell in cells if cell is not None]
-    numbers = [cell for cell in filled if isinstance(cell, int | float)]
+    numbers = [cell for cell in filled if isinstance(cell, int | float) or _is_number_in_text(cell)]
     return len(numbers) > 1 or (bool(numbers) and len(numbers) == len(filled))
+
+
+def _is_number_in_text(cell: Any) -> bool:
+    return isinstance(cell, str) and any(holds_number([cell.strip()], mark) for mark in (".", ","))
 
 
 def _table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: CsvMap) -> Table:
@@ -160,9 +164,13 @@ def _table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: CsvMa
         for place, cell in enumerate(cells)
         if isinstance(cell, str) and _PERCENT.search(cell)
     }
+    # Numbers of a sheet have no decimal sign; texts that are numbers may have either.
+    pointed = any(isinstance(cell, float) and cell % 1 for _, cells in rows for cell in cells)
+    decimal = settings.decimal or ("." if pointed else "")
     try:
         return read_lines(
-            [_line(number, cells, width, percents) for number, cells in rows], replace(settings, delimiter=_DELIMITER)
+            [_line(number, cells, width, (percents, decimal or ".")) for number, cells in rows],
+            replace(settings, delimiter=_DELIMITER, decimal=decimal),
         )
     except ValueError as problem:
         said = "" if settings.sheet else "; to read another sheet alone, the map names it: sheet = ... under [csv]"
@@ -173,23 +181,26 @@ def _width(cells: Sequence[Any]) -> int:
     return max((place for place, cell in enumerate(cells, start=1) if cell is not None), default=0)
 
 
-def _line(number: int, cells: Sequence[Any], width: int, percents: Collection[int]) -> Line:
-    """percents: columns of which some cell says percent; their numbers are taken as they are shown."""
+def _line(number: int, cells: Sequence[Any], width: int, how: tuple[Collection[int], str]) -> Line:
+    """how: columns of which some cell says percent, whose numbers are taken as they are shown; the decimal sign."""
+    percents, decimal = how
     fields = [
-        f"{cell * 100:.15g}" if isinstance(cell, _Percent) and place in percents else _field(cell)
+        f"{cell * 100:.15g}".replace(".", decimal)
+        if isinstance(cell, _Percent) and place in percents
+        else _field(cell, decimal)
         for place, cell in enumerate(cells)
     ]
     return number, _DELIMITER.join([*fields, *[""] * (width - len(fields))])
 
 
-def _field(cell: Any) -> str:
+def _field(cell: Any, decimal: str) -> str:
     match cell:
         case None:
             return ""
         case bool():
             return str(int(cell))
         case int() | float():
-            return float.__repr__(cell) if isinstance(cell, float) else repr(cell)
+            return (float.__repr__(cell) if isinstance(cell, float) else repr(cell)).replace(".", decimal)
         case datetime():
             return cell.isoformat(" ")
         case date() | time():

@@ -208,3 +208,8 @@ def test_a_long_field_is_shortened_in_errors(tmp_path):
         read(tmp_path, f"t,u\n0,1\n1,{'1x' * 500}\n2,3\n")
     assert f"'{'1x' * 30}…' is not a number" in refused.value.happened
     assert len(refused.value.happened) < 300
+
+
+def test_a_name_in_quotes_may_hold_a_line_break(tmp_path):
+    rows = "".join(f"{t},{u}\n" for t, u in VALUES)
+    assert list(read(tmp_path, f'Rig 3\n"time\n[s]","force\n[N]"\n{rows}').by_name) == ["time [s]", "force [N]"]

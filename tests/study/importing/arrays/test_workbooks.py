@@ -187,3 +187,22 @@ def test_a_sheet_that_is_damaged_or_too_large_is_refused_in_one_sentence(book, t
     with pytest.raises(ImportRefusedError) as refused:
         read_arrays(tmp_path / "b.xlsx", CsvMap())
     assert said in refused.value.happened
+
+
+def test_numbers_of_a_sheet_need_no_decimal_sign_and_texts_may_be_numbers(book):
+    pointed = [(k, (1.125, 946, 2.375)[k % 3]) for k in range(40)]
+    assert read_arrays(book(Data=[["t", "u"], *pointed]), CsvMap()).by_name["u"][:3].tolist() == [1.125, 946, 2.375]
+    mixed = [[time, str(force).replace(".", ","), travel] for time, force, travel in ROWS]
+    found = read_arrays(book(Data=[NAMES, *mixed]), CsvMap(decimal=",")).by_name
+    np.testing.assert_array_equal(np.stack(list(found.values()), axis=1), ROWS)
+    for mark in ".,":
+        texts = [[f"{cell}".replace(".", mark) for cell in row] for row in ROWS]
+        found = read_arrays(book(Data=[NAMES, *texts]), CsvMap()).by_name
+        np.testing.assert_array_equal(np.stack(list(found.values()), axis=1), ROWS)
+
+
+def test_a_column_of_remarks_is_left_out_however_few_they_are(book):
+    rows = [[*row, "bump here" if k == 5 else None] for k, row in enumerate(ROWS)]
+    found = read_arrays(book(Data=[[*NAMES, "remarks"], *rows]), CsvMap())
+    assert list(found.by_name) == NAMES
+    assert found.notes == ("Left out: 'remarks' holds words, not numbers.",)
