@@ -180,10 +180,13 @@ def _with_whole_header(lines: list[Line]) -> list[Line]:
 def _comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
     """How many lines between the rows are comments. Raises ValueError for one that has as many fields as a row."""
     first, width = layout.body[0][0], len(layout.names)
-    found = [line for line in lines if line[0] > first and is_comment(line[1])]
-    for number, line in found if layout.delimiter != " " else ():
+    header = max((number for number, line in lines if number < first and not is_comment(line)), default=first)
+    below = [line for line in lines if line[0] > header and is_comment(line[1])]
+    found = [line for line in below if line[0] > first]
+    for number, line in below if layout.delimiter != " " else ():
         fields = split_row(line, layout.delimiter)
-        if len(fields) >= width > 1 and any(fields[1:]):
+        said = any(fields[1:]) if number > first else holds_number(fields[1:], layout.decimal)
+        if len(fields) >= width > 1 and said:
             raise ValueError(
                 f"line {number} begins with '{line.lstrip()[0]}' as a comment does, but has the fields of a row; "
                 "correct it, or take it out"

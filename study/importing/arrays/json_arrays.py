@@ -24,6 +24,7 @@ _OURS = "hapteq"
 _OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
 _LOOKED_AT = 4096
 _UNIT_KEYS = ("unit", "units")
+_VALUE_KEYS = ("values", "value", "data", "samples")
 
 
 def read_json_arrays(path: Path) -> dict[str, Array]:
@@ -92,10 +93,11 @@ def _arrays(value: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...
 def _of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
     """Of `{"unit": "N", "values": [...]}` one array, with its unit in brackets."""
     units = [value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)]
-    lists = [entry for entry in value.values() if isinstance(entry, list)]
-    if place and len(units) == 1 and len(lists) == 1:
+    lists = [key for key, entry in value.items() if isinstance(entry, list)]
+    values = lists[0] if len(lists) == 1 else next((key for key in _VALUE_KEYS if key in lists), "")
+    if place and len(units) == 1 and values:
         for key, entry in value.items():
-            if isinstance(entry, list):
+            if key == values:
                 yield (*place[:-1], with_units([place[-1]], units)[0]), _array(entry)
             elif key not in _UNIT_KEYS:
                 yield from _beside_values(entry, (*place, key))
@@ -122,7 +124,7 @@ def _columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
     keys = dict.fromkeys(key for record in flat for key in record)
     if len(keys) > MOST_COLUMNS or len(keys) * len(flat) > _MOST_VALUES:
         raise ValueError(
-            f"its {len(flat)} records have {len(keys)} keys; up to {MOST_COLUMNS} and {_MOST_VALUES} values are read"
+            f"its {len(flat)} records have {len(keys)} keys; up to {MOST_COLUMNS} are read, and {_MOST_VALUES} values"
         )
     return {key: [record.get(key) for record in flat] for key in keys}
 

@@ -8,6 +8,7 @@ from itertools import islice
 from study.errors import StudyError, WrongUseError
 
 _LONGEST_WORD = 60
+_LONGEST_SENTENCE = 2000
 _MOST_NAMES = 500
 _QUOTED = re.compile(rf"(?<!\w)'([^']{{{_LONGEST_WORD}}})[^']+'(?!\w)")
 
@@ -47,6 +48,8 @@ class MapNeededError(WrongUseError):
 def _sentence(problem: str) -> str:
     """Names and fields shortened: those of a damaged file may have a million letters."""
     short = _QUOTED.sub(r"'\1…'", problem)
+    if len(short) > _LONGEST_SENTENCE:
+        short = f"{short[:_LONGEST_SENTENCE].rpartition('; ')[0] or short[:_LONGEST_SENTENCE]}; and more"
     return f"{short[:1].upper()}{short[1:].rstrip('.')}."
 
 

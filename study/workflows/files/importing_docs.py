@@ -104,23 +104,29 @@ are missing. What cannot be understood is refused by name, and then nothing is w
 
 * **Tables** are read from their rows of numbers upwards: the row above them is the header, or units (`s,N,mm`,
   `[s] [N]`) with the header above; what stands higher, and lines with `#` or `%`, are remarks. Delimiter and decimal
-  sign are those by which the rows are numbers. UTF-8, UTF-16 and Windows' western encoding (`µ`, `°`) are understood.
+  sign are those by which the rows are numbers. Comments between rows are counted; a line that begins like one but has
+  the fields of a row, as one with a spreadsheet's error (`#DIV/0!`), is refused.
+  UTF-8, UTF-16 and Windows' western encoding (`µ`, `°`) are understood.
   Other encodings (GBK, Shift-JIS, EUC, KOI8 ...) are recognised by a word for what is measured in them, such as 位移 or
   сила, and that is said; else `encoding` under `[csv]` states it, and the error shows how the text reads in each.
   Delimiters with which all lines end are no columns. Columns of words, columns that number the rows, and lines of words
   below the last row are left out, and that is said. Signs between thousands are refused, and so are commas and points
   that may be such (`1,250`; `1.886` beside `946`) until `decimal` under `[csv]` says that they are the decimal sign.
 * **Workbooks**: each sheet with rows of numbers is read as a table. Of several, arrays are named with their sheet
-  (`Run 1/force [N]`), and sheets that are alike are parts. `sheet` under `[csv]` takes a single one.
+  (`Run 1/force [N]`), and sheets that are alike and numbered are parts, which is said. Hidden sheets are left out.
+  `sheet` under `[csv]` takes a single one. Percents are read as they are shown where a header says percent. Formulas
+  must have been computed, and up to four million cells are read.
 * **JSON**: records (`[{{"t": 0, "u": 1}}, ...]`), columns (`{{"t": [0, ...], "u": [1, ...]}}`) or a record in each
   line. What is inside an object is named by it (`imu.x` of records, `run1/u` of columns). A unit beside values
-  (`{{"unit": "N", "values": [...]}}`) is theirs.
+  (`{{"unit": "N", "values": [...]}}`) is theirs; a number beside them, as a scale, is refused, and so is a key that
+  comes twice. Objects that are alike (`run1`, `run2`) are parts if they are numbered.
 * **Rows that were logged twice** (the same time stamp, the same values) are left out and counted. Where a stamp comes
   again with other values, time stands still, and the import is refused with the keys that mend it.
 * **Units** are never guessed: a channel without one keeps its numbers, in the unit `1`, and that is said. So is the
   unit in which each computed channel is taken to be. {ALLOWED[0].upper()}{ALLOWED[1:]}; `lb` and `oz` are masses.
   In headers other spellings are understood (`RPM`, `rad/sec`, `m/sec2`, `m/s²`, `°/s`, `kgf·cm`, `oz-in`, `lbf-in`,
-  `force / N`, `force, N`); a unit that is not known is named, with the nearest one that is.
+  `force / N`, `force, N`); `ms-2` is m/s^2, and `m/s-2` is refused; numbers in `A rms` or `A (peak)` are kept as they
+  are, and that is said; a unit that is not known is named, with the nearest one that is.
 * **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.
 * **Free motion**: a recording without a command gets one of zeros for each axis, as `[[computed]]` with
   `role = "command"`, `name = "none"`, `value = "0 * clock_s"`, `unit = "N"` (`"N m"` for angles).
@@ -129,8 +135,8 @@ are missing. What cannot be understood is refused by name, and then nothing is w
 * **Dates and clock times** (`2024-03-01T12:00:00.123+01:00`, with a blank for the T, with or without a zone;
   `12:00:00.123`; a date and a clock time in two columns) are read as seconds since the first, and that is said. Dates
   that do not begin with the year are read where all are the same. Clock times without a date may pass midnight. A clock
-  that was set back or ahead by an hour is refused with the expression that mends it:
-  `time = "t + 3600 * cumsum(diff(t) < 0)"` under `[[clock]]`.
+  that was set back or ahead by an hour, or a counter that begins anew, is refused with the expression that mends it:
+  `time = "t + 3600 * cumsum(diff(t) < 0)"` under `[[clock]]`. Stamps with and without a zone are not mixed.
 * **Left out** of what is proposed, and said: columns without any number, and further columns of the same time.
 * **Resampling** is never done unasked. `held`: a command that stays until the next one. `band-limited`: a signal that
   was sampled behind a filter; flat to {FLAT_TO:.0%} of the lower Nyquist frequency, what is above the new one is taken

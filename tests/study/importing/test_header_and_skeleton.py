@@ -7,10 +7,12 @@ from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map, header_notes, header_problems
 from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.map_errors import MapNeededError
 from study.importing.map_format.map_toml import parse_map
 from study.importing.map_format.signal_words import name_signal, propose_roles, unit_in
 from study.importing.map_skeleton import map_skeleton
 from study.store.disk.file_errors import UnusableFileError
+from study.workflows.recording.import_recording import read_foreign
 
 NO_TIME = "no column is the time (as in 'time [s]'), and no number is the sample rate (as in 'rate_Hz')"
 
@@ -289,3 +291,6 @@ def test_names_of_many_columns_take_no_time_by_the_square(tmp_path):
     begin = time.process_time()
     assert len(header_problems(held)) == 300
     assert time.process_time() - begin < 2
+    with pytest.raises(MapNeededError) as refused:
+        read_foreign((held.path,), None)
+    assert refused.value.happened.endswith("; and more.")

@@ -92,6 +92,7 @@ def test_dates_become_seconds(tmp_path):
         ('{"t": [1, 2], "u": [1, 2], "t": [3, 4]}', "has 't' twice"),
         ('{"t": 1, "t": 2}\n{"t": 3, "t": 4}', "has 't' twice"),
         ({"f": {"unit": "N", "values": TIME, "scale": 2}, "t": TIME}, "'f' has 'scale' beside its values"),
+        ({"f": {"unit": "N", "values": TIME, "flags": TIME}, "t": TIME}, "'f' has 'flags' beside its values"),
         ({"f": {"unit": "N", "values": TIME, "gain": "0.5"}, "t": TIME}, "'f' has 'gain' beside its values"),
         ({"f [lbf]": {"unit": "N", "values": TIME}, "t": TIME}, "header says lbf in 'f [lbf]'"),
         ({"format": "hapteq.diagnosis/1"}, "a document of ours"),
