@@ -28,6 +28,24 @@ def test_the_ends_of_a_part_and_what_lies_beside_a_gap_do_not_count(rig):
     assert mask[2500 - 2 * REACH] and mask[2500 + 2 * REACH]
 
 
+@pytest.mark.parametrize("lost", ["every 30th", "a tenth"])
+def test_sparse_losses_leave_most_rows_to_compare_by(lost, rig):
+    """Before, each took 33 rows, and a comparison without rows ended the diagnosis."""
+    random = np.random.default_rng(1)
+    gone = np.arange(rig.COUNT) % 30 == 0 if lost == "every 30th" else random.random(rig.COUNT) < 0.1
+    clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
+    lossy = replace(other[0], known=other[0].known & ~gone)
+    compared = stream_of(bases_of(clean, other)[0][0], clean, (lossy,))
+    assert compared.other.count > 0.8 * compared.clean.count
+
+
+def test_a_side_with_too_few_rows_is_not_compared(rig):
+    clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
+    bare = replace(other[0], known=np.arange(rig.COUNT) < 60)
+    with pytest.raises(ValueError, match="too few rows"):
+        stream_of(bases_of(clean, other)[0][0], clean, (bare,))
+
+
 def test_what_undoing_a_fault_loses_stays_as_it_was(stream):
     rows = tuple(np.zeros_like(part) for part in stream.other.rows)
     half = tuple(np.arange(len(part)) < len(part) // 2 for part in rows)
