@@ -20,8 +20,8 @@ from equalizer.signals.signal import FloatArray
 
 Base = ForceBase | AutoregressiveBase | SensorBase
 REACH = 2 * CONTRAST_WHITENING_ORDER
-"""Rows that the ends of a part, and rare gaps, reach: by the filter that whitens, which begins from rest, and by what is
-left of those that differentiate. On real recordings, errors there were up to 20 times the rms."""
+"""Rows that ends of a part and rare gaps reach: by the filter that whitens, which begins from rest, and by what is left
+of those that differentiate. On real recordings, errors there were up to 20 times the rms."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,8 +135,8 @@ def _settled(valid: Mask, gap_reach: int) -> Mask:
 
 
 def _reach_of_gaps(valid: Sequence[Mask]) -> int:
-    """`REACH`; 0 where single losses come so often that less than the main part of the rows of a set would be left: what was filled
-    in over a sample or two is good enough then."""
+    """`REACH`; 0 where single losses come so often that less than the main part of a set's rows would be left: what was
+    filled in over a sample or two is good enough then."""
     whole, kept = (sum(int(_settled(mask, reach).sum()) for mask in valid) for reach in (0, REACH))
     return REACH if kept >= LEAST_KEPT * whole else 0
 

@@ -111,12 +111,12 @@ def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prio
     def root(below_db: float) -> float:
         """Signed root of the likelihood ratio: of a quadratic likelihood, a straight line."""
         # The other numbers begin where a quadratic likelihood would have them; where that ends too low to go on, also
-        # where they are at the estimate, for with few answers the likelihood has several tops, and a profile is the
-        # highest of them.
-        height = float(maximise(objective, fit.numbers - below_db * along, held=place).fun)
-        if math.sqrt(max(0.0, 2.0 * (height - best))) >= wanted:
-            height = min(height, float(maximise(objective, fit.numbers - below_db * unit, held=place).fun))
-        return math.sqrt(max(0.0, 2.0 * (height - best)))
+        # where they are at the estimate, for with few answers the cost has several minima, and a profile is the
+        # lowest of them.
+        cost = float(maximise(objective, fit.numbers - below_db * along, held=place).fun)
+        if math.sqrt(max(0.0, 2.0 * (cost - best))) >= wanted:
+            cost = min(cost, float(maximise(objective, fit.numbers - below_db * unit, held=place).fun))
+        return math.sqrt(max(0.0, 2.0 * (cost - best)))
 
     near, near_root, far = 0.0, 0.0, 2.0
     while (far_root := root(far)) < wanted:

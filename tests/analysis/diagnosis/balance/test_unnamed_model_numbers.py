@@ -61,3 +61,16 @@ def test_a_recording_that_is_too_short_to_name_physics_gets_candidates(axes, sec
     if not names:
         assert found.verdict == "unexplained"
         assert (found.candidates[0].effect, found.candidates[0].why_not) == ("coulomb_friction", TOO_SHORT)
+
+
+def test_a_short_recording_gets_no_name_by_the_search_either(axes):
+    """Its readings are clipped, which a search by simulation would name."""
+    from analysis.diagnosis.diagnose import diagnose
+    from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+
+    whole = axes.recorded(axes.Physics(), SEED, seconds=1.4, rate_hz=1000.0, noise=1e-7)
+    top = 0.5 * np.abs(whole.response.samples).max()
+    clipped = replace(whole, response=replace(whole.response, samples=np.clip(whole.response.samples, -top, top)))
+    model = widen_tolerance(fit_mechanical_model([clipped], name="fitted").model)
+    found = diagnose([clipped], model, DiagnosisSettings(fitted=True), map, lambda said, share: None).diagnosis
+    assert (found.effects, found.verdict) == ((), "unexplained")

@@ -91,6 +91,13 @@ def test_a_decay_in_an_unknown_unit_is_read_as_a_position_and_named():
     assert "angle measures: it was taken for a position that moves freely" in plain_form([unknown])[1][0]
 
 
+@pytest.mark.parametrize(("quantity", "unit"), [("temperature", "K"), ("current", "A")])
+def test_what_is_no_motion_is_not_read_as_a_position(quantity, unit):
+    cooled = recording(decay(rubbing, 1.0, 8, 3))
+    with pytest.raises(NothingToDiagnose, match="the command never changes"):
+        diagnose_values(replace(cooled, response=replace(cooled.response, quantity=quantity, unit=unit)))
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_linear_decay_names_nothing(seed):
     found = diagnose_values(recording(decay(linear, 1.0, 12, seed), decay(linear, 0.4, 12, seed + 10)))
