@@ -30,7 +30,7 @@ def find_balances(
         found = _balances_per_axis(motions, recordings, without, time_left, map_)
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
-    for look_again in (_balances_in_motion_band, _balances_in_motion):
+    for look_again in (_balances_in_motion_band, look_in_motion):
         if any(balance.named or not balance.tested for balance in found) or not time_left():
             return found
         found = look_again(records, motions, without, time_left, map_) or found
@@ -57,7 +57,7 @@ def _balances_in_motion_band(
     return found if any(balance.named for balance in found) else ()
 
 
-def _balances_in_motion(
+def look_in_motion(
     records: Sequence[Observed],
     motions: Sequence[Motion],
     without: frozenset[str],

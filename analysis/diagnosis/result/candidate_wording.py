@@ -37,6 +37,11 @@ _FAMILIES = (
         "a late command or reading, by lag or delay, which these data cannot tell apart",
         {"amplifier_lag", "transport_delay", "sensor_lag", "logger_offset"},
     ),
+    (
+        "what holds an axis at rest",
+        "dead band or friction, for the axis rests as long as either would hold it",
+        {"force_deadband", "coulomb_friction"},
+    ),
 )  # fmt: skip
 """Families of laws that act alike: short name, title of a sentence, and members."""
 

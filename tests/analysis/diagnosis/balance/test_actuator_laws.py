@@ -38,6 +38,7 @@ def test_a_dead_band_is_recovered_with_its_width(dead_band):
     law = named(dead_band)["force_deadband"]
     assert law.values["width"] == pytest.approx(1.5, rel=0.1)
     assert law.gain > 0.8
+    assert law.alike == ()
     assert set(named(dead_band)) == {"force_deadband"}
 
 

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.balances import look_in_motion
+from analysis.diagnosis.balance.motion import motions_of
+from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME
 
 RATE_HZ, LEVEL, MASS, DAMPING = 100.0, 0.4, 0.05, 0.8
@@ -51,3 +54,47 @@ def test_an_axis_that_rests_without_friction_gets_no_name(recording_of, balance_
     (balance,) = balance_of(recording_of(*_hunt(0.0, seconds=60.0), RATE_HZ))
 
     assert not balance.named
+
+
+def _pushed(friction, width=0.0, wander=0.95, seconds=120.0, fine=20, seed=3):
+    """Force and position (n, 1) of an axis that is pushed now and then beyond what holds it, friction or a dead band.
+    wander: of the force in between, as a share of that."""
+    rng, n, step_s = np.random.default_rng(seed), int(seconds * RATE_HZ), 1 / (RATE_HZ * fine)
+    course = np.convolve(rng.standard_normal(n + 100), np.hanning(100), "same")[:n]
+    force = wander * LEVEL * np.clip(1.6 * course / np.abs(course).max(), -1, 1)
+    push = np.hanning(80)
+    for number, start_s in enumerate(np.arange(2, seconds - 3, 6.0)):
+        first = int((start_s + rng.uniform(0, 2)) * RATE_HZ)
+        force[first : first + len(push)] = (LEVEL + 0.25 * rng.uniform(0.7, 1.5)) * (-1) ** number * push
+    place = speed = 0.0
+    position = np.zeros((n, 1))
+    for k in range(n):
+        position[k], given = place, force[k] - np.clip(force[k], -width, width)
+        for _ in range(fine):
+            if friction and abs(speed) < 1e-3 and abs(given) <= friction:
+                speed = 0.0
+                continue
+            way, before = np.sign(speed) or np.sign(given), speed
+            speed += step_s * (given - DAMPING * speed - friction * way) / MASS
+            speed = 0.0 if friction and before * speed < 0 else speed
+            place += step_s * speed
+    return force[:, None], position + 1e-4 * rng.standard_normal((n, 1))
+
+
+@pytest.mark.parametrize(("friction", "width"), [(LEVEL, 0.0), (0.0, LEVEL)])
+def test_a_dead_band_of_an_axis_that_rests_within_it_may_be_dry_friction(friction, width, recording_of, balance_of):
+    (balance,) = balance_of(recording_of(*_pushed(friction, width), RATE_HZ))
+    band = next(law for law in balance.named if law.law.effect == "force_deadband")
+
+    assert band.values["width"] == pytest.approx(LEVEL, rel=0.15)
+    assert "coulomb_friction" in band.alike
+
+
+@pytest.mark.parametrize(("friction", "wander"), [(LEVEL, 0.95), (0.0, 0.0)])
+def test_samples_in_motion_alone_show_what_holds_the_axis(friction, wander, recording_of):
+    """The look that is taken where an axis mostly rests, and nothing is named over all samples."""
+    force, position = _pushed(friction, wander=wander)
+    speed = np.gradient(position[:, 0], 1 / RATE_HZ)
+    assert np.mean(speed**2 > 0.01 * np.mean(speed**2)) < MOVES_MOST_OF_THE_TIME
+    records = observed_parts((recording_of(force, position, RATE_HZ),), 1)
+    assert bool(look_in_motion(records, motions_of(records), frozenset(), lambda: True, map)) == bool(friction)
