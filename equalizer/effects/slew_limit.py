@@ -16,9 +16,11 @@ ERRS = 1.05
 """RMS residual of a channel, over its noise, from which these guesses are tried."""
 
 
-def limit_slew(commands: FloatArray, step_s: float, rate: float, first: float = 0.0) -> FloatArray:
-    """(n,): mean force over each step, from `first` at the beginning. commands: (n,)."""
-    return np.asarray(first + _mean_and_end(commands - first, step_s, rate)[0])
+def limit_slew(
+    commands: FloatArray, step_s: float, rate: float, first: float = 0.0, at_end: bool = False
+) -> FloatArray:
+    """(n,): mean force over each step, or that at its end, from `first` at the beginning. commands: (n,)."""
+    return np.asarray(first + _mean_and_end(commands - first, step_s, rate)[int(at_end)])
 
 
 def _limit_rate(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
@@ -26,7 +28,7 @@ def _limit_rate(commands: FloatArray, step_s: float, values: Values) -> FloatArr
 
 
 def _limit_rate_at_end(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    return np.asarray(_mean_and_end(commands, step_s, values["rate"])[1])
+    return limit_slew(commands, step_s, values["rate"], at_end=True)
 
 
 def _mean_and_end(commands: FloatArray, step_s: float, rate: float) -> FloatArray:

@@ -1,6 +1,6 @@
 """The force balances of recordings, one per command: in the band that noise allows, and in that of the motion."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,55 +30,51 @@ def find_balances(
         found = _balances_per_axis(motions, recordings, without, time_left, map_)
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
-    for look_again in (_balances_in_motion_band, look_in_motion):
+    for select in (motions_in_own_band, samples_in_motion):
         if any(balance.named or not balance.tested for balance in found) or not time_left():
             return found
-        found = look_again(records, motions, without, time_left, map_) or found
+        found = look_again(select, records, motions, without, time_left, map_) or found
     return found
 
 
-def _balances_in_motion_band(
+Select = Callable[[Sequence[Observed], Sequence[Motion]], Sequence[Motion]]
+"""What another look is taken at; empty where that is hardly anything else."""
+
+
+def look_again(
+    select: Select,
     records: Sequence[Observed],
     motions: Sequence[Motion],
     without: frozenset[str],
     time_left: TimeBudget,
     map_: Mapper,
 ) -> tuple[Balance, ...]:
-    """The balances in the band in which the device moves; empty where it is hardly narrower, or no law is named."""
-    narrow_hz = motion_band_hz(motions)
-    if not narrow_hz < SECOND_BAND_NARROWER * motions[0].band_hz:
-        return ()
+    """The balances of what is selected; empty where no law is named."""
     try:
-        found = _balances_per_axis(
-            motions_of(records, narrow_hz), [each.recording for each in records], without, time_left, map_
-        )
+        kept = select(records, motions)
+        recordings = [each.recording for each in records]
+        found = _balances_per_axis(kept, recordings, without, time_left, map_) if kept else ()
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
     return found if any(balance.named for balance in found) else ()
 
 
-def look_in_motion(
-    records: Sequence[Observed],
-    motions: Sequence[Motion],
-    without: frozenset[str],
-    time_left: TimeBudget,
-    map_: Mapper,
-) -> tuple[Balance, ...]:
-    """The balances of the samples in which the device moves; empty where it moves most of the time, or no law is named.
-    At rest a friction holds any force that is asked of it: no law foretells that, and what is linear takes its
-    place."""
+def motions_in_own_band(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
+    """In the band in which the device moves; empty where it is hardly narrower. Raises NoMotionError."""
+    narrow_hz = motion_band_hz(motions)
+    return motions_of(records, narrow_hz) if narrow_hz < SECOND_BAND_NARROWER * motions[0].band_hz else ()
+
+
+def samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
+    """The samples in which the device moves; empty where it moves most of the time. At rest a friction holds any force
+    that is asked of it: no law foretells that, and what is linear takes its place."""
     moving = [_moves(motion, motions) for motion in motions]
     if np.mean(np.concatenate(moving)) > MOVES_MOST_OF_THE_TIME:
         return ()
-    kept = [
+    return [
         replace(motion, fit=motion.fit & moves, test=motion.test & moves)
         for motion, moves in zip(motions, moving, strict=True)
     ]
-    try:
-        found = _balances_per_axis(kept, [each.recording for each in records], without, time_left, map_)
-    except (NoMotionError, np.linalg.LinAlgError):
-        return ()
-    return found if any(balance.named for balance in found) else ()
 
 
 def _moves(motion: Motion, motions: Sequence[Motion]) -> Mask:

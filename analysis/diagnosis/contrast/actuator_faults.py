@@ -10,7 +10,7 @@ from analysis.diagnosis.contrast.fault import ColumnChange, Fault, Numbers, Undo
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import LONGEST_DELAY
 from equalizer.effects.simulation.sensor_path import filter_one_pole
-from equalizer.effects.simulation.slew_kernel import limit_rate
+from equalizer.effects.slew_limit import limit_slew
 from equalizer.signals.signal import FloatArray
 
 CommandChange = Callable[[FloatArray, float], FloatArray]
@@ -116,14 +116,8 @@ def _saturation(axis: _Axis, limit: float) -> Variant:
 
 
 def _slew_limit(axis: _Axis, limit: float) -> Variant:
-    return Variant((axis.of(lambda u, rate: _follow_with_steps(u, limit / rate)),), lambda s: {"rate": limit}, 0.6, 1.5)
-
-
-def _follow_with_steps(command: FloatArray, reach: float) -> FloatArray:
-    """(n,): the command followed with steps of at most `reach` per sample."""
-    mean, end = np.empty_like(command), np.empty_like(command)
-    limit_rate(command - command[0], reach, mean, end)
-    return np.asarray(end + command[0])
+    undo = axis.of(lambda u, rate: limit_slew(u, 1 / rate, limit, float(u[0]), at_end=True))
+    return Variant((undo,), lambda s: {"rate": limit}, 0.6, 1.5)
 
 
 def _deadband(axis: _Axis, width: float) -> Variant:

@@ -1,9 +1,9 @@
-"""An axis that friction holds most of the time: what it is given at rest tells nothing, and hides the friction."""
+"""An axis that rests now and then, or mostly: what it is given at rest tells nothing, and hides the friction."""
 
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.balances import look_in_motion
+from analysis.diagnosis.balance.balances import look_again, samples_in_motion
 from analysis.diagnosis.balance.motion import motions_of
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME
@@ -12,8 +12,8 @@ RATE_HZ, LEVEL, MASS, DAMPING = 100.0, 0.4, 0.05, 0.8
 
 
 def _hunt(friction, seconds=120.0, fine=20):
-    """Force and position (n, 1) of an axis that an integrating controller leads after a slow target; it waits for half
-    of the time, while its force wanders below what moves the axis."""
+    """Force and position (n, 1) of an axis that an integrating controller leads after a slow target; it waits at
+    the end of each way, while its force wanders below what moves the axis."""
     rng, n, step_s = np.random.default_rng(3), int(seconds * RATE_HZ), 1 / (RATE_HZ * fine)
     target = np.interp(np.arange(n) / RATE_HZ, np.arange(0, seconds + 6, 6), rng.uniform(-1, 1, int(seconds / 6) + 1))
     place = speed = kept = 0.0
@@ -40,7 +40,7 @@ def held(recording_of, balance_of):
     return position, balance_of(recording_of(force, position, RATE_HZ))[0]
 
 
-def test_friction_of_an_axis_that_mostly_rests_is_named(held):
+def test_friction_of_an_axis_that_rests_at_its_targets_is_named(held):
     position, balance = held
     speed = np.gradient(position[:, 0], 1 / RATE_HZ)
     (named, *_) = balance.named
@@ -50,7 +50,7 @@ def test_friction_of_an_axis_that_mostly_rests_is_named(held):
     assert named.values["level"] == pytest.approx(LEVEL, rel=0.15)
 
 
-def test_an_axis_that_rests_without_friction_gets_no_name(recording_of, balance_of):
+def test_an_axis_that_follows_without_friction_gets_no_name(recording_of, balance_of):
     (balance,) = balance_of(recording_of(*_hunt(0.0, seconds=60.0), RATE_HZ))
 
     assert not balance.named
@@ -97,4 +97,5 @@ def test_samples_in_motion_alone_show_what_holds_the_axis(friction, wander, reco
     speed = np.gradient(position[:, 0], 1 / RATE_HZ)
     assert np.mean(speed**2 > 0.01 * np.mean(speed**2)) < MOVES_MOST_OF_THE_TIME
     records = observed_parts((recording_of(force, position, RATE_HZ),), 1)
-    assert bool(look_in_motion(records, motions_of(records), frozenset(), lambda: True, map)) == bool(friction)
+    found = look_again(samples_in_motion, records, motions_of(records), frozenset(), lambda: True, map)
+    assert bool(found) == bool(friction)
