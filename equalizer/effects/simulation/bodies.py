@@ -7,7 +7,7 @@ import numpy as np
 
 from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Structure
 from equalizer.effects.simulation.command_path import ActuatorForce
-from equalizer.effects.simulation.mechanism_kernel import LAWS, no_force
+from equalizer.effects.simulation.mechanism_kernel import LAWS, law_address, no_force
 from equalizer.effects.simulation.stepping import Forces, forced_stepping, unforced_stepping
 from equalizer.plant.linear_simulation import LinearSteps, driven_axes, linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -156,7 +156,7 @@ def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
         raise ValueError(f"{len(laws)} different forces act at once; at most {LAWS} can be played")
     return Forces(
         ports,
-        (*laws, *(no_force,) * (LAWS - len(laws))),
+        tuple(law_address(law) for law in (*laws, *(no_force,) * (LAWS - len(laws)))),
         np.array(places, dtype=np.int64).reshape(-1, 6),
         np.concatenate([*bodies.numbers, [0.0]]),
         np.zeros(kept + 1),
