@@ -9,7 +9,7 @@ from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced
 from analysis.diagnosis.settings import FOUND_NUMBERS_OPEN, MASSLESS_SHARE
-from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
+from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -61,8 +61,15 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
         np.eye(count),
         np.eye(count),
         tolerance=Tolerance(max(spread[0], 1e-12), max(spread[1], 1e-12), max(spread[2], 1e-12), None),
+        actuator=ActuatorLimits(delay_s=_common_delay_s(balances)),
         rotational=turning,
     )
+
+
+def _common_delay_s(balances: Sequence[Balance]) -> float:
+    """The delay of all commands where reduced recordings do not hold it; 0 where each has another: a model has one."""
+    delays = {balance.search.regression.beside.delay_s for balance in balances}
+    return delays.pop() if len(delays) == 1 and not is_reduced(balances) else 0.0
 
 
 def plain_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:

@@ -15,15 +15,17 @@ RATE_HZ, SPEED = 50.0, 1.5
 def followed(recording_of):
     """Of a speed: a recording of steps and sines of a target in metres, and the position that follows."""
 
-    def recording(speed):
-        rng, n = np.random.default_rng(5), 6000
+    def recording(speed, late=0, n=6000):
+        rng = np.random.default_rng(5)
         times_s = np.arange(n) / RATE_HZ
         target = np.repeat(rng.uniform(-0.6, 0.6, n // 60), 60) + 0.2 * np.sin(2 * np.pi * 0.4 * times_s)
+        target -= target[0]
+        heard = np.concatenate([np.zeros(late), target[: n - late]])
         place, seen = 0.0, np.zeros((n, 1))
         for k in range(n):
             seen[k] = place
             for _ in range(10):
-                place += np.clip((target[k] - place) / 0.08, -speed, speed) / (10 * RATE_HZ)
+                place += np.clip((heard[k] - place) / 0.08, -speed, speed) / (10 * RATE_HZ)
         made = recording_of(target[:, None], seen + 2e-4 * rng.standard_normal((n, 1)), RATE_HZ)
         return replace(made, command=replace(made.command, quantity="position", unit="m"))
 
@@ -39,6 +41,18 @@ def test_the_limit_is_named_with_its_speed(offset_m, followed, balance_of):
 
     assert balance.named[0].law.effect == "slew_limit"
     assert balance.named[0].values["rate"] == pytest.approx(SPEED, rel=0.2)
+
+
+def test_a_late_command_is_in_the_first_model_beside_the_limit(followed, balance_of):
+    """Else the limit would be taken for a slower one, which is late, too."""
+    from analysis.diagnosis.first_model.model_of_balance import plain_model
+
+    late = 4
+    given = followed(SPEED, late, 3000)
+    model = plain_model(balance_of(given), given, "first")
+
+    assert model is not None
+    assert model.actuator.delay_s == pytest.approx(late / RATE_HZ, abs=1.2 / RATE_HZ)
 
 
 def test_a_servo_without_a_limit_gets_no_name(followed, balance_of):
