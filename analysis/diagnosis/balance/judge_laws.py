@@ -26,6 +26,7 @@ from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import Structure, StructureSearch, values_of
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
+    FURTHER_LAW_GAIN,
     FURTHER_LAW_OF_ALL,
     LARGEST_CLASS,
     LARGEST_LAW_FORCE,
@@ -293,6 +294,8 @@ def _judge_further_laws(
         values = values_of(regression, laws)[-1] or {}
         share = float((held - errors).sum()) / room
         why = "it takes too little beside what is named" if chosen.laws else "its gain is too small to be named"
+        if not chosen.laws and gain > FURTHER_LAW_GAIN:
+            why = "it gains too unevenly from stretch to stretch"
         if gain > 0 and low > 0:
             possible = force_ratio(regression, laws, number) <= LARGEST_LAW_FORCE
             law = regression.laws[number]

@@ -95,16 +95,21 @@ def _beam(first: Regression, linear: Structure, time_left: TimeBudget) -> tuple[
 
 
 def is_better(plain: Structure, richer: Structure) -> bool:
-    """Whether more laws are worth it: a sufficient gain in error power that is significant over the folds, absolutely
-    or relative to each fold's own error, for a stop that only one fold meets makes the absolute gains unequal."""
+    """Whether more laws are worth it: a sufficient gain in error power that is significant over the folds: absolutely;
+    relative to each fold's own error, for a stop that only one fold meets makes the absolute gains unequal; or as the
+    share of all errors, for a stop that few folds meet gains nothing in the others."""
     floor = 1e-12 * plain.error / len(plain.errors)
     shares = np.log(np.maximum(plain.errors, floor) / np.maximum(richer.errors, floor)) if floor > 0 else np.zeros(1)
-    agreed = any(_is_significant(gains) for gains in (plain.errors - richer.errors, shares))
+    gains = plain.errors - richer.errors
+    agreed = _is_significant(gains, gains) or _is_significant(shares, shares)
+    # The standard error of a ratio of totals (Cochran, Sampling Techniques, 3rd ed., equation 6.4).
+    agreed = agreed or _is_significant(gains, gains - (1 - richer.error / max(plain.error, 1e-300)) * plain.errors)
     return richer.error < (1 - FURTHER_LAW_GAIN) * plain.error and agreed
 
 
-def _is_significant(gains: FloatArray) -> bool:
-    spread = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
+def _is_significant(gains: FloatArray, about: FloatArray) -> bool:
+    """about: the gains about what is expected of each, or the gains themselves where that is their mean."""
+    spread = float(np.std(about, ddof=1) * np.sqrt(len(about))) if len(about) > 1 else np.inf
     return float(gains.sum()) > FURTHER_LAW_ERRORS * spread
 
 

@@ -140,3 +140,14 @@ def test_laws_are_worth_it_where_the_folds_agree():
     assert is_better(Structure((), plain), swing)
     assert not is_better(Structure((), plain), luck)
     assert not is_better(Structure((), plain), Structure((0,), 0.99 * plain))
+
+
+def test_a_gain_where_a_stop_is_met_counts_though_the_other_folds_gain_nothing():
+    rng = np.random.default_rng(4)
+    plain = rng.uniform(0.9, 1.1, 15)
+    plain[[2, 7, 12]] = 40.0
+    met, once = plain * rng.uniform(0.9, 1.1, 15), plain * rng.uniform(0.9, 1.1, 15)
+    met[[2, 7, 12]] = 5.0
+    once[2] = 5.0
+    assert is_better(Structure((), plain), Structure((0,), met))
+    assert not is_better(Structure((), plain), Structure((0,), once))
