@@ -37,8 +37,8 @@ def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    way = -1.0 if values["position"] < 0 else 1.0
-    return np.array([abs(values["position"]), values["stiffness"], way, -way, values.get("opposite", 0.0)])
+    way = values.get("side", -1.0 if values["position"] < 0 else 1.0)
+    return np.array([way * values["position"], values["stiffness"], way, -way, values.get("opposite", 0.0)])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -73,7 +73,8 @@ def _best_stop(
 
 EFFECT = Effect(
     name="end_stop",
-    equation="F = -stiffness (x - position) beyond position; at -position a stop of opposite times that stiffness",
+    equation="F = -stiffness (x - position) beyond position; at -position a stop of opposite times that stiffness; "
+    "beyond: above for a side of 1, below for -1; without one, away from zero",
     source="Brogliato, Nonsmooth Mechanics, chapter 2",
     signature="nothing is missing until the axis comes near its farthest positions; then a force pushes back, and odd "
     "and even harmonics appear",

@@ -16,11 +16,12 @@ from equalizer.laws.tree import Apply, Node, Variable, format_formula
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.signal import FloatArray
 
-TURNED: Mapping[str, str] = {
-    "constant_force": "force", "position_dependent_friction": "slope_per_m", "asymmetric_stiffness": "k2",
-    "gravity_torque": "angle", "cogging": "phase", "end_stop": "position", "pose_dependent_inertia": "per_m",
+TURNED: Mapping[str, tuple[str, ...]] = {
+    "constant_force": ("force",), "position_dependent_friction": ("slope_per_m",), "asymmetric_stiffness": ("k2",),
+    "gravity_torque": ("angle",), "cogging": ("phase",), "end_stop": ("position", "side"),
+    "pose_dependent_inertia": ("per_m",),
 }  # fmt: skip
-"""Effects that differ with the direction, and their number that changes its sign."""
+"""Effects that differ with the direction, and their numbers that change their sign."""
 SWAPPED = {"asymmetric_friction": ("level_positive", "level_negative")}
 TILTED = {"extra_mode": ("tilt_next", "tilt_after_next")}
 """Numbers that couple an axis to those after it."""
@@ -61,9 +62,9 @@ def _turned_numbers(effect: ModelEffect, site: int, way: FloatArray) -> dict[str
             numbers[name] *= float(way[site] * way[(site + place) % len(way)])
     if way[site] > 0:
         return numbers
-    turned = TURNED.get(effect.kind, "")
-    if turned in numbers:
-        numbers[turned] = -numbers[turned]
+    for turned in TURNED.get(effect.kind, ()):
+        if turned in numbers:
+            numbers[turned] = -numbers[turned]
     if effect.kind in SWAPPED:
         first, second = SWAPPED[effect.kind]
         numbers[first], numbers[second] = numbers[second], numbers[first]

@@ -117,7 +117,12 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
     EffectName(
         "end_stop",
         "mechanism",
-        (_required("position", "m", "rad"), _stiffness("stiffness"), _optional("opposite", "1")),
+        (
+            _required("position", "m", "rad"),
+            _stiffness("stiffness"),
+            _optional("opposite", "1"),
+            _optional("side", "1"),
+        ),
     ),
     EffectName(
         "pose_dependent_inertia", "mechanism", (_required("per_m", "1/m", "1/rad"), _optional("speed_share", "1"))

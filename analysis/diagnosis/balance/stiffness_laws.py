@@ -35,11 +35,11 @@ def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
 
 
 def _stop_values(side: float) -> Values:
-    """Parameters of an end stop on one side. Only where it stands on that side of zero is there none opposite."""
+    """Parameters of an end stop on one side, which is said where the stop does not stand on that side of zero."""
 
     def values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
-        own = {"opposite": 0.0} if side * n[0] > 0 else {}
-        return {"position": n[0], "stiffness": float(w[0]), **own} if w[0] > 0 else None
+        beyond = {} if side * n[0] > 0 else {"side": side}
+        return {"position": n[0], "stiffness": float(w[0]), "opposite": 0.0, **beyond} if w[0] > 0 else None
 
     return values
 

@@ -12,6 +12,7 @@ from analysis.diagnosis.balance.structures import values_of
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -93,9 +94,10 @@ def hypothesis_of_judged(axis: int, judged: JudgedLaw, recording: Recording) -> 
         name, formula = axis_names(recording.command.channels)[axis], judged.formula
         text = _OWN.sub(lambda signal: f"{_PREFIX[signal[0]]}{name}", formula.text)
         return hypothesis_of_law(Law(text, formula.numbers, (), formula.acts_on, name), axis, recording)
-    effect = EFFECTS[judged.law.effect]
+    known = EFFECTS_BY_NAME[judged.law.effect].parameters
     return hypothesis_of_claim(
-        Claim(effect, "one", (axis,)), [{p.name: judged.values[p.name] for p in effect.parameters}]
+        Claim(EFFECTS[judged.law.effect], "one", (axis,)),
+        [{p.name: judged.values[p.name] for p in known if p.name in judged.values}],
     )
 
 

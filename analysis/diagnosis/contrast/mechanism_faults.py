@@ -125,5 +125,7 @@ def _stops(axis: _Axis, reach: float) -> Iterator[Variant]:
 
 def _stop(axis: _Axis, side: float, reach: float) -> Variant:
     undo = axis.of(lambda m: side * np.maximum(side * axis.q(m) - reach, 0.0))
-    numbers: Numbers = lambda s: {"position": axis.middle + side * reach, "stiffness": float(s[0])}  # noqa: E731
+    position = axis.middle + side * reach
+    beyond = {} if side * position > 0 else {"side": side}
+    numbers: Numbers = lambda s: {"position": position, "stiffness": float(s[0]), **beyond}  # noqa: E731
     return Variant((undo,), numbers, least=0.0)

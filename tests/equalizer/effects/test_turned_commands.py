@@ -76,6 +76,24 @@ def test_the_turned_model_answers_to_the_turned_command_as_before(bench, kind):
     assert apart(bench, ModelEffect(kind, axis, NUMBERS[kind])) < 1e-6
 
 
+FAR_STOP = {"position": -2e-4, "stiffness": 1e4, "side": 1.0}
+
+
+def test_a_stop_beyond_zero_turns_with_its_side(bench):
+    assert apart(bench, ModelEffect("end_stop", "y", FAR_STOP)) < 1e-6
+
+
+def test_a_stop_beyond_zero_pushes_as_its_law_written_out(bench):
+    law = law_of("-1e4*maximum(y + 2e-4, 0)", "force", "y")
+    answers = [
+        simulate_mechanism(model, COMMANDS, RATE_HZ, place_effects(model, Channels(INPUTS, OUTPUTS))).response
+        for effect in (ModelEffect("end_stop", "y", FAR_STOP), ModelEffect("discovered_law", "y", {}, law))
+        for model in [replace(bench.three_axes(), effects=(effect,))]
+    ]
+    without = simulate_mechanism(bench.three_axes(), COMMANDS, RATE_HZ).response
+    assert np.std(answers[0] - answers[1]) < 0.02 * np.std(answers[1] - without)
+
+
 def test_every_effect_that_pushes_or_is_pushed_was_turned():
     assert {each.name for each in CATALOGUE if place_of_effect(each) != "sensor"} <= set(NUMBERS)
     assert {*TURNED, *SWAPPED, *TILTED} <= set(NUMBERS)

@@ -1,5 +1,7 @@
 """One physical effect at a time in an axis is recovered from the force balance; intact axes name none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -98,6 +100,17 @@ def test_every_law_in_a_closed_loop(axes, balance_of, effect):
 )
 def test_every_law_along_an_imposed_motion(axes, balance_of, effect):
     imposed(axes, balance_of, effect)
+
+
+@pytest.mark.slow
+def test_a_stop_beyond_zero_is_named_with_its_side(axes, balance_of):
+    recording = axes.recorded(axes.Physics(**TRUTHS["end_stop"]))
+    moved = replace(recording.response, samples=recording.response.samples - 0.06)
+    (balance,) = balance_of(replace(recording, response=moved))
+    (law,) = balance.named
+    assert law.law.effect == "end_stop"
+    assert law.values["side"] == 1
+    assert law.values["position"] == pytest.approx(-0.02, abs=0.008)
 
 
 def test_of_two_axes_each_has_its_own(axes, balance_of):

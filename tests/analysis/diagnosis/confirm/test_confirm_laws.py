@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.judged_law import JudgedLaw
+from analysis.diagnosis.balance.stiffness_laws import _stop_values
 from analysis.diagnosis.confirm import confirm_laws as by_balance
 from analysis.diagnosis.confirm.confirm_laws import (
     ONLY_BESIDE_CALIBRATION,
@@ -17,13 +18,14 @@ from analysis.diagnosis.confirm.confirm_laws import (
     unname_doubtful_effects,
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
-from analysis.diagnosis.confirm.laws_to_play import find_special_case
+from analysis.diagnosis.confirm.laws_to_play import can_be_played, find_special_case, hypothesis_of_judged
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.search.verdict import Judgement
 from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.simulation.instant import LENGTH, X_FREE, X
 
 OPEN, SURE = 1.01 / VAGUE, 0.1 / VAGUE
 """Standard errors of a logarithm whose interval holds zero, and of one that is well known."""
@@ -228,3 +230,20 @@ def test_what_the_signal_itself_shows_keeps_its_name_unless_the_model_runs_away(
 def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
     monkeypatch.setattr(by_balance, "held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
     assert unname_doubtful_effects(searched_to("slew_limit")).unconfirmed == ()
+
+
+@pytest.mark.parametrize(
+    ("position_m", "side", "pushing_at_m"),
+    [(0.04, 1.0, 0.05), (-0.02, 1.0, 0.0), (-0.04, -1.0, -0.05), (0.02, -1.0, 0.0)],
+)
+def test_a_stop_is_played_on_whichever_side_of_zero_it_stands(position_m, side, pushing_at_m):
+    values = _stop_values(side)(np.array([800.0]), (position_m,), 1.0)
+    judged = SimpleNamespace(formula=None, law=SimpleNamespace(effect="end_stop", channel=0), values=values)
+    assert can_be_played(0, judged)
+
+    (placed,) = hypothesis_of_judged(0, judged, None).placed_effects()
+    at, numbers = np.zeros(LENGTH), placed.effect.acts.pack(None, 0, placed.values)
+    at[X] = at[X_FREE] = pushing_at_m
+    assert placed.effect.acts.law(numbers, np.zeros(1), at) == pytest.approx(-800.0 * (pushing_at_m - position_m))
+    at[X] = at[X_FREE] = position_m - 0.01 * side
+    assert placed.effect.acts.law(numbers, np.zeros(1), at) == 0
