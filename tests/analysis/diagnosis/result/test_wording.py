@@ -112,6 +112,14 @@ def test_a_share_of_samples_is_read_as_per_cent():
     assert numbers_text("lost_samples", {"fraction": Estimate(0.02, "1", (0.018, 0.022))}) == "2.0 % [1.8, 2.2] of all"
 
 
+def test_a_stop_on_the_far_side_of_zero_says_from_where_it_is_reached():
+    numbers = {"position": Estimate(-0.0035, "m", None), "stiffness": Estimate(1e4, "N/m", None)}
+    plain = numbers_text("end_stop", numbers)
+    for side, way in ((1.0, "positive"), (-1.0, "negative")):
+        said = numbers_text("end_stop", numbers | {"side": Estimate(side, "1", None)})
+        assert said == f"{plain}, reached in the {way} direction"
+
+
 def test_the_verdict_names_what_is_missing_and_what_it_brings():
     assert verdict_sentence(diagnosis("explained", (DRY,))) == (
         "Missing in the model: dry friction on the x drive. The error on held-out data falls from 36 % of the signal "
