@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance, family_of
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_something
+from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_something
 from analysis.diagnosis.confirm.laws_to_play import (
     CONSTANT,
     can_be_played,
@@ -98,7 +98,7 @@ def _confirm(begun: _Confirming, named: Sequence[tuple[int, JudgedLaw]]) -> tupl
         explained = Explanation(begun.before, begun.confirmed, after, tuple((step,) for step in steps), tuple(steps))
         vague: int | None = len(named) - 1
         errors: FloatArray | None = None
-        if _is_borne_out(begun.plain, after) and predicts_something(context.whole, after):
+        if _is_borne_out(begun.plain, after) and explains_half(context.whole, after):
             errors = final_errors(context, explained)
             vague = _find_vague_law(explained, errors[len(context.tuning.names) :], begun.constants)
         if vague is None:

@@ -47,13 +47,28 @@ def predicts_something(measure: ErrorMeasure, candidate: FittedCandidate) -> boo
     """Whether a completed model leaves less of a held-out motion than its mean alone would: a law that only holds a
     runaway model still does not. Channels that hold no more than noise do not count. True where forces are compared, or
     nothing that moves is held out."""
+    return measure.name == "predicted force" or _share_left(measure, candidate, 0.0) < 1
+
+
+def explains_half(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
+    """Whether a completed model explains at least half of the held-out power that is no noise: a law in a model that
+    leaves more is no more than the best stand-in for what was not found. True where nothing that moves is held out."""
+    return predicts_something(measure, candidate) and _share_left(measure, candidate, 1.0) < 0.5
+
+
+def _share_left(measure: ErrorMeasure, candidate: FittedCandidate, noise_taken: float) -> float:
+    """Share of the held-out signal power that is left, in the mean over the channels that hold more than noise.
+    noise_taken: 1 to count out what noise alone leaves of both, 0 to count it in."""
     masks = [record.test for record in measure.records]
-    if measure.name == "predicted force" or not any(mask.any() for mask in masks):
-        return True
+    if not any(mask.any() for mask in masks):
+        return 0.0
     left = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit
     size = signal_rms(measure.records, masks)
     moves = size > SEALED_SURPRISE * measure.noise
-    return not moves.any() or bool(np.mean((left[moves] / size[moves]) ** 2) < 1)
+    if not moves.any():
+        return 0.0
+    noise = noise_taken * measure.noise[moves] ** 2
+    return float(np.mean((left[moves] ** 2 - noise) / (size[moves] ** 2 - noise)))
 
 
 def _powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:

@@ -148,7 +148,7 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
         "can_be_played": lambda own, weighed: True, "constants_of": lambda balances: SimpleNamespace(claims=()),
         "refit_laws": lambda balances, named: named, "evaluate_fit": lambda *of: given, "refine": lambda *of: 4.0,
         "final_errors": lambda *of: np.zeros(1), "_find_vague_law": lambda *of: None,
-        "_from_starts": lambda *of: ([ends_at(1.1)], ends_at(1.1)), "predicts_something": lambda *of: predicts,
+        "_from_starts": lambda *of: ([ends_at(1.1)], ends_at(1.1)), "explains_half": lambda *of: predicts,
         "open_refinements": lambda *of: (),
     }  # fmt: skip
     for name, stand_in in patched.items():

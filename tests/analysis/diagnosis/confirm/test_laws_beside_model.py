@@ -8,7 +8,7 @@ import pytest
 
 from analysis.diagnosis.confirm import laws_beside_model as beside_given
 from analysis.diagnosis.confirm.balance_beside_model import find_balances_beside_model
-from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_something
+from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_something
 from analysis.diagnosis.confirm.laws_beside_model import objection
 from analysis.diagnosis.search.time_budget import always
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
@@ -109,6 +109,16 @@ def test_an_idle_channel_does_not_say_whether_a_model_predicts_something(left, i
     record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=NOISE * (1.0, idle), recording=POSITIONS)
     measure = SimpleNamespace(name="free simulation", records=(record,), unit=np.ones(2), noise=np.full(2, 0.01))
     assert predicts_something(measure, candidate(NOISE * (left, 0.02))) == something
+
+
+@pytest.mark.parametrize("name", ["free simulation", "predicted force"])
+@pytest.mark.parametrize(
+    ("left", "noise", "half"), [(0.69, 0.01, True), (0.72, 0.01, False), (0.72, 0.4, True), (0.8, 0.4, False)]
+)
+def test_a_name_needs_a_model_that_explains_half_of_what_is_no_noise(name, left, noise, half):
+    record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=3.0 + NOISE, recording=POSITIONS)
+    measure = SimpleNamespace(name=name, records=(record,), unit=np.ones(2), noise=np.full(2, noise))
+    assert explains_half(measure, candidate(left * NOISE)) == half
 
 
 def searched(after, rival=None):
