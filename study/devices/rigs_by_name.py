@@ -8,7 +8,6 @@ from study.devices.device import DeviceSettings
 from study.devices.force_dimension.models import MODELS
 from study.devices.force_dimension.rigs import force_dimension_rig
 from study.devices.opening import REPLAY
-from study.devices.replay.replay_rig import replay_rig
 from study.devices.rig import CompiledRig, Rig
 from study.devices.simulated.omega3 import build_omega3
 from study.errors import DeviceError
@@ -49,5 +48,8 @@ RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {
 def rig_named(name: str, settings: DeviceSettings, seed: int) -> Rig | CompiledRig:
     """The rig of a known name, or a replay. Raises `DeviceError`."""
     if name.startswith(REPLAY):
+        # Imported here: its compiled code is loaded then.
+        from study.devices.replay.replay_rig import replay_rig
+
         return replay_rig(Path(name.removeprefix(REPLAY)))
     return RIGS_BY_NAME[name](settings, seed)

@@ -51,6 +51,9 @@ def test_a_session_begins_and_a_file_is_checked_without_statistics_and_plots():
     assert "numba" in loaded
     slow = {"scipy.stats", "statsmodels", "pandas", "matplotlib"}
     assert loaded.isdisjoint(slow), sorted(loaded & slow)
+    # What compares two days of a device, and effects of a model, compile as much as all the rest.
+    needless = ("analysis.device_change", "equalizer.effects", "study.devices.replay")
+    assert not any(name.startswith(needless) for name in loaded)
 
 
 def test_the_process_that_draws_loads_no_arrays_no_disk_and_no_device():

@@ -6,10 +6,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from analysis.device_change.compare_devices import Change, compare_devices
-from analysis.device_change.measure_device import NotMeasurableError
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.hashing import protocol_hash
@@ -26,6 +24,10 @@ from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.device_changes import change_findings
 from study.workflows.recording.record_device import RecordingPlan, record_on, recording_settings
+
+if TYPE_CHECKING:
+    from analysis.device_change.compare_devices import Change
+    from analysis.device_change.measure_device import NotMeasurableError
 
 PROTOCOL = "daily_check"
 BASELINES, CHECKS = "baselines", "daily_checks"
@@ -122,7 +124,7 @@ def _write_check(
     baseline_sha256: str,
     passed: bool,
     sentences: tuple[str, ...],
-    changes: tuple[Change, ...],
+    changes: tuple["Change", ...],
 ) -> Path:
     check = DailyCheck(
         device=info.name,
@@ -140,8 +142,12 @@ def _write_check(
     return file
 
 
-def compare_recordings(baseline: Recording, today: Recording) -> tuple[Change, ...]:
+def compare_recordings(baseline: Recording, today: Recording) -> tuple["Change", ...]:
     """Raises DeviceError where one of them does not tell what is compared."""
+    # Imported here: every sitting asks for the last check, and only a check compares; it takes as long as all the rest.
+    from analysis.device_change.compare_devices import compare_devices
+    from analysis.device_change.measure_device import NotMeasurableError
+
     try:
         return compare_devices(baseline, today)
     except NotMeasurableError as refusal:
@@ -212,7 +218,7 @@ def _accepted_recording(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[
     return baseline, digest
 
 
-def _not_comparable_error(refusal: NotMeasurableError) -> DeviceError:
+def _not_comparable_error(refusal: "NotMeasurableError") -> DeviceError:
     happened = f"What was recorded does not tell how the device answers: {refusal}."
     return DeviceError("The device was not compared", happened, "Check accelerometer and handle, and try again.")
 
@@ -236,6 +242,6 @@ def _open(plan: RecordingPlan) -> Device:
     return open_device(plan.device, recording_settings(plan), RealClock(), plan.seed)
 
 
-def _as_json(change: Change) -> dict[str, Any]:
+def _as_json(change: "Change") -> dict[str, Any]:
     numbers = {name: None for name in ("accepted", "today", "error") if math.isnan(getattr(change, name))}
     return asdict(change) | numbers

@@ -2,10 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from analysis.device_change.compare_devices import Change
 from analysis.wording import signed_number
 from study.session.views.views import DeviceFinding
+
+if TYPE_CHECKING:
+    from analysis.device_change.compare_devices import Change
 
 CAUSES = {
     "friction": "Look for a cable that rubs and for dirt in the joints; let the device warm up.",
@@ -18,14 +21,14 @@ TOO_NOISY = "It was measured too inaccurately: close other programs, keep the ta
 IF_IT_STAYS = "If it stays, name the cause with `hapteq diagnose`, or accept the device anew."
 
 
-def change_findings(changes: Sequence[Change]) -> tuple[DeviceFinding, ...]:
+def change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ...]:
     """One for each kind, in the order in which they come."""
     kinds = dict.fromkeys(change.kind for change in changes)
     rubs = any(change.changed for change in changes if change.kind == "friction")
     return tuple(_finding(kind, [change for change in changes if change.kind == kind], rubs) for kind in kinds)
 
 
-def _finding(kind: str, changes: Sequence[Change], rubs: bool) -> DeviceFinding:
+def _finding(kind: str, changes: Sequence["Change"], rubs: bool) -> DeviceFinding:
     """rubs: the friction changed, from which gain and response change too."""
     value = f"{'; '.join(_words(change) for change in changes)} ({_limit_words(changes[0])})"
     axes = ", ".join(change.axis for change in changes if change.changed)
@@ -38,7 +41,7 @@ def _finding(kind: str, changes: Sequence[Change], rubs: bool) -> DeviceFinding:
     return DeviceFinding(kind.capitalize(), value, fine=True)
 
 
-def _words(change: Change) -> str:
+def _words(change: "Change") -> str:
     match change.kind:
         case "gain":
             return f"{change.axis} {signed_number(100 * (change.today - 1), 1)} %"
@@ -51,14 +54,14 @@ def _words(change: Change) -> str:
             return f"{change.axis} {now} {change.unit}, accepted {then}"
 
 
-def _place_words(change: Change) -> str:
+def _place_words(change: "Change") -> str:
     if change.band_hz is None:
         return ""
     moved = f", strongest at {change.peaks_hz[1]:g} Hz, accepted {change.peaks_hz[0]:g} Hz" if change.peaks_hz else ""
     return f" at {change.band_hz[0]:g} to {change.band_hz[1]:g} Hz{moved}"
 
 
-def _limit_words(change: Change) -> str:
+def _limit_words(change: "Change") -> str:
     match change.kind:
         case "friction":
             return f"may change by {change.limit:g} {change.unit}"

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from equalizer.effects.placing import PlacingError, place_recorded_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.store.formats.mechanical_model_file import read_mechanical_model
@@ -31,6 +30,9 @@ def _sound(found: Sequence[Validation], kind: str) -> Iterator[Validation]:
 
 
 def _problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:
+    # Imported here: the catalogue of effects takes longer to load than most files to check.
+    from equalizer.effects.placing import PlacingError, place_recorded_effects
+
     for path, recording in recordings:
         commands, responses = recording.command.channels, recording.response.channels
         if (len(commands), len(responses)) != (model.inputs, model.outputs):
