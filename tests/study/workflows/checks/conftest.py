@@ -1,6 +1,7 @@
 """A device on the stub of the vendor's library that is as new but for what is given, and its recordings."""
 
 import contextlib
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -52,12 +53,23 @@ def device_like(stepped_stub):
     return made
 
 
+@pytest.fixture(scope="session")
+def kept(tmp_path_factory):
+    """Recordings that were made once, for each test that asks for the same device on the same day."""
+    return tmp_path_factory.mktemp("kept")
+
+
 @pytest.fixture
-def recorded(device_like):
+def recorded(device_like, kept):
     def record(seed: int, **changed: float):
-        with device_like(seed, changed) as (device, plan):
-            record_on(device, plan, lambda done: None)
-        return read_recording(plan.out)
+        out = device_folder() / f"{seed}.h5"
+        once = kept / f"{'-'.join(map(str, (seed, *changed, *changed.values())))}.h5"
+        if not once.exists():
+            with device_like(seed, changed) as (device, plan):
+                record_on(device, plan, lambda done: None)
+            plan.out.rename(once)
+        shutil.copyfile(once, out)
+        return read_recording(out)
 
     return record
 

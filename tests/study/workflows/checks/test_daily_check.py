@@ -24,11 +24,9 @@ def changed_kinds(baseline, today) -> set[str]:
     return {change.kind for change in compare_recordings(baseline, today) if change.changed}
 
 
-@pytest.mark.parametrize("seeds", [(1, 2, 3)])
-def test_an_unchanged_device_passes_and_what_was_planted_is_named(recorded, seeds):
-    baseline = recorded(seeds[0])
-    for seed in seeds[1:]:
-        assert changed_kinds(baseline, recorded(seed)) == set(), seed
+def test_an_unchanged_device_passes_and_what_was_planted_is_named(recorded):
+    baseline = recorded(1)
+    assert changed_kinds(baseline, recorded(2)) == set()
     worn = compare_recordings(baseline, recorded(4, friction=0.35))
     friction = [change for change in worn if change.kind == "friction"]
     assert all(change.changed for change in friction) and len(friction) == 3
@@ -78,12 +76,13 @@ def test_a_handle_that_does_not_move_any_more_has_changed():
     assert "the handle did not move" in found.value and found.wrong
 
 
-def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, capsys):
+def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, stepped_stub, capsys):
     _, check = two_days
     assert last_check(INFO).value == "none yet" and last_check(INFO).warning
     (device_folder() / "daily_checks").mkdir()
     for seed, noise, said in ((2, 0.05, "nothing changed"), (3, 0.2, "noise changed")):
         checked = check(seed, noise=noise)
+        assert stepped_stub.get("peak_n") > 0
         document = json.loads(checked.file.read_text())
         assert (document["format"], document["passed"], document["device"]) == (
             "hapteq-daily-check",
@@ -133,11 +132,10 @@ def test_it_is_announced_and_a_no_keeps_the_device_still(two_days, device_like, 
         assert "No person may hold the handle" in notice and "pushed with up to 2 N" in notice
         raise KeyboardInterrupt
 
-    before = stepped_stub.get("peak_n")
     stepped_stub.set("peak_n", 0)
     with device_like(2, {}) as (device, plan), pytest.raises(LeftError):
         check_on(device, plan, Moving(no, lambda done: None))
-    assert stepped_stub.get("peak_n") == 0 < before
+    assert stepped_stub.get("peak_n") == 0
 
 
 def test_a_simulated_device_has_no_daily_check(tmp_path):

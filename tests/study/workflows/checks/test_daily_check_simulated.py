@@ -2,6 +2,7 @@
 
 import contextlib
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -29,13 +30,16 @@ WORN = {
 }
 
 
-@pytest.fixture
-def recorded(tmp_path):
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Each device on each day once: tests change copies."""
+    folder = tmp_path_factory.mktemp("days")
+
+    @cache
     def record(seed: int, parameters: Omega3Parameters = NEW) -> Recording:
         rig = replace(build_omega3(seed, hand=False), parameters=pack_parameters(parameters, False, CENTRE_M))
-        plan = RecordingPlan(
-            read_recording_protocol("daily_check").protocol, "simulated", CENTRE_M, seed, tmp_path / f"{seed}.h5"
-        )
+        out = folder / f"{len(list(folder.iterdir()))}.h5"
+        plan = RecordingPlan(read_recording_protocol("daily_check").protocol, "simulated", CENTRE_M, seed, out)
         with contextlib.closing(SafeDevice(rig, recording_settings(plan), VirtualClock())) as device:
             assert record_on(device, plan, lambda done: None).warnings == ()
         return read_recording(plan.out)
