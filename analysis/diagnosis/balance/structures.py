@@ -187,7 +187,8 @@ def refine_numbers(regression: Regression, structures: Sequence[Structure]) -> R
         for place, number in enumerate(structure.laws):
             if number not in seen and regression.laws[number].bounded:
                 seen.add(number)
-                moved = replace_law(regression, number, _refine_law(keep_laws(regression, structure.laws), place))
+                fitted = replace(keep_laws(regression, structure.laws), test=())  # only the fit is asked
+                moved = replace_law(regression, number, _refine_law(fitted, place))
                 regression = moved or regression
     return regression
 

@@ -7,6 +7,7 @@ first order about size 1 elsewhere. Products of the rows and of their changes, b
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -65,7 +66,7 @@ class Grams:
         return np.asarray(self.blocks[list(blocks)].sum(axis=0))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Pair:
     """Blocks of one stream: those in which a fault is undone, and those without it."""
 
@@ -73,6 +74,16 @@ class Pair:
     at: tuple[int, ...]
     without: tuple[FloatArray, ...]
     """Products of plain rows (width, width), one per block."""
+
+    @cached_property
+    def whole(self) -> FloatArray:
+        """(k, k): products of the blocks with the fault."""
+        return self.with_it.part(self.at)
+
+    @cached_property
+    def plain(self) -> FloatArray:
+        """(width, width): products of those without it."""
+        return np.asarray(sum(self.without))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,8 +140,8 @@ def error_of_own_fit(gram: FloatArray) -> float:
 
 
 def _joint_products(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    whole, spread = pair.with_it.part(pair.at), pair.with_it.spread(_pad_sizes(pair, sizes))
-    return whole, spread, np.asarray(spread @ whole @ spread.T + sum(pair.without))
+    whole, spread = pair.whole, pair.with_it.spread(_pad_sizes(pair, sizes))
+    return whole, spread, np.asarray(spread @ whole @ spread.T + pair.plain)
 
 
 def _pad_sizes(pair: Pair, sizes: FloatArray) -> FloatArray:
