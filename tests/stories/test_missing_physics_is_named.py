@@ -55,8 +55,8 @@ def all_but(*names):
     ("concealed", "main"),
     [
         (FRICTION, "level"),
-        ({"hardening_stiffness": {"k3": 4e5}}, "k3"),
-        ({"sensor_lag": {"bandwidth": 85.0}}, "bandwidth"),
+        pytest.param({"hardening_stiffness": {"k3": 4e5}}, "k3", marks=pytest.mark.slow),
+        pytest.param({"sensor_lag": {"bandwidth": 85.0}}, "bandwidth", marks=pytest.mark.slow),
         (SATURATION, "limit"),
     ],
     ids=lambda given: next(iter(given)) if isinstance(given, dict) else "",

@@ -44,8 +44,8 @@ def markers(figure: Figure) -> list[str]:
 
 
 def test_a_study_has_its_figures_in_the_order_of_the_report(draw, simulate_study):
-    assert list(draw(simulate_study(subjects=2))) == [
-        "thresholds", "delivered", "staircases-1-s01", "staircases-2-s02",
+    assert list(draw(simulate_study(subjects=3))) == [
+        "thresholds", "delivered", "staircases-1-s01", "staircases-2-s02", "staircases-3-s03",
     ]  # fmt: skip
 
 

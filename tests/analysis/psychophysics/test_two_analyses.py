@@ -87,4 +87,4 @@ def test_the_direction_limit_is_between_the_frequencies_around_the_cap(analysis)
 
 def test_the_declaration_is_part_of_the_analysis(simulate_study, protocol):
     declared = replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 5.0), 10))
-    assert "Declared as primary" in analyse_study(simulate_study(subjects=2), declared).declared
+    assert "Declared as primary" in analyse_study(simulate_study(subjects=3), declared).declared

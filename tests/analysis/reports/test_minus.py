@@ -65,7 +65,7 @@ def test_a_number_is_written_with_the_minus_sign_and_a_zero_without(said, expect
 
 def test_on_the_report_of_a_study(simulate_study, protocol):
     turned = replace(protocol, directions=replace(protocol.directions, symmetry_deg=-10.0))
-    trials = simulate_study(subjects=2)
+    trials = simulate_study(subjects=3)
     wave = np.exp(2j * np.pi * 25.0 * np.arange(2000) / 1000.0)
     samples = np.real(np.array([1.0, -0.5, 0.1j])[None, :] * wave[:, None])
     ellipses = moment_ellipsoid(samples), phasor_ellipse(samples, 1000.0, 25.0)

@@ -161,7 +161,7 @@ def test_detection_catch_trials_and_practice_have_sections(report, everything, f
 
 
 def test_without_such_trials_there_is_no_such_section(words, simulate_study, full_protocol):
-    html = words(simulate_study(subjects=2), protocol=full_protocol)
+    html = words(simulate_study(subjects=3), protocol=full_protocol)
     assert not any(section in html for section in SIDE_SECTIONS)
 
 

@@ -132,7 +132,7 @@ def healthy(axes, balance_of, seed, **beside):
     return [law.law.effect for law in balance.named]
 
 
-@pytest.mark.parametrize("seed", [21, 22])
+@pytest.mark.parametrize("seed", [pytest.param(21, marks=pytest.mark.slow), 22])
 def test_where_nothing_is_missing_nothing_is_named(axes, balance_of, seed):
     assert healthy(axes, balance_of, seed) == []
 

@@ -32,7 +32,7 @@ def followed(recording_of):
     return recording
 
 
-@pytest.mark.parametrize("offset_m", [0.0, 1.5, -10.0])
+@pytest.mark.parametrize("offset_m", [-10.0, *(pytest.param(m, marks=pytest.mark.slow) for m in (0.0, 1.5))])
 def test_the_limit_is_named_with_its_speed(offset_m, followed, balance_of):
     """Around any place: a servo of 0 to 180 degrees is centred at 90."""
     given = followed(SPEED)

@@ -5,10 +5,9 @@ import pytest
 
 from analysis.psychophysics.hierarchy.answers import count_answers, tally
 from analysis.psychophysics.hierarchy.curve import Family
-from analysis.psychophysics.hierarchy.fit import Prior, fit_hierarchy
+from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.inference import (
     direction_limit,
-    lower_bound,
     median_thresholds,
     pseudo_thresholds,
 )
@@ -77,7 +76,6 @@ def test_answers_that_contradict_nothing_give_no_lower_bound():
     right = np.concatenate([np.tile([True, True, True, False], 6), [False, False]])
     run = np.concatenate([np.repeat([0, 2], 12), [1, 3]])
     fit = fit_hierarchy(tally(("a", "b"), (5.0, 45.0), run, level, np.tile([1.0, -1.0], 13), right))
-    assert lower_bound(fit, 1, 0.95, Prior()) is None
     median = median_thresholds(fit, fit.means_db[1] - 0.1, 0.95)[1]
     assert median.above_cap and median.lower_db is None and median.lower_n is None
 

@@ -22,7 +22,7 @@ from study.store.disk.file_errors import UnusableFileError
 
 ROOT = Path(__file__).parents[4]
 SEED = 51_404
-PLAN = BankPlan(SEED, 2, brief=True)
+PLAN = BankPlan(SEED, 1, brief=True)
 
 
 @pytest.fixture(scope="module")

@@ -80,6 +80,7 @@ def equalized(small_text, tmp_path) -> Rehearsal:
 
 
 def test_a_rehearsal_does_not_continue_with_another_model(tmp_path, equalized):
+    equalized = replace(equalized, subjects=1)
     rehearse_study(equalized, workers=1, on_finished=lambda done: None)
     rehearse_study(equalized, workers=1, on_finished=lambda done: None)
     other = tmp_path / "other.h5"
