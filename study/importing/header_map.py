@@ -4,11 +4,14 @@
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from study.importing.arrays.array_groups import groups_in
-from study.importing.arrays.arrays import WORKBOOKS, Arrays
+from study.importing.arrays.arrays import MEND, WORKBOOKS, Array, Arrays, left_out, read_arrays
+from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.imposed_roles import IMPOSED, NOT_IMPOSED, turn_imposed
-from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap, PartMap
+from study.importing.map_format.import_map import ChannelMap, ClockMap, CsvMap, ImportMap, PartMap
+from study.importing.map_format.map_errors import ImportRefusedError
 from study.importing.map_format.signal_words import (
     ParsedName,
     is_peak_value,
@@ -16,6 +19,7 @@ from study.importing.map_format.signal_words import (
     name_signal,
     open_roles,
     plain_names,
+    propose_roles,
     roles_of,
     unit_at_end,
     unit_in,
@@ -29,6 +33,24 @@ _TIME = re.compile(
 )
 _NUMBER = re.compile(r"\d+")
 _NAMED = 3
+
+
+def read_headed(path: Path) -> Arrays:
+    """A file that no map describes. Raises CannotReadError; ImportRefusedError, too, for a wrong field in a column that
+    its name says to be a signal, or where no column is without."""
+    arrays = read_arrays(path, CsvMap())
+    faulty = [name for name, array in arrays.by_name.items() if _fault(array)]
+    columns = [name_signal(header) for header in arrays.by_name] if faulty else []
+    for column, role in zip(columns, propose_roles(columns), strict=True):
+        used = role or _is_time(column) or len(faulty) == len(columns)
+        if used and column.header in faulty:
+            raise ImportRefusedError(path.name, _fault(arrays.by_name[column.header]), MEND)
+    return arrays
+
+
+def _fault(array: Array) -> str:
+    said = left_out(array)
+    return said if isinstance(said, FaultyColumn) else ""
 
 
 def header_map(arrays: Arrays) -> ImportMap | None:
@@ -61,7 +83,11 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     parts = ", ".join(f"'{part.prefix.rstrip('/_')}'" for part in wanted.part)
     joined = [f"Put one after another, as parts of one recording: {parts}."] if parts else []
     left_out = [f"Left out: '{name}' {why}." for name, why in surplus_arrays(table).items()]
-    others = [name for name, array in arrays.by_name.items() if not array.ndim and name != wanted.clock[0].rate]
+    others = [
+        name
+        for name, array in arrays.by_name.items()
+        if not array.ndim and name != wanted.clock[0].rate and not _fault(array)  # which its own remark names
+    ]
     left_out += [f"Left out: '{name}' is no column." for name in others]
     peaks = [f"'{channel.value}'" for channel in wanted.channel if is_peak_value(_bracketed(channel.value))]
     joined += [f"Rms or peak values by their unit, kept as they are: {', '.join(peaks)}."] if peaks else []

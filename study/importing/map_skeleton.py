@@ -7,7 +7,8 @@ from itertools import takewhile
 from textwrap import wrap
 
 from study.importing.arrays.array_groups import Groups, groups_in
-from study.importing.arrays.arrays import Array, Arrays
+from study.importing.arrays.arrays import Array, Arrays, left_out
+from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.imposed_roles import IMPOSED, NOT_IMPOSED, turn_imposed
 from study.importing.map_format.signal_words import may_be_imposed, name_signal, propose_roles, unit_in
 from study.importing.surplus_arrays import (
@@ -92,8 +93,10 @@ def _direction(roles: Mapping[str, str]) -> Iterator[str]:
 
 
 def _no_channel(name: str, array: Array) -> Iterator[str]:
-    if array.dtype.kind not in "fiub":
-        what = array.item() if array.dtype.kind == "O" and array.size == 1 and isinstance(array.item(), str) else ""
+    what = left_out(array)
+    if isinstance(what, FaultyColumn):
+        yield f"\n# Left out: {what}"
+    elif array.dtype.kind not in "fiub":
         yield f"\n# {name} holds no numbers" + (f": it is {what}" if what else "")
         if "timeseries" in what:
             yield f"# in Matlab: {name} = struct('time', {name}.Time, 'values', {name}.Data)"

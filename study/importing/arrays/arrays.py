@@ -29,8 +29,7 @@ FOREIGN = (*TABLES, *WORKBOOKS, *RECORDS, ".npz", ".npy", ".mat")
 """Kinds of files that are never recordings of ours; HDF5 may be."""
 
 _CHECK = "Check the file; nothing else can be read from it."
-
-_MEND = "Do that, and import again; docs/importing.md lists the keys of a map."
+MEND = "Do that, and import again; docs/importing.md lists the keys of a map."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +48,12 @@ class Arrays:
         return self.path.name
 
 
+def left_out(array: Array) -> str:
+    """What stands for an array that is not read: what it is, or what is wrong with it; empty for all others."""
+    said = array.item() if array.dtype.kind == "O" and array.size == 1 else ""
+    return said if isinstance(said, str) else ""
+
+
 def read_arrays(path: Path, table: CsvMap) -> Arrays:
     """Read a file. Raises CannotReadError, ImportRefusedError."""
     try:
@@ -61,7 +66,7 @@ def read_arrays(path: Path, table: CsvMap) -> Arrays:
         raise ImportRefusedError(path.name, refused.happened, _CHECK) from refused
     except DAMAGED as problem:
         words = str(problem) or type(problem).__name__
-        raise ImportRefusedError(path.name, words, _MEND if "; " in words else _CHECK) from problem
+        raise ImportRefusedError(path.name, words, MEND if "; " in words else _CHECK) from problem
     if not found.by_name:
         raise ImportRefusedError(path.name, "it holds no arrays", "Check that it is the right file.")
     return Arrays(path, {name: np.squeeze(array) for name, array in found.by_name.items()}, found.clocks, found.notes)

@@ -27,9 +27,16 @@ MOST_ROWS = 20_000_000
 MOST_COLUMNS = 10_000
 _LONGEST_LINE = 2**20
 """Characters: a hundred for each of so many columns."""
+_LONGEST_SHOWN = 60
+"""Characters of a field in a sentence about it."""
 _HOLDS_NUMBER = re.compile(r'(?:^|[,;\t|])[\s"]*[-+.]?\d[\d.,:eE+-]*[\s"]*(?:[,;\t|]|$)')
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
 _MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
+
+
+class FaultyColumn(str):
+    """What is wrong with a field of a column; stands in the place of its numbers, for it matters only where they are
+    used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,16 +81,19 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
         number = next((number for number, line in body if line.count('"') % 2), body[0][0])
         raise ValueError(f"line {number}: a quote is opened and not closed in its line; take it out, or close it")
     made = _table({name: found[name] for name in wanted}, body, layout)
-    for name in words:
-        _require_words(found[name], name, body, layout)
-    left_out = tuple(f"Left out: '{name}' holds words, not numbers." for name in layout.names if name in words)
-    return replace(made, notes=(*made.notes, *left_out, *comments, *layout.notes))
+    faulty = {name: problem for name in words if (problem := _number_in_words(found[name], name, body, layout))}
+    faulty |= {name: array.item() for name, array in made.by_name.items() if array.dtype.kind == "O"}
+    left_out = [f"Left out: '{name}' holds words, not numbers." for name in layout.names if name in words - {*faulty}]
+    left_out += [f"Left out: {problem}." for problem in faulty.values()]
+    by_name = {**made.by_name, **{name: np.array(problem, dtype=object) for name, problem in faulty.items()}}
+    return Table(by_name, made.clocks, (*made.notes, *left_out, *comments, *layout.notes))
 
 
 def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
-    """Without columns of words alone. Raises ValueError for a field that is neither a number nor, in a column of such,
-    a date or a clock time."""
-    numbers, stamps, words = {}, {}, []
+    """Without columns of words alone. In place of a column with a field that is neither a number nor, in a column of
+    such, a date or a clock time, what is wrong with it."""
+    numbers: dict[str, npt.NDArray[Any]] = {}
+    stamps, words = {}, []
     for name, column in columns.items():
         if column.dtype == np.float64:
             numbers[name] = column.to_numpy()
@@ -92,7 +102,10 @@ def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: Ta
         elif all(map(is_text, column[~_is_missing(column)].str.strip())):
             words.append(name)
         else:
-            numbers[name] = _numbers(column, name, body, layout)
+            try:
+                numbers[name] = _numbers(column, name, body, layout)
+            except ValueError as problem:
+                numbers[name] = np.array(FaultyColumn(problem), dtype=object)
     joined = join_stamps(stamps)
     in_seconds = {name: _seconds_name(name, columns) for name in joined}
     every = numbers | {name: stamp.seconds - stamp.seconds[0] for name, stamp in joined.items()}
@@ -108,12 +121,13 @@ def _seconds_name(name: str, others: Iterable[str]) -> str:
     return f"{plain} [s]" if f"{plain} [s]" not in others else f"{plain} stamp [s]"
 
 
-def _require_words(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> None:
-    """Raises ValueError where a column that was taken for words holds a number."""
+def _number_in_words(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> FaultyColumn:
+    """What is wrong where a column that was taken for words holds a number; empty if it holds none."""
     numbers = column.fillna("").map(lambda field: holds_number([field.strip()], layout.decimal)).to_numpy()
-    if numbers.any():
-        number = body[int(np.argmax(numbers))][0]
-        raise ValueError(f"line {number}: column '{name}' holds words elsewhere; empty fields are missing samples")
+    if not numbers.any():
+        return FaultyColumn()
+    number = body[int(np.argmax(numbers))][0]
+    return FaultyColumn(f"line {number}: column '{name}' holds words elsewhere; empty fields are missing samples")
 
 
 def _is_missing(column: "pd.Series[str]") -> "pd.Series[bool]":
@@ -256,5 +270,6 @@ def _numbers(column: "pd.Series[str]", name: str, body: list[Line], layout: Tabl
         dated = f"; {STAMP_WORDS}" if re.search(r"\d[-/:]\d", text) else ""
         thousands = f"; {NO_THOUSANDS}" if _THOUSANDS.fullmatch(text.strip()) else ""
         mend = hint or dated or thousands or "; correct it, or leave it empty where the sample is missing"
-        raise ValueError(f"line {number}, column '{name}': '{text}' is not a number{mend}")
+        shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
+        raise ValueError(f"line {number}, column '{name}': '{shown}' is not a number{mend}")
     return np.asarray(values, dtype=np.float64)

@@ -14,7 +14,9 @@ from datetime import date, datetime, time, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from study.importing.arrays.csv_arrays import Table, read_lines
+import numpy as np
+
+from study.importing.arrays.csv_arrays import FaultyColumn, Table, read_lines
 from study.importing.arrays.table_cells import Line, holds_number, is_comment
 from study.importing.map_format.import_map import CsvMap
 from study.regular_file import read_regular
@@ -167,14 +169,20 @@ def _table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: CsvMa
     # Numbers of a sheet have no decimal sign; texts that are numbers may have either.
     pointed = any(isinstance(cell, float) and cell % 1 for _, cells in rows for cell in cells)
     decimal = settings.decimal or ("." if pointed else "")
+    said = "" if settings.sheet else "; to read another sheet alone, the map names it: sheet = ... under [csv]"
     try:
-        return read_lines(
+        made = read_lines(
             [_line(number, cells, width, (percents, decimal or ".")) for number, cells in rows],
             replace(settings, delimiter=_DELIMITER, decimal=decimal),
         )
     except ValueError as problem:
-        said = "" if settings.sheet else "; to read another sheet alone, the map names it: sheet = ... under [csv]"
         raise ValueError(f"sheet '{name}', {problem}{said}") from problem
+    faulty = {
+        key: np.array(FaultyColumn(f"sheet '{name}', {array.item()}{said}"), dtype=object)
+        for key, array in made.by_name.items()
+        if array.dtype.kind == "O"
+    }
+    return replace(made, by_name={**made.by_name, **faulty})
 
 
 def _width(cells: Sequence[Any]) -> int:

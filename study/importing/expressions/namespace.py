@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.arrays import Arrays
+from study.importing.arrays.arrays import Arrays, left_out
+from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import evaluate
 from study.importing.expressions.functions import Clock, Value
@@ -84,6 +85,8 @@ class Namespace:
 
     def _numbers(self, name: str) -> Value:
         array = self.arrays[name]
+        if isinstance(problem := left_out(array), FaultyColumn):
+            raise ImportProblemError(problem)
         if array.dtype.kind not in "fiub":
             what = "complex numbers" if array.dtype.kind == "c" else "text or objects"
             raise ImportProblemError(f"the array '{name}' in {self.where} holds {what}, not real numbers")

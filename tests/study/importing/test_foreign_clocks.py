@@ -14,6 +14,7 @@ from study.importing.map_skeleton import map_skeleton
 from study.store.disk.file_errors import UnusableFileError
 from study.workflows.recording.import_recording import read_foreign
 from tests.recording_maps import N, U, Y, built, map_text, refusal
+from tests.whole_arrays import read_whole
 
 CLOCK = 'time = "t"\ntime_unit = "s"'
 
@@ -62,7 +63,7 @@ def test_a_stamp_that_is_none_is_named_with_what_is_understood(tmp_path):
     with pytest.raises(
         ImportRefusedError, match=r"Line 3, .*'2024-03-01T12:60' is not a number; dates and clock times"
     ):
-        read_arrays(table(tmp_path, ["2024-03-01T12:59:00", "2024-03-01T12:60"]), CsvMap())
+        read_whole(table(tmp_path, ["2024-03-01T12:59:00", "2024-03-01T12:60"]), CsvMap())
 
 
 def test_dates_in_stored_arrays_are_read_too(tmp_path):

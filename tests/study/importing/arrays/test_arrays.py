@@ -3,16 +3,17 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from study.importing.arrays.arrays import KINDS, read_arrays
+from study.importing.arrays.arrays import KINDS
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 from study.store.disk.file_errors import CannotReadError
+from tests.whole_arrays import read_whole
 
 U = np.array([0.5, np.nan, -2.0])
 
 
 def read(path, **csv):
-    return read_arrays(path, CsvMap(**csv)).by_name
+    return read_whole(path, CsvMap(**csv)).by_name
 
 
 def written(tmp_path, text, name="a.csv"):

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from study.importing.arrays.arrays import read_arrays
 from study.importing.header_map import header_map, header_problems
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
+from tests.whole_arrays import read_whole
 
 NAMES = ["time [s]", "force [N]", "travel [mm]"]
 ROWS = "0,1,2\n0.1,-3,4.5\n0.2,5,-6\n"
@@ -14,7 +14,7 @@ VALUES = [[0, 1, 2], [0.1, -3, 4.5], [0.2, 5, -6]]
 def read(tmp_path, data, settings=CsvMap()):  # noqa: B008
     path = tmp_path / "a.csv"
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
-    return read_arrays(path, settings)
+    return read_whole(path, settings)
 
 
 @pytest.mark.parametrize(

@@ -5,17 +5,17 @@ import re
 import numpy as np
 import pytest
 
-from study.importing.arrays.arrays import read_arrays
 from study.importing.header_map import header_map, header_problems
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
+from tests.whole_arrays import read_whole
 
 VALUES = [[0.0, 1.5], [1.0, 2.5], [2.0, -3.5]]
 
 
 def read(tmp_path, text, settings=CsvMap()):  # noqa: B008
     (tmp_path / "a.csv").write_text(text)
-    return read_arrays(tmp_path / "a.csv", settings)
+    return read_whole(tmp_path / "a.csv", settings)
 
 
 def table(delimiter, end, head_end="", decimal="."):

@@ -12,6 +12,7 @@ from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map, header_notes, header_problems
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
+from tests.whole_arrays import read_whole
 
 NAMES = ["time [s]", "force [N]", "travel [mm]"]
 NOON = datetime(2026, 5, 4, 12)  # noqa: DTZ001 cells of a workbook have no time zone
@@ -119,7 +120,7 @@ def test_dates_become_seconds(book, step):
 )
 def test_what_cannot_be_read_is_said_with_its_sheet(book, rows, said):
     with pytest.raises(ImportRefusedError) as refused:
-        read_arrays(book(Data=rows), CsvMap())
+        read_whole(book(Data=rows), CsvMap())
     assert said in refused.value.happened
 
 
