@@ -9,6 +9,7 @@ from pathlib import Path
 from study.importing.arrays.array_groups import groups_in
 from study.importing.arrays.arrays import MEND, WORKBOOKS, Array, Arrays, left_out, read_arrays
 from study.importing.arrays.csv_arrays import FaultyColumn
+from study.importing.arrays.mat_arrays import instead
 from study.importing.imposed_roles import IMPOSED, NOT_IMPOSED, turn_imposed
 from study.importing.map_format.import_map import ChannelMap, ClockMap, CsvMap, ImportMap, PartMap
 from study.importing.map_format.map_errors import ImportRefusedError
@@ -124,12 +125,11 @@ def _table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
 
 def header_problems(arrays: Arrays) -> tuple[str, ...]:
     """What the names leave open, one clause each with the column; empty if `header_map` gives a map."""
-    others = [(name, array) for name, array in arrays.by_name.items() if array.dtype.kind not in "fiub"]
-    if len(others) == len(arrays.by_name):
-        kinds = ", ".join(
-            f"'{name}' is {array.item()}" for name, array in others if array.dtype.kind == "O" and array.item()
-        )
-        return (f"it holds no arrays of numbers{f' ({kinds})' if kinds else ''}",)
+    if not any(array.dtype.kind in "fiub" and array.ndim for array in arrays.by_name.values()):
+        said = {name: what for name, array in arrays.by_name.items() if (what := left_out(array))}
+        kinds = ", ".join(f"'{name}' is {what}" for name, what in said.items())
+        mends = [mend for name, what in said.items() if (mend := instead(name, what))][:1]
+        return ("; ".join((f"it holds no arrays of numbers{f' ({kinds})' if kinds else ''}", *mends)),)
     table, prefixes = _table(arrays)
     if len({_NUMBER.sub("", prefix) for prefix in prefixes}) > 1:
         names = " and ".join(f"'{prefix.rstrip('/_')}'" for prefix in prefixes[:_NAMED])

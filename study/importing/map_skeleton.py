@@ -9,6 +9,7 @@ from textwrap import wrap
 from study.importing.arrays.array_groups import Groups, groups_in
 from study.importing.arrays.arrays import Array, Arrays, left_out
 from study.importing.arrays.csv_arrays import FaultyColumn
+from study.importing.arrays.mat_arrays import OF_CELL, instead
 from study.importing.imposed_roles import IMPOSED, NOT_IMPOSED, turn_imposed
 from study.importing.map_format.signal_words import may_be_imposed, name_signal, propose_roles, unit_in
 from study.importing.surplus_arrays import (
@@ -21,6 +22,7 @@ from study.importing.surplus_arrays import (
 )
 
 _FORCES = ("force", "torque")
+_NAMED = 4
 _TIME_UNITS = ("s", "ms", "us", "min")
 
 
@@ -31,7 +33,8 @@ def map_skeleton(arrays: Arrays) -> str:
 
 def _lines(whole: Arrays) -> Iterator[str]:
     groups = groups_in(whole.by_name, LEAST_SAMPLES)
-    arrays = _first_run(whole, groups)
+    beside = [name for name in whole.by_name if OF_CELL.match(name) and not name.startswith(groups.prefixes)]
+    arrays = _first_run(whole, groups, beside)
     surplus = surplus_arrays(arrays)
     every = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
     clocks = [name for name in every if name not in surplus]
@@ -55,16 +58,18 @@ def _lines(whole: Arrays) -> Iterator[str]:
         else:
             yield from _no_channel(name, array)
     yield from _parts(groups.prefixes)
+    yield from _cells_beside(beside, groups)
     yield ""
     yield "[[segment]]"
     yield 'kind = "noise"            # multisine, sweep, sine, slow, noise, binary, step, impact, free, rest'
     yield "split = { fit = 0.5, test = 0.5 }"
 
 
-def _first_run(whole: Arrays, groups: Groups) -> Arrays:
-    """Arrays of the first of several runs and those of none; the time of a table, [time, value ...], on its own."""
+def _first_run(whole: Arrays, groups: Groups, beside: Sequence[str]) -> Arrays:
+    """Arrays of the first of several runs and those of none, without those of cells beside them; the time of a table,
+    [time, value ...], on its own."""
     inside = [name for name in whole.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
-    common = {name: array for name, array in whole.by_name.items() if name not in inside}
+    common = {name: array for name, array in whole.by_name.items() if name not in (*inside, *beside)}
     found = {**{name: whole.by_name[full] for name, full in groups.names.items()}, **common}
     times = {_line(name, array, 0): _line_0(array) for name, array in found.items() if time_in_table(array)}
     return Arrays(whole.path, {**found, **times}, (*whole.clocks, *times))
@@ -98,8 +103,7 @@ def _no_channel(name: str, array: Array) -> Iterator[str]:
         yield f"\n# Left out: {what}"
     elif array.dtype.kind not in "fiub":
         yield f"\n# {name} holds no numbers" + (f": it is {what}" if what else "")
-        if "timeseries" in what:
-            yield f"# in Matlab: {name} = struct('time', {name}.Time, 'values', {name}.Data)"
+        yield from (f"# {mend}" for mend in (instead(name, what),) if mend)
     elif array.size < LEAST_SAMPLES:
         yield f"\n# {name}: {_shape(array.shape)}, a constant for expressions"
     else:
@@ -134,6 +138,15 @@ def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
     for prefix in prefixes:
         yield "\n[[part]]"
         yield f"prefix = {json.dumps(prefix)}"
+
+
+def _cells_beside(beside: Sequence[str], groups: Groups) -> Iterator[str]:
+    """How runs of cells of another length, under other names, are added."""
+    if beside:
+        prefix, slash, name = beside[-1].partition("/")
+        shown = ", ".join(beside[:_NAMED]) + (" ..." if beside[_NAMED:] else "")
+        yield f"\n# Also in the file: {shown}. Such a run is added by"
+        yield f'# [[part]] with prefix = "{prefix}{slash}" and let = {{ {next(reversed(groups.names))} = "{name}" }}'
 
 
 def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:

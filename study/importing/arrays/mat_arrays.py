@@ -2,6 +2,7 @@
 and nesting are checked against the file before memory is allocated. Format: MAT-File Level 5, MathWorks, 2010."""
 
 import math
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -24,7 +25,28 @@ _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"
 _CLASSES = {
     6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8",
 }  # fmt: skip
-_LEFT_OUT = {_CELL: "a cell", _TEXT: "a text", _OBJECT: "an object", 5: "a sparse matrix", 16: "a function"}
+_LEFT_OUT = {_TEXT: "a text", _OBJECT: "an object", 5: "a sparse matrix", 16: "a function"}
+_SAVED_INSTEAD = {
+    "a cell": "{plain}_1 = {name}{{1}}",
+    "class timeseries": "{name} = struct('time', {name}.Time, 'values', {name}.Data)",
+    "class table": "{name} = table2struct({name}, 'ToScalar', true)",
+}
+
+
+def instead(name: str, what: str) -> str:
+    """What to do in Matlab before it is saved again, by what an array is; empty where nothing general is known."""
+    for said, statement in _SAVED_INSTEAD.items():
+        if said in what:
+            return f"in Matlab: {statement.format(name=name, plain=name.replace('.', '_'))}"
+    return ""
+
+
+OF_CELL = re.compile(r"\d+-of-\d+/")
+"""Begin of the name of an array that stood in a cell."""
+
+
+class _Cells(tuple[Array, ...]):
+    """Arrays of one kind, a run each."""
 
 
 class _Bytes:
@@ -65,7 +87,8 @@ class _Bytes:
 
 
 def read_mat5_arrays(path: Path) -> dict[str, Array]:
-    """Arrays by name; fields of structures are named with a dot, as in `data.u`. Raises ValueError, OSError."""
+    """Arrays by name: fields of structures as in `data.u`, arrays of a cell as in `2-of-6/u`. Raises ValueError,
+    OSError."""
     content = read_regular(path, MOST_MAT_BYTES)
     if len(content) < _HEADER_BYTES or content[126:128] not in (b"IM", b"MI"):
         raise ValueError("it is no MAT file of version 5 to 7.3; save it in Matlab with -v7")
@@ -78,7 +101,7 @@ def read_mat5_arrays(path: Path) -> dict[str, Array]:
             kind, element = _unpack(element, limit).element()
         if kind == _MATRIX:
             name, value = _matrix(element, 0)
-            if not name.startswith("__"):
+            if name and not name.startswith("__"):  # what objects hold has no name
                 _add(found, name, value)
     return found
 
@@ -93,7 +116,7 @@ def _unpack(packed: _Bytes, limit: SizeLimit) -> _Bytes:
 
 
 def _matrix(element: _Bytes, depth: int) -> tuple[str, Any]:
-    """Name and value: an array, or a dict of arrays for a structure."""
+    """Name and value: an array, a dict of arrays for a structure, or arrays of a cell."""
     if depth > DEEPEST:
         raise ValueError(f"its structures are nested more than {DEEPEST} levels deep")
     if not element.left:
@@ -109,6 +132,8 @@ def _matrix(element: _Bytes, depth: int) -> tuple[str, Any]:
         return name, np.array(0j) if flags & _COMPLEX else _numeric(element, shape, _CLASSES[code])
     if code == _STRUCT:
         return name, _structures(element, math.prod(shape), depth)
+    if code == _CELL:
+        return name, _cells(element, math.prod(shape), depth)
     return name, _no_numbers(_LEFT_OUT.get(code, "no array"))
 
 
@@ -137,10 +162,25 @@ def _structures(element: _Bytes, count: int, depth: int) -> dict[str, Any]:
     return every[0] if count == 1 else {str(number): fields for number, fields in enumerate(every, start=1)}
 
 
+def _cells(element: _Bytes, count: int, depth: int) -> Any:
+    """Arrays of numbers that have as many dimensions, and as many rows or columns; all else is left out."""
+    if count * 8 > element.left:
+        raise ValueError(f"a cell of {count} arrays is longer than what is left of the file")
+    every = [_field(element, f"{number}", depth) for number in range(1, count + 1)]
+    if not every or not all(isinstance(each, np.ndarray) and each.dtype.kind in "fiu" and each.size for each in every):
+        return _no_numbers("a cell, not of arrays of numbers alone")
+    if (
+        len({(squeezed.ndim, min(squeezed.shape) if squeezed.ndim > 1 else 0) for squeezed in map(np.squeeze, every)})
+        > 1
+    ):
+        return _no_numbers("a cell of arrays that are not alike")
+    return _Cells(every)
+
+
 def _field(element: _Bytes, word: str, depth: int) -> Any:
     kind, inner = element.element()
     if kind != _MATRIX:
-        raise ValueError(f"the field '{word}' of a structure is damaged")
+        raise ValueError(f"the field '{word}' of a structure or cell is damaged")
     return _matrix(inner, depth + 1)[1]
 
 
@@ -148,5 +188,9 @@ def _add(found: dict[str, Array], name: str, value: Any) -> None:
     if isinstance(value, dict):
         for field, inner in value.items():
             _add(found, f"{name}.{field}", inner)
+    elif isinstance(value, _Cells) and len(value) > 1:
+        found.update({f"{number}-of-{len(value)}/{name}": array for number, array in enumerate(value, start=1)})
+    elif isinstance(value, _Cells):
+        found[name] = value[0]
     else:
         found[name] = value

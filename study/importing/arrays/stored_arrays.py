@@ -20,6 +20,7 @@ from study.store.disk.hdf5_file import open_any_hdf5
 
 Array = npt.NDArray[Any]
 _PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_CELL = "a cell, which is read where the file was saved with -v7"
 _NO_NUMBERS = np.array(None, dtype=object)
 """Stands for texts and objects, of which only the existence is reported."""
 
@@ -82,7 +83,11 @@ def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
         for name, entry in datasets_in(file):
             if name.startswith("#") or entry.shape is None:
                 continue
-            if entry.dtype.kind in "fiub":
+            kind = entry.attrs.get("MATLAB_class", b"")
+            if kind == b"cell" or "MATLAB_object_decode" in entry.attrs:
+                what = f"an object of the class {kind.decode('utf-8', 'replace')}" if kind != b"cell" else _CELL
+                values = np.array(what, dtype=object)
+            elif entry.dtype.kind in "fiub":
                 values = np.asarray(entry[()])
             elif h5py.check_string_dtype(entry.dtype) is not None and entry.ndim == 1 and len(entry):
                 values = np.asarray(entry.asstr(errors="replace")[()], dtype=str)

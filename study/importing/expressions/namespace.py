@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from study.importing.arrays.arrays import Arrays, left_out
 from study.importing.arrays.csv_arrays import FaultyColumn
+from study.importing.arrays.mat_arrays import instead
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import evaluate
 from study.importing.expressions.functions import Clock, Value
@@ -85,11 +86,14 @@ class Namespace:
 
     def _numbers(self, name: str) -> Value:
         array = self.arrays[name]
-        if isinstance(problem := left_out(array), FaultyColumn):
+        problem = left_out(array)
+        if isinstance(problem, FaultyColumn):
             raise ImportProblemError(problem)
         if array.dtype.kind not in "fiub":
             what = "complex numbers" if array.dtype.kind == "c" else "text or objects"
-            raise ImportProblemError(f"the array '{name}' in {self.where} holds {what}, not real numbers")
+            known = f": it is {problem}" if problem else ""
+            mend = f"; {said}" if (said := instead(name, problem)) else ""
+            raise ImportProblemError(f"the array '{name}' in {self.where} holds {what}, not real numbers{known}{mend}")
         self.budget.spend(array.size, name)
         with np.errstate(all="ignore"):
             return np.asarray(array, dtype=np.float64)

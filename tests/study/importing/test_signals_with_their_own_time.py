@@ -92,5 +92,7 @@ def test_an_object_of_matlab_is_named_with_what_to_save_instead(tmp_path):
     matrix = element(14, element(6, struct.pack("<II", 17, 0)) + words + inner)
     (tmp_path / "a.mat").write_bytes(b" " * 124 + struct.pack("<H", 0x0100) + b"IM" + matrix)
     arrays = read_arrays(tmp_path / "a.mat", CsvMap())
-    assert header_problems(arrays) == ("it holds no arrays of numbers ('pos' is an object of the class timeseries)",)
+    mend = "in Matlab: pos = struct('time', pos.Time, 'values', pos.Data)"
+    said = f"it holds no arrays of numbers ('pos' is an object of the class timeseries); {mend}"
+    assert header_problems(arrays) == (said,)
     assert "struct('time', pos.Time, 'values', pos.Data)" in map_skeleton(arrays)
