@@ -60,7 +60,7 @@ def part_signals(
         columns[channel.role, channel.name] = _on_grid(channel, samples, grid, say)
         step()
     for logger in loggers:
-        if said := logger.base.gaps():
+        for said in filter(None, (logger.base.gaps(), logger.base.wander())):
             say(said)
     for computed in wanted.computed:
         named = {name: column for (_, name), column in reversed(columns.items())}  # of one name, the first counts

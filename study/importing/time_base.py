@@ -19,6 +19,9 @@ UNEVEN = 0.02
 """Stamps are uniform if each is within this fraction of a step of its place."""
 LEFT_OUT = 0.02
 """A uniform logger skips at most this fraction of its rows; more indicates rounded stamps."""
+_MOST_DECIMALS = 6
+_BINARY = 1e-3
+"""Of a decimal: how far a stamp in binary, from a difference of large ones, may lie off it."""
 _USUAL_GAP = 3
 """Median steps from which on stamps leave a gap."""
 _HOUR_S = 3600.0
@@ -72,6 +75,18 @@ class TimeBase:
             "[[clock]] in the map, and resample under each [[channel]]."
         )
 
+    def wander(self) -> str:
+        """How far stamps that were taken for even ones are from that; empty where it is not worth a word."""
+        if self.stamps_s is None or self.places is None:
+            return ""
+        off_s = float(np.max(np.abs(self.times_s(0) - self.stamps_s)))
+        if off_s * self.rate_hz <= UNEVEN:
+            return ""
+        return (
+            f"Clock '{self.name}': its stamps are even but for their last decimal, so {self.rate_hz:.6g} Hz is taken; "
+            f"they lie up to {off_s:.2g} s beside."
+        )
+
     def samples(self, values: Value) -> Samples:
         """In the reference clock's time; rows skipped by a uniform logger are missing samples, unless the map calls no
         step a gap."""
@@ -110,7 +125,7 @@ def _from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
         )
     if problem := _wrong_stamps(stamps_s, _as_expression(clock.time, names), unit.factor):
         raise ImportProblemError(f"clock '{clock.name}': {clock.time} {problem}")
-    rate_hz, places = _uniform(stamps_s)
+    rate_hz, places = _uniform(stamps_s, _last_decimal(stamps_s / unit.factor) * unit.factor)
     if places is not None and places[-1] >= MOST_SAMPLES:
         widest = int(np.argmax(np.diff(stamps_s)))
         raise ImportProblemError(
@@ -167,8 +182,18 @@ def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
     return ""
 
 
-def _uniform(stamps_s: Value) -> tuple[float, IntArray | None]:
-    """Rate and indices; 0 and None for uneven stamps. A round rate (1000 for 1000.0003) if all stamps fit it."""
+def _last_decimal(stamps: Value) -> float:
+    """The last decimal to which stamps are written, as 0.001; 0 where they have more than that."""
+    for digits in range(_MOST_DECIMALS + 1):
+        whole = stamps * 10**digits
+        if (np.abs(whole - np.round(whole)) <= _BINARY).all():
+            return float(10**-digits)
+    return 0.0
+
+
+def _uniform(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | None]:
+    """Rate and indices; 0 and None for uneven stamps. A round rate (1000 for 1000.0003) if all stamps fit it. unit_s:
+    of their last decimal."""
     since_s = stamps_s - stamps_s[0]
     mean_hz = (len(stamps_s) - 1) / float(since_s[-1])
     usual_hz = 1 / float(np.median(np.diff(stamps_s)))
@@ -179,7 +204,20 @@ def _uniform(stamps_s: Value) -> tuple[float, IntArray | None]:
             steps = np.diff(places)
             if uneven <= UNEVEN and (steps >= 1).all() and np.mean(steps > 1) <= LEFT_OUT:
                 return rate_hz, places
-    return 0.0, None
+    rate_hz = _rounded_rate(since_s, unit_s)
+    return rate_hz, np.arange(len(stamps_s)) if rate_hz else None
+
+
+def _rounded_rate(since_s: Value, unit_s: float) -> float:
+    """Rate of stamps without a gap that are even but for their last decimal, the plainest that fits; else 0. They lie
+    within a unit of it together (the rounding of two), or wander by no more from each to the next, where it is fine."""
+    mean_hz = (len(since_s) - 1) / float(since_s[-1])
+    for rate_hz in (*(float(f"{mean_hz:.{digits}g}") for digits in range(1, max(_PLAIN_DIGITS) + 1)), mean_hz):
+        off, unit = since_s * rate_hz - np.arange(len(since_s)), unit_s * rate_hz * (1 + _BINARY)
+        wanders = unit <= UNEVEN * (1 + _BINARY) and np.max(np.abs(np.diff(off))) <= unit
+        if np.ptp(off) < 1 and (wanders or np.ptp(off) <= unit):
+            return rate_hz
+    return 0.0
 
 
 def without_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, str]:

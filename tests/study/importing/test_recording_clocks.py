@@ -39,10 +39,28 @@ def test_a_clock_that_is_not_understood_is_named(files, clock, sentence):
     assert sentence in refusal(map_text(clock), files(u=U, y=Y, t=np.arange(N) / 1000, fs=1000.0))
 
 
-def test_stamps_that_were_rounded_away_are_uneven(files):
-    stamps = np.round(12.3 + np.arange(N) / 800, 3)
-    text = map_text('time = "t"\ntime_unit = "s"')
-    assert "has uneven stamps (steps of 1 to 2 ms)" in refusal(text, files(u=U, y=Y, t=stamps))
+@pytest.mark.parametrize(("rate_hz", "digits"), [(800, 3), (130, 3), (7, 1), (400, 3), (100, 4)])
+def test_stamps_within_the_rounding_of_their_last_decimal_are_even(files, rate_hz, digits):
+    stamps = np.round(12.34567 + np.arange(N) / rate_hz, digits)
+    made = built(map_text('time = "t"\ntime_unit = "s"'), files(u=U, y=Y, t=stamps))
+    assert made.recording.sample_rate_hz == pytest.approx(rate_hz, rel=1e-3)
+    np.testing.assert_array_equal(made.recording.command.samples[:, 0], U)
+    assert any("even but for their last decimal" in note for note in made.notes) == (rate_hz != 100)
+
+
+def test_stamps_that_wander_by_their_last_decimal_are_even_and_that_is_said(files):
+    steps = np.full(N - 1, 0.01)
+    steps[40:75], steps[300:310] = 0.0099, 0.0101
+    made = built(map_text('time = "t"\ntime_unit = "s"'), files(u=U, y=Y, t=np.round(np.cumsum([0, *steps]), 4)))
+    assert made.recording.sample_rate_hz == 100
+    assert "they lie up to 0.0035 s beside." in " ".join(made.notes)
+
+
+@pytest.mark.parametrize("spread", [1.2, 3.0])
+def test_stamps_that_jitter_by_more_than_their_last_decimal_are_uneven(files, spread):
+    jitter = np.random.default_rng(3).uniform(-spread, spread, N)
+    stamps = np.round(10 * np.arange(N) + jitter)
+    assert "has uneven stamps" in refusal(map_text('time = "t"\ntime_unit = "ms"'), files(u=U, y=Y, t=stamps))
 
 
 @pytest.mark.parametrize("rounded", [5, 6, 9])
