@@ -87,7 +87,7 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     others = [
         name
         for name, array in arrays.by_name.items()
-        if not array.ndim and name != wanted.clock[0].rate and not _fault(array)  # which its own remark names
+        if not array.ndim and name not in wanted.clock[0].rate and not _fault(array)  # which its own remark names
     ]
     left_out += [f"Left out: '{name}' is no column." for name in others]
     peaks = [f"'{channel.value}'" for channel in wanted.channel if is_peak_value(_bracketed(channel.value))]
@@ -145,7 +145,7 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
     times, rest = _columns(table)
     twice = [name for name, count in Counter(column.name for column in rest).items() if count > 1]
     return (
-        *_open_time(times, rest, _rates(arrays)),
+        *_open_time(times, rest, arrays),
         *(f"'{column.header}': {column.doubt}" for column in rest if column.doubt),
         *(f"nothing says {what}" for what in open_roles([column for column in rest if not _is_time(column)])),
         *(f"several columns are called '{name}'" for name in twice),
@@ -169,11 +169,15 @@ def _is_time(column: ParsedName) -> bool:
 
 
 def _rates(arrays: Arrays) -> list[str]:
-    """Single numbers that are a sample rate in hertz."""
-    return [name for name in rates_in(arrays) if "Hz" in (unit_in(name)[1], unit_at_end(name)[1])]
+    """Expressions for the sample rate, from single numbers that say that they are hertz, or seconds of a step."""
+    found = rates_in(arrays)
+    stated = {rate: unit_in(name)[1] or unit_at_end(name)[1] for rate, name in found.items()}
+    rates = [rate for rate, name in found.items() if rate == name and stated[rate] == "Hz"]
+    return rates or [rate for rate, name in found.items() if rate != name and stated[rate] == "s"]
 
 
-def _open_time(times: Sequence[ParsedName], rest: Sequence[ParsedName], rates: Sequence[str]) -> Iterator[str]:
+def _open_time(times: Sequence[ParsedName], rest: Sequence[ParsedName], arrays: Arrays) -> Iterator[str]:
+    single, rates = rates_in(arrays), _rates(arrays)
     bare = [column.header for column in rest if _is_time(column)]
     if len(times) > 1:
         yield f"which of {' and '.join(repr(column.header) for column in times)} is the time is open"
@@ -181,5 +185,9 @@ def _open_time(times: Sequence[ParsedName], rest: Sequence[ParsedName], rates: S
         yield f"'{bare[0]}' does not say in which unit the time is (as in '{bare[0]} [s]')"
     elif len(rates) > 1:
         yield f"which of {' and '.join(map(repr, rates))} is the sample rate is open"
+    elif not times and not rates and single:
+        rate, name = next(iter(single.items()))
+        unit = "Hz" if rate == name else "s"
+        yield f"'{name}' does not say in which unit it is (as in '{name}_{unit}')"
     elif not times and not rates:
         yield "no column is the time (as in 'time [s]'), and no number is the sample rate (as in 'rate_Hz')"

@@ -16,6 +16,7 @@ from study.importing.surplus_arrays import (
     LEAST_SAMPLES,
     equal_clocks,
     is_growing_time,
+    quote,
     rates_in,
     surplus_arrays,
     time_in_table,
@@ -107,7 +108,7 @@ def _no_channel(name: str, array: Array) -> Iterator[str]:
     elif array.size < LEAST_SAMPLES:
         yield f"\n# {name}: {_shape(array.shape)}, a constant for expressions"
     else:
-        yield f"\n# {name}: {_shape(array.shape)}; a channel is one row of it, as in {_quote(name)}[0, 0]"
+        yield f"\n# {name}: {_shape(array.shape)}; a channel is one row of it, as in {quote(name)}[0, 0]"
 
 
 def _stem(name: str) -> str:
@@ -118,7 +119,7 @@ def _stem(name: str) -> str:
 
 
 def _line(name: str, array: Array, number: int) -> str:
-    return f"{_quote(name)}[{number}]" if array.shape[0] < array.shape[1] else f"{_quote(name)}[:, {number}]"
+    return f"{quote(name)}[{number}]" if array.shape[0] < array.shape[1] else f"{quote(name)}[:, {number}]"
 
 
 def _line_0(array: Array) -> Array:
@@ -162,7 +163,10 @@ def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
         return
     yield "\n[[clock]]"
     rates = rates_in(arrays)
-    yield f"rate = {json.dumps(rates[0])}           # in hertz" if rates else "# rate_hz = 1000, or unknown = true"
+    for rate, name in list(rates.items())[:1]:
+        yield f"rate = {json.dumps(rate)}           # in hertz{'' if rate == name else f', {name} in seconds'}"
+    if not rates:
+        yield "# rate_hz = 1000, or unknown = true"
 
 
 def _table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
@@ -189,10 +193,6 @@ def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> 
     yield f'unit = {json.dumps(told.unit):20s} # {why}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
     if clock:
         yield f"clock = {json.dumps(clock)}"
-
-
-def _quote(name: str) -> str:
-    return name if name.isidentifier() else f"array('{name}')"
 
 
 def _shape(shape: tuple[int, ...]) -> str:

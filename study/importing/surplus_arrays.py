@@ -20,7 +20,8 @@ _INDEX = re.compile(
     r"column1|#|unnamed: 0|(index|idx|i|n|nr|no|number|row|record|sample|scan|point)[ _.]?(nr|no|number|#)?\.?",
     re.IGNORECASE,
 )
-RATE_WORDS = {"fs", "rate", "samplerate", "sampling"}
+_RATE_WORDS = {"fs", "rate", "samplerate", "sampling"}
+_STEP_WORDS = {"ts", "dt"}
 _USUAL_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
 _EVEN = 0.02
 SAME_CLOCK = 0.5
@@ -55,9 +56,18 @@ def name_words(name: str) -> set[str]:
     return set("".join(letter if letter.isalnum() else " " for letter in plain).split())
 
 
-def rates_in(arrays: Arrays) -> tuple[str, ...]:
-    """Single numbers that are called a sample rate."""
-    return tuple(name for name, array in arrays.by_name.items() if array.size == 1 and name_words(name) & RATE_WORDS)
+def rates_in(arrays: Arrays) -> Mapping[str, str]:
+    """Single numbers that are called a sample rate, or the step between samples, by the expression that gives the rate;
+    rates first."""
+    single = [name for name, array in arrays.by_name.items() if array.size == 1 and array.dtype.kind in "fiu"]
+    rates = {name: name for name in single if name_words(name) & _RATE_WORDS}
+    steps = {f"1 / {quote(name)}": name for name in single if name_words(name) & _STEP_WORDS}
+    return {**rates, **steps}
+
+
+def quote(name: str) -> str:
+    """An array in an expression."""
+    return name if name.isidentifier() else f"array('{name}')"
 
 
 def _is_empty(array: Array) -> bool:

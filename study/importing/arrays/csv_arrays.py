@@ -96,14 +96,14 @@ def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: Ta
     stamps, words = {}, []
     for name, column in columns.items():
         if column.dtype == np.float64:
-            numbers[name] = column.to_numpy()
+            numbers[name] = _without_blanks(column.to_numpy())
         elif (found := read_stamps(column.mask(_is_missing(column)))) is not None:
             stamps[name] = found
         elif all(map(is_text, column[~_is_missing(column)].str.strip())):
             words.append(name)
         else:
             try:
-                numbers[name] = _numbers(column, name, body, layout)
+                numbers[name] = _without_blanks(_numbers(column, name, body, layout))
             except ValueError as problem:
                 numbers[name] = np.array(FaultyColumn(problem), dtype=object)
     joined = join_stamps(stamps)
@@ -113,6 +113,12 @@ def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: Ta
     notes += tuple(f"Left out: '{name}' holds words, not numbers." for name in words)
     by_name = {in_seconds.get(name, name): every[name] for name in columns if name in every}
     return Table(by_name, tuple(in_seconds.values()), notes)
+
+
+def _without_blanks(column: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The number alone, of a column that holds it in its first row and nothing below, as a rate."""
+    single = len(column) > 1 and not np.isnan(column[0]) and bool(np.isnan(column[1:]).all())
+    return np.asarray(column[0]) if single else column
 
 
 def _seconds_name(name: str, others: Iterable[str]) -> str:

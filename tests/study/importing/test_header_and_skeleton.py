@@ -253,10 +253,12 @@ def test_a_number_in_hertz_is_the_rate_of_an_archive_and_its_runs_are_parts(tmp_
 @pytest.mark.parametrize(
     ("beside", "problem"),
     [
-        ({"fs": 250.0}, "no number is the sample rate (as in 'rate_Hz')"),
+        ({"gain": 250.0}, "no number is the sample rate (as in 'rate_Hz')"),
+        ({"fs": 250.0}, "'fs' does not say in which unit it is (as in 'fs_Hz')"),
+        ({"Ts": 0.004}, "'Ts' does not say in which unit it is (as in 'Ts_s')"),
         ({"fs_Hz": 250.0, "rate_Hz": 500.0}, "which of 'fs_Hz' and 'rate_Hz' is the sample rate is open"),
     ],
-    ids=["without a unit", "two"],
+    ids=["none", "without a unit", "a step without a unit", "two"],
 )
 def test_a_rate_without_a_unit_is_not_guessed_and_of_two_none_is_chosen(tmp_path, beside, problem):
     np.savez(tmp_path / "a.npz", force_N=np.ones(400), displacement_mm=np.ones(400), **beside)

@@ -1,0 +1,47 @@
+"""The sample rate, or the step, in the first row of a table without a time."""
+
+import numpy as np
+import pytest
+
+from study.importing.arrays.arrays import read_arrays
+from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.map_errors import MapNeededError
+from study.workflows.recording.import_recording import read_foreign
+from tests.recording_maps import built, map_text
+
+
+def table(tmp_path, header, first):
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join((header, *(f"{k % 7},{k % 5},{'' if k else first}" for k in range(30)))) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("first", ["250", "250.0"])
+def test_a_number_in_the_first_row_alone_is_a_single_number(tmp_path, first):
+    found = read_arrays(table(tmp_path, "u,y,fs", first), CsvMap()).by_name
+    assert (found["fs"].shape, float(found["fs"])) == ((), 250)
+    assert found["u"].shape == (30,)
+
+
+@pytest.mark.parametrize(
+    ("name", "first"),
+    [("fs_Hz", "250"), ("Fs [Hz]", "250"), ("sampling rate [Hz]", "250"), ("Ts_s", "0.004"), ("dt [s]", "0.004")],
+)
+def test_it_is_the_rate_where_its_name_says_so(tmp_path, name, first):
+    found = read_foreign((table(tmp_path, f"force [N],travel [mm],{name}", first),), None)
+    assert found.recording.sample_rate_hz == pytest.approx(250, rel=1e-12)
+    np.testing.assert_array_equal(found.recording.command.samples[:, 0], [k % 7 for k in range(30)])
+    assert not any("is no column" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "line"),
+    [("fs", "250", 'rate = "fs"'), ("Fs", "250", 'rate = "Fs"'), ("Ts", "0.004", 'rate = "1 / Ts"')],
+)
+def test_a_proposed_map_takes_it_and_is_right(tmp_path, name, first, line):
+    path = table(tmp_path, f"u,y,{name}", first)
+    with pytest.raises(MapNeededError) as needed:
+        read_foreign((path,), None)
+    assert line in needed.value.skeleton
+    assert needed.value.skeleton.count("[[channel]]") == 2
+    assert built(map_text(line), path).recording.sample_rate_hz == pytest.approx(250, rel=1e-12)
