@@ -147,7 +147,7 @@ def _cells_beside(beside: Sequence[str], groups: Groups) -> Iterator[str]:
         prefix, slash, name = beside[-1].partition("/")
         shown = ", ".join(beside[:_NAMED]) + (" ..." if beside[_NAMED:] else "")
         yield f"\n# Also in the file: {shown}. Such a run is added by"
-        yield f'# [[part]] with prefix = "{prefix}{slash}" and let = {{ {next(reversed(groups.names))} = "{name}" }}'
+        yield f'# [[part]] with prefix = "{prefix}{slash}" and let = {{ {tuple(groups.names)[-1]} = "{name}" }}'
 
 
 def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:

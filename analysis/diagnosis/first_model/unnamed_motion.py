@@ -1,4 +1,5 @@
-"""Infers the quantity of responses without one: position, velocity or force, from how they go with the command.
+"""Infers the quantity of responses without one: position, velocity or force, from their name where that is clear, else
+from how they go with the command.
 
 Along a measured position forces need its second derivative, unless no mass moves; along a velocity they do not, for
 the mass then goes with the first. So a response is taken as a position, or as a velocity where it is of use by itself
@@ -17,6 +18,7 @@ from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.settings import DERIVATIVE_NEEDED
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.quantity_words import quantity_in
 from equalizer.signals.recording import Recording
 from equalizer.signals.units import UNSTATED
 
@@ -29,6 +31,8 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
     first = recordings[0]
     if set(first.response.quantities) & KNOWN:
         return recordings, ""
+    if said := _said_by_names(first):
+        return tuple(_with_quantity(each, said) for each in recordings), _sentence_of_names(first, said)
     if not is_driven(recordings):
         if set(first.response.units) != {UNSTATED}:
             return recordings, ""
@@ -45,6 +49,25 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
         f"Nothing says what {names} measures: it was taken for a {quantity}, as its course suggests; if it is another, "
         "say so in the map (quantity)."
     )
+
+
+def _said_by_names(recording: Recording) -> tuple[str, ...]:
+    """Quantities of the responses, where a name tells one of them that nothing else does; else empty."""
+    response = recording.response
+    told = [
+        named if unit == UNSTATED and (named := quantity_in(name)) in KNOWN else quantity
+        for name, unit, quantity in zip(response.channels, response.units, response.quantities, strict=True)
+    ]
+    return tuple(told) if set(told) & KNOWN else ()
+
+
+def _sentence_of_names(recording: Recording, quantities: Sequence[str]) -> str:
+    taken = [
+        f"{name} was taken for {'an' if quantity.startswith('a') else 'a'} {quantity}"
+        for name, quantity in zip(recording.response.channels, quantities, strict=True)
+        if quantity in KNOWN
+    ]
+    return f"By name alone, {conjoin(taken)}; if it is another, say so in the map (quantity)."
 
 
 def _likely_quantity(recordings: Sequence[Recording]) -> str:
@@ -70,5 +93,5 @@ def _likely_quantity(recordings: Sequence[Recording]) -> str:
     return "velocity" if twice < DERIVATIVE_NEEDED <= itself else "position"
 
 
-def _with_quantity(recording: Recording, quantity: str) -> Recording:
+def _with_quantity(recording: Recording, quantity: str | tuple[str, ...]) -> Recording:
     return replace(recording, response=replace(recording.response, quantity=quantity))

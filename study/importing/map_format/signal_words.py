@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
+from equalizer.signals.quantity_words import quantity_in, words_in
 from equalizer.signals.units import (
     QUANTITY_UNITS,
     UNSTATED,
@@ -29,22 +30,6 @@ LONGEST_NAME = 300
 """Characters; no channel is called by more, and to search for a unit in them takes time by the square."""
 _REMEMBERED = 2**14
 """Names: the headers of one file are asked for again and again."""
-_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
-_WORDS = {
-    "force": ("force", "load", "thrust"),
-    "torque": ("torque", "moment", "tau"),
-    "position": ("position", "pos", "displacement", "disp", "stroke", "travel", "encoder"),
-    "angle": ("angle", "theta", "phi"),
-    "velocity": ("velocity", "vel", "speed", "omega"),
-    "acceleration": ("acceleration", "accel", "acc"),
-    "voltage": ("voltage", "volt", "volts"),
-    "current": ("current",),
-    "temperature": ("temperature", "temp"),
-    "pressure": ("pressure",),
-    "humidity": ("humidity",),
-    "setting": ("setting",),
-}
-_QUANTITY = {word: quantity for quantity, words in _WORDS.items() for word in words}
 _FOREIGN = {
     "time": ("时间", "時間", "時刻", "시간", "время", "χρόνος"),
     "force": ("载荷", "荷重", "하중", "сила", "усилие", "δύναμη"),
@@ -60,14 +45,22 @@ _FOREIGN = {
 }
 FOREIGN_WORDS = {word: quantity for quantity, words in _FOREIGN.items() for word in words}
 """Words in other scripts, by which an encoding is recognised, and the quantity of each."""
+_SURE = ("rad", "mrad", "deg", "mdeg", "rpm", "mm", "cm", "kN", "N m", "mN m", "Hz", "kHz", "kg")
+"""Units that are nothing else at the end of a name, as `A` of `phase_A` is; so are those with a stroke."""
 _WRITTEN_TOGETHER = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
 _SAID: dict[str, SignalRole] = {
-    **dict.fromkeys(("command", "cmd", "commanded"), "command"),
+    **dict.fromkeys(("command", "cmd", "commanded", "comando", "mando", "befehl", "commande"), "command"),
     **dict.fromkeys(("ref", "reference", "target", "setpoint", "desired"), "helper"),
+    **dict.fromkeys(("referencia", "sollwert", "consigne"), "helper"),
     **dict.fromkeys(("supply", "battery", "bus", "ambient", "setting"), "condition"),
 }  # fmt: skip
 _SHORT: dict[str, SignalRole] = {"u": "command", "y": "response"}
 """Textbook names of input and output, if both exist and no `x`: then `y` would be an axis."""
+_ALONE: dict[str, SignalRole] = {
+    **dict.fromkeys(("input", "entrada", "eingang", "entrée", "entree"), "command"),
+    **dict.fromkeys(("output", "salida", "ausgang", "sortie"), "response"),
+}
+"""Names of input and output where they are all of a name: an output speed is known as a speed."""
 _Role = SignalRole | Literal[""]
 _DRIVES, _FEEDS = ("force", "torque"), ("current", "voltage")
 _MOTIONS, _PLACES = ("acceleration", "velocity"), ("position", "angle")
@@ -124,9 +117,7 @@ def name_signal(header: str) -> ParsedName:
     """Interpret one header."""
     name, unit = unit_in(header)
     foreign = max((word for word in FOREIGN_WORDS if word in name.lower()), key=len, default="")
-    words = [_QUANTITY[part.lower()] for part in _WORD.findall(name) if part.lower() in _QUANTITY]
-    words += [FOREIGN_WORDS[foreign]] if FOREIGN_WORDS.get(foreign, "time") != "time" else []
-    word = words[-1] if words else ""  # the last says it: a load angle is an angle
+    word = quantity_in(name) if FOREIGN_WORDS.get(foreign, "time") == "time" else FOREIGN_WORDS[foreign]
     told = unit or unit_at_end(name)[1]
     try:
         known = parse_unit(told)
@@ -136,7 +127,11 @@ def name_signal(header: str) -> ParsedName:
     if by_unit == known.si != UNSTATED and word not in ("setting", *QUANTITY_UNITS):
         return ParsedName(header, name, told, by_unit, f"what is measured in {told} is not known")
     if not word:
-        doubt = "" if unit else f"whether {told} is its unit is not sure, for no word says what it is"
+        doubt = (
+            ""
+            if unit or told in _SURE or "/" in told
+            else f"whether {told} is its unit is not sure, for no word says what it is"
+        )
         return ParsedName(header, name, told, by_unit, doubt)
     try:
         check_quantity(word, known)
@@ -213,8 +208,10 @@ def _said_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     short = _SHORT if {"u", "y"} <= firsts and "x" not in firsts else {}
     found: list[_Role] = []
     for column in columns:
-        words = [part.lower() for part in _WORD.findall(column.name)]
-        found.append(next((_SAID[word] for word in words if word in _SAID), short.get(words[0], "") if words else ""))
+        words = words_in(column.name)
+        alone = _ALONE.get(words[0], "") if len(words) == 1 else ""
+        brief: _Role = alone or (short.get(words[0], "") if words else "")
+        found.append(next((_SAID[word] for word in words if word in _SAID), brief))
     return found
 
 

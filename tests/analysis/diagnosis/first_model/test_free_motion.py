@@ -85,10 +85,10 @@ def test_dry_friction_is_named_from_a_decay(seed):
 def test_a_decay_in_an_unknown_unit_is_read_as_a_position_and_named():
     """As of a photodiode that a swinging mirror shines on: its numbers are in no unit."""
     counted = recording(decay(rubbing, 1.0, 8, 3))
-    response = replace(counted.response, quantity="1", unit="1")
+    response = replace(counted.response, quantity="1", unit="1", channels=("diode",))
     unknown = replace(counted, response=response)
     assert "coulomb_friction" in names_of(diagnose_values(unknown))
-    assert "angle measures: it was taken for a position that moves freely" in plain_form([unknown])[1][0]
+    assert "diode measures: it was taken for a position that moves freely" in plain_form([unknown])[1][0]
 
 
 @pytest.mark.parametrize(("quantity", "unit"), [("temperature", "K"), ("current", "A")])

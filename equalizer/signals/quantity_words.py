@@ -1,0 +1,44 @@
+"""What a channel's name says that it measures: words of headers and maps, and the quantity of each.
+
+Words for the same in another language are another entry of the table; those in other scripts are with the importing.
+French `tension` is left out: in English it is a force.
+"""
+
+import re
+import unicodedata
+
+QUANTITY_WORDS = {
+    "force": "force load thrust fuerza kraft",
+    "torque": "torque moment tau drehmoment",
+    "position": "position pos displacement disp stroke travel encoder posición posicion desplazamiento lage weg "
+    "déplacement deplacement",
+    "angle": "angle theta phi yaw pitch roll ángulo angulo winkel",
+    "velocity": "velocity vel speed omega rpm velocidad geschwindigkeit drehzahl vitesse",
+    "acceleration": "acceleration accel acc aceleración aceleracion beschleunigung accélération",
+    "voltage": "voltage volt volts voltaje tensión spannung",
+    "current": "current corriente strom courant",
+    "temperature": "temperature temp",
+    "pressure": "pressure",
+    "humidity": "humidity",
+    "setting": "setting",
+}
+_QUANTITY = {word: quantity for quantity, words in QUANTITY_WORDS.items() for word in words.split()}
+_LARGE, _SMALL = "A-ZÀ-ÖØ-Þ", "a-zß-öø-ÿ"
+_WORD = re.compile(f"[{_LARGE}]?[{_SMALL}]+|[{_LARGE}]+(?![{_SMALL}])")
+_OF_ANGLE = "rate"
+"""`yaw rate`: behind an angle the word says its derivative."""
+
+
+def words_in(name: str) -> list[str]:
+    """In small letters: of `Yaw_Rate`, `motorSpeed` and `load angle` two each."""
+    return [word.lower() for word in _WORD.findall(unicodedata.normalize("NFC", name))]
+
+
+def quantity_in(name: str) -> str:
+    """By the last word that is one: a load angle is an angle. Empty where none is."""
+    words = words_in(name)
+    last = max((place for place, word in enumerate(words) if word in _QUANTITY), default=None)
+    if last is None:
+        return ""
+    found = _QUANTITY[words[last]]
+    return "velocity" if found == "angle" and words[last + 1 : last + 2] == [_OF_ANGLE] else found
