@@ -1,5 +1,6 @@
 """Formats physical values: unit prefix, as many digits as the confidence interval allows, raised exponents."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,8 @@ _KEPT = (0.01, 1e4)
 """Between these a unit needs no prefix, unless people always give it one."""
 _ALWAYS_PREFIXED = ("m", "s", "m/s", "N m")
 _NEVER_PREFIXED = ("1", "deg", "ppm", "kg", "kg m^2")
+_NO_PREFIX = re.compile(r"1/|[A-Za-z]+\^")
+"""A power at the begin would raise the prefix, too."""
 _RAISED = {"^2": "²", "^3": "³"}
 _SYMBOLS = {"deg": "°"}
 _MOST_DIGITS, _DIGITS = 5, 3
@@ -24,15 +27,20 @@ class Scale:
     unit: str
 
 
+_INERTIAS = (Scale(1.0, "kg m²"), Scale(1e4, "kg cm²"), Scale(1e7, "g cm²"))
+_LEAST_INERTIA = 0.1
+"""In the unit that is shown, but in the smallest."""
+
+
 def scale_of(unit: str, magnitude: float) -> Scale:
     """The displayed unit and its factor for values of about this size. unit: SI in ASCII."""
     size = abs(magnitude) if np.isfinite(magnitude) else 0.0
     if unit == "kg":
         return Scale(1.0, "kg") if size >= 1 or size == 0 else Scale(1e3, "g")
     if unit == "kg m^2":
-        return Scale(1.0, "kg m²") if size >= 0.01 or size == 0 else Scale(1e7, "g cm²")
+        return next((scale for scale in _INERTIAS if size * scale.factor >= _LEAST_INERTIA or size == 0), _INERTIAS[-1])
     kept = _KEPT[0] <= size < _KEPT[1] and unit not in _ALWAYS_PREFIXED
-    if kept or size == 0 or unit in _NEVER_PREFIXED or unit.startswith("1/"):
+    if kept or size == 0 or unit in _NEVER_PREFIXED or _NO_PREFIX.match(unit):
         return Scale(1.0, typeset_unit(unit))
     factor, prefix = max((prefixed for prefixed in _PREFIXES if prefixed[0] <= size * (1 + 1e-9)), default=_PREFIXES[0])
     return Scale(1 / factor, prefix + typeset_unit(unit))

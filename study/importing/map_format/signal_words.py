@@ -209,8 +209,8 @@ def _said_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     found: list[_Role] = []
     for column in columns:
         words = words_in(column.name)
-        alone = _ALONE.get(words[0], "") if len(words) == 1 else ""
-        brief: _Role = alone or (short.get(words[0], "") if words else "")
+        alone: _Role = _ALONE.get(words[0], "") if len(words) == 1 else ""
+        brief = alone or (short.get(words[0], "") if words else "")
         found.append(next((_SAID[word] for word in words if word in _SAID), brief))
     return found
 
