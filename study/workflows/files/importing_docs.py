@@ -88,7 +88,7 @@ This page is made from the code (`python -m study.workflows.files.format_docs do
 
 ```
 hapteq import run1.npz run2.npz --map MAP.toml --out rec.h5    # any arrays, by a map
-hapteq import run1.csv --out rec.h5                            # names say it: time [s],fx [N]; t_s, fx_N, x_mm
+hapteq import run1.csv --out rec.h5                            # names say it: time [s],fx [N]; t_s, force_N, x_mm
 hapteq import data.mat --out rec.h5 > MAP.toml                 # nothing says it: a map for this file, to be completed
 hapteq import FOLDER --out rec.h5                              # its map, ours that fits, or numbered tables by header
 ```
@@ -110,8 +110,10 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   Other encodings (GBK, Shift-JIS, EUC, KOI8 ...) are recognised by a word for what is measured in them, such as 位移 or
   сила, and that is said; else `encoding` under `[csv]` states it, and the error shows how the text reads in each.
   Delimiters with which all lines end are no columns. Columns of words, columns that number the rows, and lines of words
-  below the last row are left out, and that is said. Signs between thousands are refused, and so are commas and points
-  that may be such (`1,250`; `1.886` beside `946`) until `decimal` under `[csv]` says that they are the decimal sign.
+  below the last row are left out, and that is said. So is a column with a field that is no number, unless the map or
+  its name says that it is a signal: then it is refused. Signs between thousands are refused, and so are commas and
+  points that may be such (`1,250`; `1.886` beside `946`) until `decimal` under `[csv]` says that they are the decimal
+  sign.
 * **Workbooks**: each sheet with rows of numbers is read as a table. Of several, arrays are named with their sheet
   (`Run 1/force [N]`), and sheets that are alike and numbered are parts, which is said. Hidden sheets are left out.
   `sheet` under `[csv]` takes a single one. Percents are read as they are shown where a header says percent. Formulas
@@ -127,6 +129,9 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   In headers other spellings are understood (`RPM`, `rad/sec`, `m/sec2`, `m/s²`, `°/s`, `kgf·cm`, `oz-in`, `lbf-in`,
   `force / N`, `force, N`); `ms-2` is m/s^2, and `m/s-2` is refused; numbers in `A rms` or `A (peak)` are kept as they
   are, and that is said; a unit that is not known is named, with the nearest one that is.
+* **Cells** of Matlab hold a run in each of their arrays, where these are alike (-v6, -v7): `y` of a cell of three is
+  `1-of-3/y`, `2-of-3/y`, `3-of-3/y`, and `prefix = "2-of-3/"` a part. A part whose arrays have other names says
+  them, as in `let = {{ y = "y_test" }}`.
 * **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.
 * **Free motion**: a recording without a command gets one of zeros for each axis, as `[[computed]]` with
   `role = "command"`, `name = "none"`, `value = "0 * clock_s"`, `unit = "N"` (`"N m"` for angles).
@@ -143,6 +148,9 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   out. `linear`: straight lines. Between uniform rates the band-limited way is exact to 1e-4 of the amplitude up to four
   fifths of the lower Nyquist frequency; from uneven stamps to 5e-5 up to a tenth, and 2e-3 up to a fifth, of their mean
   rate (tested with sinusoids).
+* **Even stamps** are those of which each lies within 2 % of a step of its place, or all within the rounding of their
+  last decimal, as whole milliseconds at 400 Hz. Steps that differ by a single unit of a fine last decimal (9.9, 10.0
+  and 10.1 ms) are even too. How far the stamps lie beside is said.
 * **Missing** samples are NaN. Rows that a uniform logger has left out, and gaps in uneven stamps, become NaN; what lies
   beside them stays. Where nothing is missing between them, as in a log of changes, `gap_s` of the clock says from which
   step on there is a gap; the channels then need `resample`.
@@ -155,13 +163,18 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   more, becomes a segment with that period and its level, and that is said; where nothing repeats none are made.
 * **Names** are understood in headers and in the map that is proposed: force, load, torque, position, displacement,
   stroke, encoder, angle, theta, speed, velocity, omega, acceleration, voltage, current, temperature, pressure,
-  humidity, setting, supply, with a unit in brackets or at the end (`displacement_mm`, `omega_rad_s`, `torque_Nm`).
+  humidity, setting, supply, yaw, pitch, roll, rpm and what they are in Spanish, German and French (`velocidad`,
+  `Drehzahl`, `vitesse`; not `tension`, which is a force in English), with a unit in brackets or at the end
+  (`displacement_mm`, `omega_rad_s`, `torque_Nm`). Words may be joined (`Yaw_Rate`, `motorSpeed`).
   Without forces, currents and voltages are commands, or else what is called a command. What is neither drive nor
   motion is a condition.
   Of a force and a displacement alone, neither called a command, the displacement is the command where it follows ramps
   or sines and the force does not, as on a testing machine; else the force. Either is said, with the way to turn it.
-  The map that is proposed also takes `cmd`, `u` beside `y`, and `ref` or `target` (a helper) for what they say.
-* **Rate**: where no column is the time, a single number in hertz (`fs_Hz`, `rate [Hz]`) is the sample rate.
+  The map that is proposed also takes `cmd`, `input`, `output`, `u` beside `y`, and `ref` or `target` (a helper) for
+  what they say. `hapteq diagnose` takes a response in no unit for what its name says.
+* **Rate**: where no column is the time, a single number in hertz (`fs_Hz`, `rate [Hz]`) is the sample rate, or one in
+  seconds (`Ts_s`, `dt [s]`) the step. In a table it stands in the first row, with nothing below. The map that is
+  proposed takes `fs` and `Ts` without a unit, too.
 * **Time** runs along the only dimension of a channel. Of a table of arrays take a row (`y[0]`) or column (`y[:, 0]`).
   Signals that carry their own time, as tables of [time, value] and as Simulink stores them (`force.time`,
   `force.signals.values`, several as `scope.signals.1.values`), get a `[[clock]]` each in the map that is proposed;
@@ -198,8 +211,8 @@ def importing_markdown() -> str:
         f"less, or cut the recording, where that is refused. Tables may have {TABLE_BYTES // 2**20} MiB and "
         f"{MOST_ROWS:.0e} rows. HDF5: no external storage, no virtual datasets, no links to other files. NPY and NPZ: "
         "versions 1.0 and 2.0, stored or deflated, no Python objects. MAT: versions 5 to 7.3 (Matlab's -v6, -v7, "
-        "-v7.3); texts, cells, sparse matrices and objects (timeseries, tables) are left out, and named: save them as "
-        "structures.",
+        "-v7.3); texts, sparse matrices, objects (timeseries, tables) and cells of unlike arrays (in -v7.3 all cells) "
+        "are left out, and named, with what to write in Matlab instead.",
         "## Keys of a map",
         _keys("At the top", MAP_SCHEMA),
         *(_keys(_title(name, node), _table_of(node)) for name, node in _tables()),
