@@ -18,7 +18,6 @@ from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.settings import DERIVATIVE_NEEDED
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
-from equalizer.signals.quantity_words import quantity_in
 from equalizer.signals.recording import Recording
 from equalizer.signals.units import UNSTATED
 
@@ -53,6 +52,8 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
 
 def _said_by_names(recording: Recording) -> tuple[str, ...]:
     """Quantities of the responses, where a name tells one of them that nothing else does; else empty."""
+    from equalizer.signals.quantity_words import quantity_in  # only where a quantity is missing
+
     response = recording.response
     told = [
         named if unit == UNSTATED and (named := quantity_in(name)) in KNOWN else quantity

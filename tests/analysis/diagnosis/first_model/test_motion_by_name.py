@@ -45,5 +45,5 @@ def test_what_a_name_says_of_several_is_said_of_each_and_the_others_stay_open():
 
 
 @pytest.mark.parametrize(("quantity", "unit"), [("velocity", "m/s"), ("position", "m")])
-def test_a_stated_quantity_is_kept_whatever_the_name_says(quantity, unit):
+def test_a_stated_quantity_counts_more_than_the_name(quantity, unit):
     assert named(("angle", quantity, unit, PLACE)) == ((quantity,), "")
