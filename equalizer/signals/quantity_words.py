@@ -27,6 +27,12 @@ _LARGE, _SMALL = "A-ZÀ-ÖØ-Þ", "a-zß-öø-ÿ"
 _WORD = re.compile(f"[{_LARGE}]?[{_SMALL}]+|[{_LARGE}]+(?![{_SMALL}])")
 _OF_ANGLE = "rate"
 """`yaw rate`: behind an angle the word says its derivative."""
+_OF_ANOTHER = frozenset(
+    ["dot", "ddot", "d", "delta", "diff", "rate", "error", "gyro", "pedal", "time", "ratio", "mode", "limit"]
+)
+"""Words beside which another word says no more what is measured: `theta_dot`, `gyro pitch`, `travel time`."""
+SEVERAL_MEANINGS = frozenset(["spannung", "tensión", "yaw", "pitch", "roll"])
+"""Also a stress, a distance, a turning speed: where a unit is stated, it decides."""
 
 
 def words_in(name: str) -> list[str]:
@@ -35,10 +41,14 @@ def words_in(name: str) -> list[str]:
 
 
 def quantity_in(name: str) -> str:
-    """By the last word that is one: a load angle is an angle. Empty where none is."""
+    """By the last word that is one: a load angle is an angle. Empty where none is, or a word beside it changes what it
+    says."""
     words = words_in(name)
     last = max((place for place, word in enumerate(words) if word in _QUANTITY), default=None)
     if last is None:
         return ""
     found = _QUANTITY[words[last]]
-    return "velocity" if found == "angle" and words[last + 1 : last + 2] == [_OF_ANGLE] else found
+    if found == "angle" and words[last + 1 : last + 2] == [_OF_ANGLE]:
+        found = "velocity"
+        del words[last + 1]
+    return "" if _OF_ANOTHER & set(words) else found

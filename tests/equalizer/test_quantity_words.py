@@ -19,7 +19,9 @@ def test_a_name_is_split_at_signs_digits_and_capitals(name, words):
 @pytest.mark.parametrize(
     ("name", "quantity"),
     [("load angle", "angle"), ("angular_velocity", "velocity"), ("yaw rate", "velocity"), ("frame rate", ""),
-     ("rate_of_angle", "angle"), ("Lage", "position"), ("déplacement", "position"), ("Kraft", "force"),
+     ("rate_of_angle", ""), ("theta_dot", ""), ("dThetaDot", ""), ("gyro_pitch", ""), ("acc pedal", ""),
+     ("travel time", ""), ("gyro yaw rate", ""),
+     ("force rate", ""), ("Lage", "position"), ("déplacement", "position"), ("Kraft", "force"),
      ("corriente", "current"), ("Spannung", "voltage"), ("tensión", "voltage"), ("tension", ""), ("displaced", ""),
      ("knob", "")],
 )  # fmt: skip

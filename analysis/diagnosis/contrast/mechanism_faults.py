@@ -118,14 +118,16 @@ def _cogging_variant(axis: _Axis, pitch: float) -> Variant:
 def _stops(axis: _Axis, reach: float) -> Iterator[Variant]:
     """End stops at both ends, and at either."""
     both = axis.of(lambda m: np.sign(axis.q(m)) * np.maximum(np.abs(axis.q(m)) - reach, 0.0))
-    yield Variant((both,), lambda s: {"position": axis.middle + reach, "stiffness": float(s[0])}, least=0.0)
+    yield Variant((both,), _stop_numbers(axis.middle + reach, 1.0), least=0.0)
     for side in (1.0, -1.0):
         yield _stop(axis, side, reach)
 
 
 def _stop(axis: _Axis, side: float, reach: float) -> Variant:
     undo = axis.of(lambda m: side * np.maximum(side * axis.q(m) - reach, 0.0))
-    position = axis.middle + side * reach
+    return Variant((undo,), _stop_numbers(axis.middle + side * reach, side), least=0.0)
+
+
+def _stop_numbers(position: float, side: float) -> Numbers:
     beyond = {} if side * position > 0 else {"side": side}
-    numbers: Numbers = lambda s: {"position": position, "stiffness": float(s[0]), **beyond}  # noqa: E731
-    return Variant((undo,), numbers, least=0.0)
+    return lambda s: {"position": position, "stiffness": float(s[0]), **beyond}

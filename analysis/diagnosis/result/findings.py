@@ -161,5 +161,8 @@ class Findings(Summarised):
 
 
 def effect_text(effect: NamedEffect) -> str:
-    numbers = ", ".join(f"{name} {each.value:.4g} {each.unit}".strip() for name, each in effect.parameters.items())
+    numbers = ", ".join(
+        f"{name} {each.value:.4g} {'' if each.unit == '1' else each.unit}".strip()
+        for name, each in effect.parameters.items()
+    )
     return f"{effect.effect} {effect.axis or ''}: {numbers}"

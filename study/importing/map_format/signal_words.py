@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
-from equalizer.signals.quantity_words import quantity_in, words_in
+from equalizer.signals.quantity_words import SEVERAL_MEANINGS, quantity_in, words_in
 from equalizer.signals.units import (
     QUANTITY_UNITS,
     UNSTATED,
@@ -45,7 +45,7 @@ _FOREIGN = {
 }
 FOREIGN_WORDS = {word: quantity for quantity, words in _FOREIGN.items() for word in words}
 """Words in other scripts, by which an encoding is recognised, and the quantity of each."""
-_SURE = ("rad", "mrad", "deg", "mdeg", "rpm", "mm", "cm", "kN", "N m", "mN m", "Hz", "kHz", "kg")
+_SURE = ("rad", "mrad", "rpm", "kN", "N m", "mN m")
 """Units that are nothing else at the end of a name, as `A` of `phase_A` is; so are those with a stroke."""
 _WRITTEN_TOGETHER = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
 _SAID: dict[str, SignalRole] = {
@@ -136,6 +136,8 @@ def name_signal(header: str) -> ParsedName:
     try:
         check_quantity(word, known)
     except UnknownUnitError:
+        if SEVERAL_MEANINGS & set(words_in(name)):
+            return ParsedName(header, name, told, by_unit, "")
         doubt = f"its name says {word}, its unit, {told}, says {by_unit}{force_hint(word, known)}"
         return ParsedName(header, name, told, by_unit, doubt)
     return ParsedName(header, name, told, word, "")

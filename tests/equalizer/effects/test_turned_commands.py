@@ -87,7 +87,10 @@ def test_a_stop_beyond_zero_pushes_as_its_law_written_out(bench):
     law = law_of("-1e4*maximum(y + 2e-4, 0)", "force", "y")
     answers = [
         simulate_mechanism(model, COMMANDS, RATE_HZ, place_effects(model, Channels(INPUTS, OUTPUTS))).response
-        for effect in (ModelEffect("end_stop", "y", FAR_STOP), ModelEffect("discovered_law", "y", {}, law))
+        for effect in (
+            ModelEffect("end_stop", "y", FAR_STOP | {"opposite": 0.5}),
+            ModelEffect("discovered_law", "y", {}, law),
+        )
         for model in [replace(bench.three_axes(), effects=(effect,))]
     ]
     without = simulate_mechanism(bench.three_axes(), COMMANDS, RATE_HZ).response

@@ -171,11 +171,12 @@ def test_a_completed_skeleton_is_a_map(tmp_path):
 @pytest.mark.parametrize(
     ("name", "unit", "quantity", "sure"),
     [
-        ("u_mm", "mm", "position", True), ("displacement_mm", "mm", "position", True),
+        ("u_mm", "mm", "position", False), ("displacement_mm", "mm", "position", True),
         ("omega_rad_s", "rad/s", "velocity", True), ("a_mps2", "m/s^2", "acceleration", True),
         ("torque_Nm", "N m", "torque", True), ("phase_A", "A", "current", False), ("speed [N]", "N", "force", False),
         ("force", "", "force", True), ("voltage_raw", "", "voltage", True), ("knob", "", "", True),
-        ("alpha_deg", "deg", "angle", True), ("load [furlong]", "", "force", False),
+        ("alpha_deg", "deg", "angle", False), ("load [furlong]", "", "force", False),
+        ("Roll [deg/s]", "deg/s", "velocity", True), ("Spannung [MPa]", "MPa", "pressure", True),
     ],
 )  # fmt: skip
 def test_quantity_and_unit_are_read_out_of_a_name(name, unit, quantity, sure):
