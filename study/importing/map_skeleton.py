@@ -34,7 +34,7 @@ def map_skeleton(arrays: Arrays) -> str:
 
 def _lines(whole: Arrays) -> Iterator[str]:
     groups = groups_in(whole.by_name, LEAST_SAMPLES)
-    beside = [name for name in whole.by_name if OF_CELL.match(name) and not name.startswith(groups.prefixes)]
+    beside = _runs_beside(whole, groups)
     arrays = _first_run(whole, groups, beside)
     surplus = surplus_arrays(arrays)
     every = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
@@ -64,6 +64,12 @@ def _lines(whole: Arrays) -> Iterator[str]:
     yield "[[segment]]"
     yield 'kind = "noise"            # multisine, sweep, sine, slow, noise, binary, step, impact, free, rest'
     yield "split = { fit = 0.5, test = 0.5 }"
+
+
+def _runs_beside(whole: Arrays, groups: Groups) -> list[str]:
+    """Runs in cells that are not among the groups; a cell of single numbers holds constants."""
+    long_ones = [name for name, array in whole.by_name.items() if OF_CELL.match(name) and array.size >= LEAST_SAMPLES]
+    return [name for name in long_ones if not name.startswith(groups.prefixes)] if groups.prefixes else []
 
 
 def _first_run(whole: Arrays, groups: Groups, beside: Sequence[str]) -> Arrays:

@@ -62,6 +62,13 @@ def test_a_proposed_map_takes_the_longer_cells_and_says_how_to_add_the_others(tm
     np.testing.assert_array_equal(made.command.samples[:, 0], np.concatenate([RUNS[2], RUNS[4]]))
 
 
+def test_a_cell_of_single_numbers_holds_constants(tmp_path):
+    path = written(tmp_path, gains=cell([1.0, 2.0]), u=RUNS[0], y=RUNS[0])
+    text = map_skeleton(read_arrays(path, CsvMap()))
+    assert "# 1-of-2/gains: one number, a constant for expressions" in text
+    assert [text.count(mark) for mark in ("[[channel]]", "[[part]]")] == [2, 0]
+
+
 @pytest.mark.parametrize("held", OTHERS)
 def test_a_cell_of_anything_else_is_named_with_what_to_do(tmp_path, held):
     path = written(tmp_path, u=cell(OTHERS[held]), y=RUNS[0])
