@@ -84,7 +84,7 @@ class TimeBase:
             return ""
         return (
             f"Clock '{self.name}': its stamps are even but for their last decimal, so {self.rate_hz:.6g} Hz is taken; "
-            f"they lie up to {off_s:.2g} s beside."
+            f"they lie up to {off_s:.2g} s from an even grid."
         )
 
     def samples(self, values: Value) -> Samples:
@@ -209,15 +209,29 @@ def _uniform(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | None]:
 
 
 def _rounded_rate(since_s: Value, unit_s: float) -> float:
-    """Rate of stamps without a gap that are even but for their last decimal, the plainest that fits; else 0. They lie
-    within a unit of it together (the rounding of two), or wander by no more from each to the next, where it is fine."""
+    """Rate of stamps without a gap that are even but for their last decimal; else 0. They lie within a unit of it
+    together (the rounding of two); of rates that leave hardly more than the mean rate does, the plainest is taken. Or a
+    step is now and then a unit of a fine decimal off the usual one, and no stamp half a step."""
+    ticks = np.round(np.diff(since_s) / unit_s) if unit_s else np.zeros(1)
+    if ticks.min() < 1 or _skips_rows(ticks):
+        return 0.0
+    numbers = np.arange(len(since_s))
     mean_hz = (len(since_s) - 1) / float(since_s[-1])
+    least = float(np.ptp(since_s * mean_hz - numbers)) + UNEVEN
     for rate_hz in (*(float(f"{mean_hz:.{digits}g}") for digits in range(1, max(_PLAIN_DIGITS) + 1)), mean_hz):
-        off, unit = since_s * rate_hz - np.arange(len(since_s)), unit_s * rate_hz * (1 + _BINARY)
-        wanders = unit <= UNEVEN * (1 + _BINARY) and np.max(np.abs(np.diff(off))) <= unit
-        if np.ptp(off) < 1 and (wanders or np.ptp(off) <= unit):
+        if np.ptp(since_s * rate_hz - numbers) <= min(unit_s * rate_hz * (1 + _BINARY), least):
             return rate_hz
-    return 0.0
+    usual_hz = 1 / float(np.sort(ticks)[len(ticks) // 2] * unit_s)
+    off, unit = since_s * usual_hz - numbers, unit_s * usual_hz * (1 + _BINARY)
+    wanders = unit <= UNEVEN * (1 + _BINARY) and np.max(np.abs(np.diff(off))) <= unit and np.max(np.abs(off)) < 0.5
+    return usual_hz if wanders else 0.0
+
+
+def _skips_rows(ticks: Value) -> bool:
+    """Whether steps are multiples of the shortest, and no more are longer than a logger skips, by chance too."""
+    usual = LEFT_OUT * len(ticks)
+    skipped = np.count_nonzero(ticks > ticks.min())
+    return not (ticks % ticks.min()).any() and bool(skipped <= usual + 3 * np.sqrt(usual) + 1)
 
 
 def without_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, str]:

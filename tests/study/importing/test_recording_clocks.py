@@ -53,7 +53,28 @@ def test_stamps_that_wander_by_their_last_decimal_are_even_and_that_is_said(file
     steps[40:75], steps[300:310] = 0.0099, 0.0101
     made = built(map_text('time = "t"\ntime_unit = "s"'), files(u=U, y=Y, t=np.round(np.cumsum([0, *steps]), 4)))
     assert made.recording.sample_rate_hz == 100
-    assert "they lie up to 0.0035 s beside." in " ".join(made.notes)
+    assert "they lie up to 0.0035 s from an even grid." in " ".join(made.notes)
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        np.delete(np.arange(41), 17) / 10,
+        np.array([0.0, 1, 2, 3, 5]),
+        np.round(np.cumsum([0, *[0.0100] * 90, *[0.0101] * 90]), 4),
+    ],
+    ids=["a row is missing", "a row of five is missing", "the rate changes"],
+)
+def test_missing_rows_and_changes_of_rate_are_no_rounding(files, stamps):
+    count = len(stamps)
+    path = files(u=U[:count], y=Y[:count], t=stamps)
+    assert "has uneven stamps" in refusal(map_text('time = "t"\ntime_unit = "s"'), path)
+
+
+def test_a_round_rate_is_taken_only_where_it_fits_as_the_mean_rate_does(files):
+    stamps = np.round(np.arange(12) / 7.3, 1)
+    made = built(map_text('time = "t"\ntime_unit = "s"'), files(u=U[:12], y=Y[:12], t=stamps))
+    assert made.recording.sample_rate_hz == pytest.approx(7.3, abs=0.15)
 
 
 @pytest.mark.parametrize("spread", [1.2, 3.0])
