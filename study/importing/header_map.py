@@ -37,13 +37,13 @@ _NAMED = 3
 
 
 def read_headed(path: Path) -> Arrays:
-    """A file that no map describes. Raises CannotReadError; ImportRefusedError, too, for a wrong field in a column that
-    its name says to be a signal, or where no column is without."""
+    """A file that no map describes. Raises CannotReadError; ImportRefusedError, too, for a wrong field in a column whose
+    name says a role, a quantity or a time, or where no column is without."""
     arrays = read_arrays(path, CsvMap())
     faulty = [name for name, array in arrays.by_name.items() if _fault(array)]
     columns = [name_signal(header) for header in arrays.by_name] if faulty else []
     for column, role in zip(columns, propose_roles(columns), strict=True):
-        used = role or _is_time(column) or len(faulty) == len(columns)
+        used = role or column.quantity or _is_time(column) or len(faulty) == len(columns)
         if used and column.header in faulty:
             raise ImportRefusedError(path.name, _fault(arrays.by_name[column.header]), MEND)
     return arrays

@@ -32,7 +32,7 @@ def test_a_remark_beside_the_columns_of_a_map_is_left_out_and_said(tmp_path):
 def test_a_column_that_the_map_takes_is_refused_with_its_wrong_field(tmp_path, value):
     path = table(tmp_path, "t;u;y;;")
     text = map_text(clock=CLOCK).replace('value = "u"', f'value = "{value}"')
-    assert WRONG in refusal(text, path).replace("Line", "line").replace("Line", "line")
+    assert WRONG in refusal(text, path).replace("Line", "line")
 
 
 @pytest.mark.parametrize("name", ["", "remarks"])
@@ -43,10 +43,15 @@ def test_a_header_that_says_all_else_suffices(tmp_path, name):
     assert not any("is no column" in note for note in found.notes)
 
 
-@pytest.mark.parametrize("name", ["stroke [mm]", "temperature", "cmd"])
+@pytest.mark.parametrize("name", ["stroke [mm]", "temperature", "cmd", "current [A]"])
 def test_a_signal_by_its_name_is_not_left_out(tmp_path, name):
     with pytest.raises(ImportRefusedError, match="'steady state error' is not a number"):
         read_foreign((table(tmp_path, f"time [s];force [N];travel [mm];;{name}"),), None)
+
+
+def test_a_wrong_field_does_not_decide_what_is_open(tmp_path):
+    with pytest.raises(ImportRefusedError, match="'steady state error' is not a number"):
+        read_foreign((table(tmp_path, "time [s];voltage [V];travel [mm];;current [A]"),), None)
 
 
 def test_a_proposed_map_has_the_others_and_says_what_is_wrong(tmp_path):
