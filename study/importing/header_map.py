@@ -37,8 +37,8 @@ _NAMED = 3
 
 
 def read_headed(path: Path) -> Arrays:
-    """A file that no map describes. Raises CannotReadError; ImportRefusedError, too, for a wrong field in a column whose
-    name says a role, a quantity or a time, or where no column is without."""
+    """A file that no map describes. Raises CannotReadError; ImportRefusedError, too, for a wrong field in a column
+    whose name says a role, a quantity or a time, or where no column is without."""
     arrays = read_arrays(path, CsvMap())
     faulty = [name for name, array in arrays.by_name.items() if _fault(array)]
     columns = [name_signal(header) for header in arrays.by_name] if faulty else []

@@ -1,6 +1,7 @@
 """Make an incomplete map for a file of which only the arrays are known, to be completed by its owner."""
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import takewhile
@@ -24,6 +25,8 @@ from study.importing.surplus_arrays import (
 
 _FORCES = ("force", "torque")
 _NAMED = 4
+_SHARE = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
+"""Of a name: for which share of the data an array is, as in `u_test`."""
 _TIME_UNITS = ("s", "ms", "us", "min")
 
 
@@ -148,12 +151,17 @@ def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
 
 
 def _cells_beside(beside: Sequence[str], groups: Groups) -> Iterator[str]:
-    """How runs of cells of another length, under other names, are added."""
+    """Runs of cells of another length, and how they are added where their names say which array each is."""
     if beside:
-        prefix, slash, name = beside[-1].partition("/")
         shown = ", ".join(beside[:_NAMED]) + (" ..." if beside[_NAMED:] else "")
-        yield f"\n# Also in the file: {shown}. Such a run is added by"
-        yield f'# [[part]] with prefix = "{prefix}{slash}" and let = {{ {tuple(groups.names)[-1]} = "{name}" }}'
+        yield f"\n# Also in the file, in cells of another length: {shown}"
+    same = {_SHARE.sub("", name): name for name in groups.names if name.isidentifier()}
+    lets: dict[str, list[str]] = {}
+    for prefix, slash, name in (full.partition("/") for full in beside):
+        if (plain := _SHARE.sub("", name)) in same:
+            lets.setdefault(prefix + slash, []).append(f"{same[plain]} = {json.dumps(quote(name))}")
+    for prefix, pairs in list(lets.items())[-1:]:
+        yield f'# Such a run is added by [[part]] with prefix = "{prefix}" and let = {{ {", ".join(pairs)} }}'
 
 
 def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:

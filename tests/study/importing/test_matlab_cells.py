@@ -56,10 +56,17 @@ def test_a_proposed_map_takes_the_longer_cells_and_says_how_to_add_the_others(tm
     path = written(tmp_path, u=cell(RUNS[:3]), y=cell(RUNS[:3]), u_test=cell(RUNS[3:]), y_test=cell(RUNS[3:]))
     text = map_skeleton(read_arrays(path, CsvMap()))
     assert [text.count(mark) for mark in ("[[channel]]", "\n[[part]]", "\n[[clock]]")] == [2, 3, 1]
-    assert 'prefix = "2-of-2/" and let = { y = "y_test" }' in text
+    assert 'prefix = "2-of-2/" and let = { u = "u_test", y = "y_test" }' in text
     parts = '\n[[part]]\nprefix = "3-of-3/"\n[[part]]\nprefix = "2-of-2/"\nlet = { u = "u_test", y = "y_test" }\n'
     made = built(map_text(end=parts), path).recording
     np.testing.assert_array_equal(made.command.samples[:, 0], np.concatenate([RUNS[2], RUNS[4]]))
+
+
+def test_cells_of_other_lengths_are_not_taken_for_each_other(tmp_path):
+    path = written(tmp_path, u=cell(RUNS[:2]), y=cell(RUNS[:3]), y_ref=cell(RUNS[:2]))
+    text = map_skeleton(read_arrays(path, CsvMap()))
+    assert "in cells of another length: " in text
+    assert "let =" not in text
 
 
 def test_a_cell_of_single_numbers_holds_constants(tmp_path):
