@@ -84,10 +84,12 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     parts = ", ".join(f"'{part.prefix.rstrip('/_')}'" for part in wanted.part)
     joined = [f"Put one after another, as parts of one recording: {parts}."] if parts else []
     left_out = [f"Left out: '{name}' {why}." for name, why in surplus_arrays(table).items()]
+    rate = rates_in(arrays).get(wanted.clock[0].rate, "")
+    joined += [f"The sample rate is taken from '{rate}'."] if rate else []
     others = [
         name
         for name, array in arrays.by_name.items()
-        if not array.ndim and name not in wanted.clock[0].rate and not _fault(array)  # which its own remark names
+        if not array.ndim and name != rate and not _fault(array)  # which its own remark names
     ]
     left_out += [f"Left out: '{name}' is no column." for name in others]
     peaks = [f"'{channel.value}'" for channel in wanted.channel if is_peak_value(_bracketed(channel.value))]

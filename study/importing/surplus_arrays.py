@@ -20,7 +20,10 @@ _INDEX = re.compile(
     r"column1|#|unnamed: 0|(index|idx|i|n|nr|no|number|row|record|sample|scan|point)[ _.]?(nr|no|number|#)?\.?",
     re.IGNORECASE,
 )
-_RATE_WORDS = {"fs", "rate", "samplerate", "sampling"}
+_RATE = re.compile(
+    r"(.* )?(fs|(sampl(e|es|ing)|scan|acquisition|logging) ?(rate|freq|frequency)|sampling)(( in)? ?k?hz)?|rate(( in)? ?k?hz)?"
+)
+"""Words of the name of a sample rate; not of an excitation rate."""
 _STEP_WORDS = {"ts", "dt"}
 _USUAL_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
 _EVEN = 0.02
@@ -52,15 +55,23 @@ def is_growing_time(name: str, array: Array) -> bool:
 
 def name_words(name: str) -> set[str]:
     """Words of a name without its unit, in small letters."""
-    plain = unit_in(name)[0].lower()
-    return set("".join(letter if letter.isalnum() else " " for letter in plain).split())
+    return set(_words(unit_in(name)[0]))
+
+
+def _words(plain: str) -> list[str]:
+    return "".join(letter if letter.isalnum() else " " for letter in plain.lower()).split()
+
+
+def _last(name: str) -> str:
+    """Of a name of several levels (`data.fs`, `1-of-2/fs`), without its unit."""
+    return re.split(r"[./](?=\w)(?!k?Hz\b)", unit_in(name)[0])[-1]
 
 
 def rates_in(arrays: Arrays) -> Mapping[str, str]:
     """Single numbers that are called a sample rate, or the step between samples, by the expression that gives the rate;
     rates first."""
     single = [name for name, array in arrays.by_name.items() if array.size == 1 and array.dtype.kind in "fiu"]
-    rates = {name: name for name in single if name_words(name) & _RATE_WORDS}
+    rates = {name: name for name in single if _RATE.fullmatch(" ".join(_words(_last(name))))}
     steps = {f"1 / {quote(name)}": name for name in single if name_words(name) & _STEP_WORDS}
     return {**rates, **steps}
 

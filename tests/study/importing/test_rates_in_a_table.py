@@ -25,13 +25,35 @@ def test_a_number_in_the_first_row_alone_is_a_single_number(tmp_path, first):
 
 @pytest.mark.parametrize(
     ("name", "first"),
-    [("fs_Hz", "250"), ("Fs [Hz]", "250"), ("sampling rate [Hz]", "250"), ("Ts_s", "0.004"), ("dt [s]", "0.004")],
+    [
+        ("fs_Hz", "250"),
+        ("Fs [Hz]", "250"),
+        ("sampling rate [Hz]", "250"),
+        ("sample_rate_hz", "250"),
+        ("Ts_s", "0.004"),
+        ("dt [s]", "0.004"),
+    ],
 )
 def test_it_is_the_rate_where_its_name_says_so(tmp_path, name, first):
     found = read_foreign((table(tmp_path, f"force [N],travel [mm],{name}", first),), None)
     assert found.recording.sample_rate_hz == pytest.approx(250, rel=1e-12)
     np.testing.assert_array_equal(found.recording.command.samples[:, 0], [k % 7 for k in range(30)])
     assert not any("is no column" in note for note in found.notes)
+    assert f"The sample rate is taken from '{name}'." in found.notes
+
+
+@pytest.mark.parametrize("name", ["excitation rate [Hz]", "frequency [Hz]"])
+def test_another_number_in_hertz_is_not_the_rate(tmp_path, name):
+    with pytest.raises(MapNeededError, match="no number is the sample rate") as needed:
+        read_foreign((table(tmp_path, f"force [N],travel [mm],{name}", "2"),), None)
+    assert "\nrate = " not in needed.value.skeleton
+
+
+def test_a_number_whose_name_is_part_of_that_of_the_rate_is_said_to_be_no_column(tmp_path):
+    path = tmp_path / "run.csv"
+    rows = (f"{k % 7},{k % 5},{'' if k else 250},{'' if k else 3}" for k in range(30))
+    path.write_text("\n".join(("force [N],travel [mm],fs_Hz,s", *rows)) + "\n")
+    assert "Left out: 's' is no column." in read_foreign((path,), None).notes
 
 
 @pytest.mark.parametrize(
