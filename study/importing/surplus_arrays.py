@@ -21,7 +21,7 @@ _INDEX = re.compile(
     re.IGNORECASE,
 )
 _RATE = re.compile(
-    r"(.* )?(fs|(sampl(e|es|ing)|scan|acquisition|logging) ?(rate|freq|frequency)|sampling)(( in)? ?k?hz)?|rate(( in)? ?k?hz)?"
+    r"((.* )?(fs|(sampl(e|es|ing)|scan|acquisition|logging) ?(rate|freq|frequency)|sampling)|rate)(( in)? ?k?hz)?"
 )
 """Words of the name of a sample rate; not of an excitation rate."""
 _STEP_WORDS = {"ts", "dt"}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.table_cells import EMPTY, Line, holds_number, is_comment, is_text, split_row
+from study.importing.arrays.table_cells import EMPTY, Line, holds_number, is_comment, is_number, is_text, split_row
 from study.importing.arrays.table_layout import TableLayout, find_layout
 from study.importing.arrays.table_marks import NO_THOUSANDS
 from study.importing.arrays.table_text import read_text
@@ -90,8 +90,8 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
 
 
 def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
-    """Without columns of words alone. In place of a column with a field that is neither a number nor, in a column of
-    such, a date or a clock time, what is wrong with it."""
+    """Without columns of words alone. In place of a column with words among its numbers, what is wrong with it. Raises
+    ValueError for a field that is a number in another notation."""
     numbers: dict[str, npt.NDArray[Any]] = {}
     stamps, words = {}, []
     for name, column in columns.items():
@@ -105,6 +105,8 @@ def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: Ta
             try:
                 numbers[name] = _without_blanks(_numbers(column, name, body, layout))
             except ValueError as problem:
+                if not all(is_number(field, layout.decimal) or is_text(field) for field in column.str.strip()):
+                    raise  # a number in another notation is no remark
                 numbers[name] = np.array(FaultyColumn(problem), dtype=object)
     joined = join_stamps(stamps)
     in_seconds = {name: _seconds_name(name, columns) for name in joined}

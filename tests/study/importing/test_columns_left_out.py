@@ -49,6 +49,12 @@ def test_a_signal_by_its_name_is_not_left_out(tmp_path, name):
         read_foreign((table(tmp_path, f"time [s];force [N];travel [mm];;{name}"),), None)
 
 
+@pytest.mark.parametrize("written", ["1,234,5", "1 234,5", "12:30", "3 mm"])
+def test_a_number_in_another_notation_is_no_remark(tmp_path, written):
+    path = table(tmp_path, "t;u;y;;enc", written)
+    assert f"Line 5, column 'enc': '{written}' is not a number" in refusal(map_text(clock=CLOCK), path)
+
+
 def test_a_wrong_field_does_not_decide_what_is_open(tmp_path):
     with pytest.raises(ImportRefusedError, match="'steady state error' is not a number"):
         read_foreign((table(tmp_path, "time [s];voltage [V];travel [mm];;current [A]"),), None)
