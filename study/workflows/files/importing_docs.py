@@ -110,8 +110,8 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   Other encodings (GBK, Shift-JIS, EUC, KOI8 ...) are recognised by a word for what is measured in them, such as 位移 or
   сила, and that is said; else `encoding` under `[csv]` states it, and the error shows how the text reads in each.
   Delimiters with which all lines end are no columns. Columns of words, columns that number the rows, and lines of words
-  below the last row are left out, and that is said. So is a column with a field that is no number, unless the map or
-  its name says that it is a signal: then it is refused. Signs between thousands are refused, and so are commas and
+  below the last row are left out, and that is said. So is a column with words among its numbers, unless the map takes
+  it or its name says a quantity or a role: then it is refused. Signs between thousands are refused, and so are commas and
   points that may be such (`1,250`; `1.886` beside `946`) until `decimal` under `[csv]` says that they are the decimal
   sign.
 * **Workbooks**: each sheet with rows of numbers is read as a table. Of several, arrays are named with their sheet
@@ -149,8 +149,10 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   fifths of the lower Nyquist frequency; from uneven stamps to 5e-5 up to a tenth, and 2e-3 up to a fifth, of their mean
   rate (tested with sinusoids).
 * **Even stamps** are those of which each lies within 2 % of a step of its place, or all within the rounding of their
-  last decimal, as whole milliseconds at 400 Hz. Steps that differ by a single unit of a fine last decimal (9.9, 10.0
-  and 10.1 ms) are even too. How far the stamps lie beside is said.
+  last decimal, as whole milliseconds at 400 Hz. Steps that are now and then a single unit of a fine last decimal (up to
+  2 % of a step) off the usual one, as 9.9 and 10.1 among 10.0 ms, are even too, as long as no stamp lies half a step
+  from an even grid; a change of rate is not. Where all steps are multiples of the shortest, and no more than about 2 %
+  are longer (in a short table, a few), rows were left out. How far stamps lie from the even grid is said.
 * **Missing** samples are NaN. Rows that a uniform logger has left out, and gaps in uneven stamps, become NaN; what lies
   beside them stays. Where nothing is missing between them, as in a log of changes, `gap_s` of the clock says from which
   step on there is a gap; the channels then need `resample`.
@@ -172,8 +174,9 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   or sines and the force does not, as on a testing machine; else the force. Either is said, with the way to turn it.
   The map that is proposed also takes `cmd`, `input`, `output`, `u` beside `y`, and `ref` or `target` (a helper) for
   what they say. `hapteq diagnose` takes a response in no unit for what its name says.
-* **Rate**: where no column is the time, a single number in hertz (`fs_Hz`, `rate [Hz]`) is the sample rate, or one in
-  seconds (`Ts_s`, `dt [s]`) the step. In a table it stands in the first row, with nothing below. The map that is
+* **Rate**: where no column is the time, a single number in hertz that is called so (`fs_Hz`, `rate [Hz]`, `sampling
+  frequency [Hz]`, not `excitation rate [Hz]`) is the sample rate, or one in seconds (`Ts_s`, `dt [s]`) the step, and
+  that is said. In a table it stands in the first row, with nothing below. The map that is
   proposed takes `fs` and `Ts` without a unit, too.
 * **Time** runs along the only dimension of a channel. Of a table of arrays take a row (`y[0]`) or column (`y[:, 0]`).
   Signals that carry their own time, as tables of [time, value] and as Simulink stores them (`force.time`,
