@@ -111,9 +111,9 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   сила, and that is said; else `encoding` under `[csv]` states it, and the error shows how the text reads in each.
   Delimiters with which all lines end are no columns. Columns of words, columns that number the rows, and lines of words
   below the last row are left out, and that is said. So is a column with words among its numbers, unless the map takes
-  it or its name says a quantity or a role: then it is refused. Signs between thousands are refused, and so are commas and
-  points that may be such (`1,250`; `1.886` beside `946`) until `decimal` under `[csv]` says that they are the decimal
-  sign.
+  it or its name says a quantity or a role: then it is refused. Signs between thousands are refused, and so are
+  commas and points that may be such (`1,250`; `1.886` beside `946`) until `decimal` under `[csv]` says that they are
+  the decimal sign.
 * **Workbooks**: each sheet with rows of numbers is read as a table. Of several, arrays are named with their sheet
   (`Run 1/force [N]`), and sheets that are alike and numbered are parts, which is said. Hidden sheets are left out.
   `sheet` under `[csv]` takes a single one. Percents are read as they are shown where a header says percent. Formulas
@@ -176,8 +176,8 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   what they say. `hapteq diagnose` takes a response in no unit for what its name says.
 * **Rate**: where no column is the time, a single number in hertz that is called so (`fs_Hz`, `rate [Hz]`, `sampling
   frequency [Hz]`, not `excitation rate [Hz]`) is the sample rate, or one in seconds (`Ts_s`, `dt [s]`) the step, and
-  that is said. In a table it stands in the first row, with nothing below. The map that is
-  proposed takes `fs` and `Ts` without a unit, too.
+  that is said. In a table it stands in the first row, with nothing below. The map that is proposed takes `fs` and
+  `Ts` without a unit, too.
 * **Time** runs along the only dimension of a channel. Of a table of arrays take a row (`y[0]`) or column (`y[:, 0]`).
   Signals that carry their own time, as tables of [time, value] and as Simulink stores them (`force.time`,
   `force.signals.values`, several as `scope.signals.1.values`), get a `[[clock]]` each in the map that is proposed;
