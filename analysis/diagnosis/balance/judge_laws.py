@@ -42,6 +42,7 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
 MENDS_SHAPE = "it acts like a named law, and may only mend its shape"
+NOT_ALONE = ("its gain is too small to be named", "it gains too unevenly from stretch to stretch")
 DRY_FRICTIONS = {
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
     "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
@@ -291,13 +292,9 @@ def _judge_further_laws(
         laws = (*chosen.laws, number)
         errors = _held_out_errors(regression, laws)
         gain, low = gain_with_bound(held, errors)
-        values = values_of(regression, laws)[-1] or {}
-        share = float((held - errors).sum()) / room
-        why = "it takes too little beside what is named" if chosen.laws else "its gain is too small to be named"
-        if not chosen.laws and gain > FURTHER_LAW_GAIN:
-            why = "it gains too unevenly from stretch to stretch"
+        values, share = values_of(regression, laws)[-1] or {}, float((held - errors).sum()) / room
+        why = "it takes too little beside what is named" if chosen.laws else NOT_ALONE[gain > FURTHER_LAW_GAIN]
         if gain > 0 and low > 0:
-            possible = force_ratio(regression, laws, number) <= LARGEST_LAW_FORCE
-            law = regression.laws[number]
+            law, possible = regression.laws[number], force_ratio(regression, laws, number) <= LARGEST_LAW_FORCE
             found.append(JudgedLaw(number, law, values, gain, low, share, (), 0.0, why, possible=possible))
     return tuple(sorted(found, key=lambda each: -each.gain))
