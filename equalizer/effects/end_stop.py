@@ -37,9 +37,10 @@ def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    way = values.get("side", -1.0 if values["position"] < 0 else 1.0)
+    side = values.get("side", 0.0)
+    way = float(np.sign(side)) or (-1.0 if values["position"] < 0 else 1.0)
     # On the far side of zero the two stops would overlap.
-    opposite = 0.0 if "side" in values else values.get("opposite", 0.0)
+    opposite = 0.0 if side else values.get("opposite", 0.0)
     return np.array([way * values["position"], values["stiffness"], way, -way, opposite])
 
 
@@ -75,8 +76,9 @@ def _best_stop(
 
 EFFECT = Effect(
     name="end_stop",
-    equation="F = -stiffness (x - position) beyond position; beyond is above for a side of 1 and below "
-    "for -1; without a side, beyond is away from zero, and at -position stands a stop of opposite times that stiffness",
+    equation="F = -stiffness (x - position) beyond position; beyond is above for a positive side and below "
+    "for a negative one; without a side, or for 0, beyond is away from zero, and at -position stands a stop of "
+    "opposite times that stiffness",
     source="Brogliato, Nonsmooth Mechanics, chapter 2",
     signature="nothing is missing until the axis comes near its farthest positions; then a force pushes back, and odd "
     "and even harmonics appear",

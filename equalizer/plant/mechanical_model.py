@@ -217,8 +217,6 @@ def effect_problems(effect: ModelEffect) -> Iterator[str]:
             yield f"{effect.kind} has no parameter '{name}'{suggest_word(name, names)}; allowed are {', '.join(names)}"
         elif not np.isfinite(value):
             yield f"{effect.kind}.{name} is {value}; it must be a finite number"
-    if effect.parameters.get("side", 1.0) not in (1.0, -1.0):
-        yield f"{effect.kind}.side is {effect.parameters['side']}; it must be 1 (met going up) or -1 (going down)"
     missing = [
         f"{part.name} ({part.unit})"
         for part in known.parameters

@@ -72,10 +72,6 @@ def test_a_model_cannot_be_changed():
             {"effects": (ModelEffect("backlash", "x", {"gap": np.nan}),)},
             "effect 1: backlash.gap is nan; it must be a finite number",
         ),
-        (
-            {"effects": (ModelEffect("end_stop", "x", {"position": 0.1, "stiffness": 1e3, "side": 0.0}),)},
-            "effect 1: end_stop.side is 0.0; it must be 1 (met going up) or -1 (going down)",
-        ),
     ],
 )
 def test_what_cannot_be_is_refused_in_words(changes, problem):

@@ -28,7 +28,6 @@ output = [[1]]
 """
 
 numbers = st.floats(-1e6, 1e6, allow_subnormal=False)
-sides = st.sampled_from([-1.0, 1.0])
 amounts = st.floats(0.0, 1e6, allow_subnormal=False)
 words = st.text(st.characters(exclude_categories=("Cs",)), min_size=1, max_size=20)
 
@@ -44,11 +43,7 @@ def models(draw):
 
     kinds = draw(st.lists(st.sampled_from(EFFECT_NAMES), max_size=3))
     effects = tuple(
-        ModelEffect(
-            kind.name,
-            draw(st.none() | words),
-            {part.name: draw(sides if part.name == "side" else numbers) for part in kind.parameters},
-        )
+        ModelEffect(kind.name, draw(st.none() | words), {part.name: draw(numbers) for part in kind.parameters})
         for kind in kinds
     )
     root = matrix(n, n) * 1e-6

@@ -70,6 +70,12 @@ def apart(bench, effect: ModelEffect) -> float:
     return float(np.std(after.response - before.response) / done)
 
 
+@pytest.mark.parametrize(("side", "way"), [(2.5, 1.0), (-1.0, -1.0), (0.0, -1.0)])
+def test_of_a_side_the_sign_counts_and_zero_is_as_none(bench, side, way):
+    packed = EFFECTS["end_stop"].acts.pack(bench.three_axes(), 0, FAR_STOP | {"side": side, "opposite": 0.3})
+    assert packed.tolist() == [way * FAR_STOP["position"], FAR_STOP["stiffness"], way, -way, 0.0 if side else 0.3]
+
+
 @pytest.mark.parametrize("kind", sorted(NUMBERS))
 def test_the_turned_model_answers_to_the_turned_command_as_before(bench, kind):
     axis = None if "one" not in EFFECTS[kind].sites else "y"
