@@ -39,9 +39,11 @@ class _Axis:
         return undo
 
 
-def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: bool) -> Iterator[Fault]:
+def actuator_faults(
+    number: int, name: str, parts: Sequence[Part], by_force: bool, late_s: Sequence[float]
+) -> Iterator[Fault]:
     """All faults of the actuator of axis `number`. parts: all compared ones, which the grids span. by_force: the base
-    predicts the command, not the response."""
+    predicts the command, not the response. late_s: see `likely_delays_s`."""
     axis = _Axis(number, name)
     whole = np.concatenate([part.command[:, number] for part in parts])
     top = float(np.abs(whole).max(initial=0.0)) or 1.0
@@ -52,7 +54,7 @@ def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: boo
     yield axis.fault("actuator_cubic", [cubed])
     longest = max(parts, key=lambda part: len(part.command))
     times = delays_to_try(longest.command[:, number], longest.rate_hz)
-    yield axis.fault("transport_delay", [_delay(axis, time_s) for time_s in times])
+    yield axis.fault("transport_delay", [_delay(axis, time_s) for time_s in (*times, *late_s)])
     yield axis.fault("amplifier_lag", [_lag(axis, time_s) for time_s in times])
     shares = np.quantile(np.abs(whole), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / top
     limits = sorted(top * share for share in (*shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)

@@ -1,7 +1,7 @@
 """Base model by autoregression: each response from its past and the commands (ARX; Ljung, System Identification, 2nd
 ed., chapter 4.2). For devices that no force balance describes: voltages as responses, many modes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,11 @@ class AutoregressiveBase:
     def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
         return tuple(self._rows(part) for part in parts)
 
+    def command_columns(self, part: Part) -> Mask:
+        """(1 + columns,): which columns commands make."""
+        past, pushed = self.order * part.response.shape[1], (self.order + 1) * part.command.shape[1]
+        return np.array([False] * (1 + past) + [True] * pushed + [False])
+
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         found = []
         for part in parts:
@@ -38,10 +43,18 @@ class AutoregressiveBase:
     def _rows(self, part: Part) -> FloatArray:
         response, command = (decimate(samples, part.rate_hz, self.step) for samples in (part.response, part.command))
         count = len(response) - self.order
-        past = [response[self.order - lag : self.order - lag + count] for lag in range(1, self.order + 1)]
+        past = [course[self.order - lag : self.order - lag + count] for lag, course in self._past(response)]
         pushed = [command[self.order - lag : self.order - lag + count] for lag in range(self.order + 1)]
         now = response[self.order :, [self.channel]]
         return np.hstack([now, *past, *pushed, np.ones((count, 1))])
+
+    def _past(self, response: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+        """The last `order` values as a value, its change, and the changes of that change, each with its lag. Of smooth
+        readings the values themselves are so alike that products of them leave errors below 1e-5 to rounding."""
+        change = np.diff(response, axis=0, prepend=response[:1])
+        again = np.diff(change, axis=0, prepend=change[:1])
+        yield from [(1, response), (1, change)][: self.order]
+        yield from ((lag, again) for lag in range(1, self.order - 1))
 
 
 def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:

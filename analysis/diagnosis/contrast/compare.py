@@ -22,8 +22,8 @@ from analysis.diagnosis.contrast.joint_products import (
 from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
-from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
-from analysis.diagnosis.contrast.stream import Stream, rows_with_fault_undone, stream_of
+from analysis.diagnosis.contrast.sensor_faults import Rows, faults_of_all, sensor_faults, sensor_misalignment
+from analysis.diagnosis.contrast.stream import Stream, likely_delays_s, rows_with_fault_undone, stream_of
 from analysis.diagnosis.settings import (
     BOOTSTRAP_LEVEL,
     CONTRAST_BLOCKS,
@@ -125,9 +125,8 @@ def compare(
         found = _judge_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
     except (np.linalg.LinAlgError, ValueError):
         return None
-    base = streams[0].base
-    step_s = 1 / base.rate_hz if isinstance(base, ForceBase) else base.step / sides[0][0].rate_hz
-    return replace(found, faulty_share=min(unexplained_share(base, sides[1]), 1.0), by_force=by_force, step_s=step_s)
+    share = min(unexplained_share(streams[0].base, sides[1]), 1.0)
+    return replace(found, faulty_share=share, by_force=by_force, step_s=streams[0].row_s)
 
 
 def _set_up(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> tuple[list[Stream], list[Fault], bool]:
@@ -138,17 +137,19 @@ def _set_up(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> tuple[list[Str
     band_hz, step = (motions[0].band_hz, motions[0].step) if motions else (np.inf, 1)
     table = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=False)}
     streams = [stream_of(base, clean, faulty) for base in (*bases, *sensor_bases(clean, band_hz, step))]
+    late_s = likely_delays_s(streams)
+    rows = Rows(clean[0].rate_hz, 1 if by_force else round(streams[0].row_s * clean[0].rate_hz), late_s)
     faults: list[Fault] = []
     turns = is_rotational(recording)
     for axis, name in enumerate(recording.command.channels):
         if timed:
             faults += mechanism_faults(axis, name, motions, lambda part: table[id(part.recording)], turns)
         if not recording.meta.get("imposed"):
-            faults += actuator_faults(axis, name, (*clean, *faulty), by_force)
+            faults += actuator_faults(axis, name, (*clean, *faulty), by_force, late_s)
     for channel, name in enumerate(recording.response.channels):
-        faults += sensor_faults(channel, name, (*clean, *faulty))
+        faults += sensor_faults(channel, name, (*clean, *faulty), rows)
     if len(recording.response.channels) > 1:
-        faults += faults_of_all((*clean, *faulty))
+        faults += faults_of_all((*clean, *faulty), rows)
     if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"}:
         faults.append(sensor_misalignment())
     return streams, faults, by_force

@@ -16,8 +16,6 @@ ColumnChange = Callable[[FloatArray, float, Part], FloatArray]
 """Maps columns (n, k) of a part that predict a command, at a rate in Hz, to those that predict the faulty command."""
 
 
-Unit = Callable[[int], float]
-"""Maps a decimation step to a scale factor."""
 Numbers = Callable[[FloatArray], dict[str, float]]
 
 
@@ -36,7 +34,7 @@ class Variant:
     least: float = -np.inf
     most: float = np.inf
     """Bounds of each size: about 1 where undoing is not linear in the size."""
-    unit: Unit = lambda step: 1.0
+    unit: float = 1.0
     """Factor by which the errors of a faulty sensor are scaled: else a gain that makes every error small would win."""
     column_change: ColumnChange | None = None
     """How the predicted command changes with the fault, where that is known. Undoing a gain or a lag in the recorded

@@ -61,12 +61,24 @@ class _Channel:
         return undo
 
 
-def sensor_faults(number: int, name: str, parts: Sequence[Part]) -> Iterator[Fault]:
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Of the base that predicts the responses."""
+
+    rate_hz: float
+    """Sample rate of the recordings."""
+    step: int
+    """Samples from one row to the next."""
+    late_s: tuple[float, ...]
+    """How late the readings seem to be; see `likely_delays_s`."""
+
+
+def sensor_faults(number: int, name: str, parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
     """All faults of response channel `number`. parts: all compared ones, which the grids span."""
     whole = np.concatenate([part.response[:, number] for part in parts])
     channel = _Channel((number,), name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
     longest = max(parts, key=lambda part: len(part.response))
-    yield from _common_faults(channel, parts, longest.response[:, number])
+    yield from _common_faults(channel, parts, longest.response[:, number], rows)
     shares = [side * share for share in BENT for side in (1.0, -1.0)]
     yield channel.fault("sensor_nonlinearity", [_nonlinearity(channel, share, 3, "cubic") for share in shares])
     yield channel.fault("sensor_asymmetry", [_nonlinearity(channel, share, 2, "square") for share in shares])
@@ -76,7 +88,7 @@ def sensor_faults(number: int, name: str, parts: Sequence[Part]) -> Iterator[Fau
             yield _cross_axis_sensitivity(channel, other)
 
 
-def faults_of_all(parts: Sequence[Part]) -> Iterator[Fault]:
+def faults_of_all(parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
     """Faults that all channels share, as those of one supply, filter or logger. parts: as in `sensor_faults`."""
     whole = np.vstack([part.response for part in parts])
     sizes = np.std(whole, axis=0)
@@ -85,12 +97,12 @@ def faults_of_all(parts: Sequence[Part]) -> Iterator[Fault]:
     channel = _Channel(tuple(range(whole.shape[1])), "", float(sizes[largest]) or 1.0, top)
     longest = max(parts, key=lambda part: len(part.response))
     alike = len(set(longest.recording.response.units)) == 1
-    for fault in _common_faults(channel, parts, longest.response[:, largest]):
+    for fault in _common_faults(channel, parts, longest.response[:, largest], rows):
         if alike or fault.effect not in IN_UNITS:
             yield fault
 
 
-def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray) -> Iterator[Fault]:
+def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray, rows: Rows) -> Iterator[Fault]:
     """Faults that one channel may have, or all. course: (n,) of the longest part."""
     longest = max(parts, key=lambda part: len(part.response))
     times = delays_to_try(course, longest.rate_hz)
@@ -99,8 +111,8 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray)
     yield channel.fault("sensor_offset", [_offset(channel, shift) for shift in shifts])
     drifts = [_drift(channel, shift, begun) for shift in shifts for begun in BEGUN]
     yield replace(channel.fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
-    yield channel.fault("logger_offset", [_logger_offset(channel, time_s) for time_s in times])
-    yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz) for time_s in times])
+    yield channel.fault("logger_offset", [_logger_offset(channel, time_s) for time_s in (*times, *rows.late_s)])
+    yield channel.fault("sensor_lag", [_lag(channel, time_s, rows) for time_s in times])
     period = longest.rate_hz / median_frequency_hz(course, longest.rate_hz)
     rates = [side * late * period / longest.whole for late in LATE for side in (1.0, -1.0)]
     runs_on = (True, False) if any(part.start > 0 for part in parts) else (True,)
@@ -143,7 +155,7 @@ def _gain(channel: _Channel, gain: float) -> Variant:
     undo = channel.of(lambda y, rate: y / gain)
     of_size: Callable[[float], float] = lambda size: 1 / (1 + size * (1 / gain - 1))  # noqa: E731
     about = lambda size: _gain(channel, of_size(size))  # noqa: E731
-    return Variant((undo,), lambda s: {"gain": of_size(float(s[0]))}, *AROUND, lambda step: gain, about=about)
+    return Variant((undo,), lambda s: {"gain": of_size(float(s[0]))}, *AROUND, gain, about=about)
 
 
 def _offset(channel: _Channel, shift: float) -> Variant:
@@ -169,20 +181,15 @@ def _logger_offset(channel: _Channel, time_s: float) -> Variant:
     return Variant((undo,), proportional_number("offset", time_s), *AROUND, about=about)
 
 
-def _lag(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
-    """A first-order low pass, y += share (x - y) per sample, inverted exactly."""
-    kept = float(np.exp(-1 / (time_s * rate_hz)))
-    undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1], y[:-1]])) / (1 - kept))
+def _lag(channel: _Channel, time_s: float, rows: Rows) -> Variant:
+    """A first-order low pass, y += (1 - kept) (x - y) per row, inverted exactly. A row is predicted from rows alone, so
+    that samples between them, which come later, may not enter here either. The one-step prediction error shrinks by
+    the geometric mean of the low pass's gain (Kolmogorov's formula), which is 1 - kept."""
+    kept = float(np.exp(-rows.step / (time_s * rows.rate_hz)))
+    undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1]] * rows.step + [y])[: len(y)]) / (1 - kept))
     numbers: Numbers = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
-    about = lambda size: _lag(channel, size * time_s, rate_hz)  # noqa: E731
-    return Variant((undo,), numbers, *AROUND, lambda step: _mean_gain(kept, step), about=about)
-
-
-def _mean_gain(kept: float, step: int) -> float:
-    """Geometric mean gain of the low pass over the band of the decimated samples: by it the one-step prediction error
-    shrinks (Kolmogorov's formula)."""
-    turn = np.pi / step * (np.arange(256) + 0.5) / 256
-    return float(np.exp(np.mean(np.log((1 - kept) / np.abs(1 - kept * np.exp(-1j * turn))))))
+    about = lambda size: _lag(channel, size * time_s, rows)  # noqa: E731
+    return Variant((undo,), numbers, *AROUND, 1 - kept, about=about)
 
 
 def _nonlinearity(channel: _Channel, share: float, power: int, number: str) -> Variant:

@@ -66,6 +66,12 @@ class Stream:
     gap_reach: int
     """Rows beside a gap that are left out; see `_reach_of_gaps`."""
 
+    @property
+    def row_s(self) -> float:
+        """Time from one row to the next, in s."""
+        base = self.base
+        return 1 / base.rate_hz if isinstance(base, ForceBase) else base.step / self.clean.parts[0].rate_hz
+
     def grams(self, side: Side, changed: Sequence[Undone]) -> Grams:
         """Products of a side's rows and of their changes by undone faults; see `Grams`."""
         moved = [_changed_columns(each.rows, side.rows) for each in changed]
@@ -184,7 +190,7 @@ def rows_with_fault_undone(stream: Stream, side: Side, fault: Fault, variant: Va
         undone = tuple(undo(part) for part in side.parts)
         still = all(a.response is b.response for a, b in zip(undone, side.parts, strict=True))
         rows = stream.base.rows(undone, side.rows if still else None)
-        unit = variant.unit(_step_of(stream.base)) if tells else 1.0
+        unit = variant.unit if tells else 1.0
         known = all(a.known is b.known for a, b in zip(undone, side.parts, strict=True))
         lost = None if known else _lost_rows(stream, side, undone)
         unit *= _spread_ratio(side, rows) if tells and fault.place == "actuator" else 1.0
@@ -198,8 +204,41 @@ def _lost_rows(stream: Stream, side: Side, undone: Sequence[Part]) -> tuple[Mask
     return tuple(mask & ~_settled(now, stream.gap_reach) for mask, now in zip(side.masks, valid, strict=True))
 
 
-def _step_of(base: Base) -> int:
-    return base.step if isinstance(base, AutoregressiveBase) else 1
+def likely_delays_s(streams: Sequence[Stream]) -> tuple[float, ...]:
+    """Per base of the device, how late the responses of the faulty set seem to be beside its commands, where they do.
+
+    With the weights of the clean set, errors are the sum of a part that the responses make and one that the commands
+    make. How they fit at all shifts is their cross-correlation: no grid is so fine that it would surely meet the narrow
+    valley about the delay of a signal with many oscillations in it.
+    """
+    found = []
+    for stream in streams:
+        if not isinstance(stream.base, SensorBase):
+            late = _best_shift(stream) * stream.row_s
+            found += [late] if late > 0 else []
+    return tuple(found)
+
+
+def _best_shift(stream: Stream) -> int:
+    """Rows by which the responses of the faulty set are to be moved ahead for the least mean square error, by at most
+    a quarter of each part."""
+    weights = weights_of(stream.clean.white.T @ stream.clean.white) / stream.columns
+    pushed = np.arange(len(weights)) == 0
+    if isinstance(stream.base, AutoregressiveBase):
+        pushed = stream.base.command_columns(stream.clean.parts[0])
+    shares = np.column_stack([weights * ~pushed, weights * pushed])
+    made = [apply_filter(stream.colour, rows @ shares)[REACH:-REACH] for rows in stream.other.rows]
+    most = max(min(len(part) for part in made) // 4, 1)
+    errors = np.sum([_errors_by_shift(part[:, 0], part[:, 1], most) for part in made if len(part)], axis=0)
+    counts = np.sum([len(part) - np.arange(most) for part in made if len(part)], axis=0)
+    return int(np.argmin(errors / counts)) if np.ndim(errors) else 0
+
+
+def _errors_by_shift(read: FloatArray, driven: FloatArray, most: int) -> FloatArray:
+    """(most,): sums of squares of read(t + shift) + driven(t) over the times that both have."""
+    room = next_fast_len(2 * len(read), True)
+    common = irfft(np.conj(rfft(driven, room)) * rfft(read, room), room)[:most]
+    return np.asarray(np.cumsum(read[::-1] ** 2)[::-1][:most] + np.cumsum(driven**2)[::-1][:most] + 2 * common)
 
 
 def _source_of(base: Base) -> tuple[str, int]:
