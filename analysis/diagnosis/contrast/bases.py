@@ -1,5 +1,6 @@
 """Chooses the base model of a comparison: a force balance where it fits, else an autoregressive model (ARX)."""
 
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -10,13 +11,14 @@ from analysis.diagnosis.contrast.force_base import force_base
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.stream import Base
 from analysis.diagnosis.settings import AUTOREGRESSIVE_ORDER, BALANCE_HOLDS, CONSTANT_SIGNAL, MOTIONS_APART
+from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 
-def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> tuple[list[Base], tuple[Motion, ...]]:
-    """Force bases, one per axis, where they fit both sides (the faulty one may be empty); else autoregressive bases,
-    one per response. And the motions of both sides; empty where none was measured."""
+def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tuple[list[Base], tuple[Motion, ...]]]:
+    """Force bases, one per axis, where they fit the clean side; then autoregressive bases, one per response. Each with
+    the motions of both sides (the faulty one may be empty); empty where none was measured."""
     recording = clean[0].recording
     turning = is_rotational(recording)
     motions: tuple[Motion, ...] = ()
@@ -26,11 +28,11 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> tuple[list[Ba
         motions = (*first, *more)
     if motions and np.isfinite(motions[0].band_hz):
         bases: list[Base] = [force_base(motions, axis, turning) for axis in range(len(recording.command.channels))]
-        if all(unexplained_share(base, side) < BALANCE_HOLDS for base in bases for side in (clean, faulty) if side):
-            return bases, motions
+        if all(unexplained_share(base, clean) < BALANCE_HOLDS for base in bases):
+            yield bases, motions
     step = likely_step((*clean, *faulty))
     channels = range(len(recording.response.channels))
-    return [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step) for channel in channels], motions
+    yield [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step) for channel in channels], motions
 
 
 def move_alike(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
@@ -54,7 +56,12 @@ def is_rotational(recording: Recording) -> bool:
 
 def unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:
     """Standard deviation of a base's residual over that of what it predicts; infinite where that is constant."""
-    rows = np.vstack([part[mask] for part, mask in zip(base.rows(parts), base.valid_samples(parts), strict=True)])
+    return unexplained_share_of_rows(base.rows(parts), base.valid_samples(parts))
+
+
+def unexplained_share_of_rows(parts: Sequence[FloatArray], masks: Sequence[Mask]) -> float:
+    """The same from the base's rows of each part, and which of them are valid."""
+    rows = np.vstack([part[mask] for part, mask in zip(parts, masks, strict=True)])
     size = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
     spread = float(np.std(rows[:, 0]))
     if spread <= CONSTANT_SIGNAL * size[0]:

@@ -7,8 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.judged_law import bootstrap_draws
+from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
-from analysis.diagnosis.contrast.bases import bases_of, is_rotational, move_alike, unexplained_share
+from analysis.diagnosis.contrast.bases import (
+    bases_of,
+    is_rotational,
+    move_alike,
+    unexplained_share,
+    unexplained_share_of_rows,
+)
 from analysis.diagnosis.contrast.fault import Fault, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import (
@@ -23,8 +30,9 @@ from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import Rows, faults_of_all, sensor_faults, sensor_misalignment
-from analysis.diagnosis.contrast.stream import Stream, likely_delays_s, rows_with_fault_undone, stream_of
+from analysis.diagnosis.contrast.stream import Base, Stream, likely_delays_s, rows_with_fault_undone, stream_of
 from analysis.diagnosis.settings import (
+    BALANCE_HOLDS,
     BOOTSTRAP_LEVEL,
     CONTRAST_BLOCKS,
     LEAST_FAULT_GAIN,
@@ -93,6 +101,8 @@ class Comparison:
     usual_clean: float
     """The same of the clean set alone."""
     by_force: bool
+    unbalanced: bool
+    """The forces of the faulty set do not balance, not even with the best fault undone."""
     step_s: float
     complete: bool
     """All faults were tested before the time ran out."""
@@ -121,17 +131,20 @@ def compare(
     if not all(sides) or not move_alike(*sides):
         return None
     try:
-        streams, faults, by_force = _set_up(*sides)
-        found = _judge_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
+        for bases, motions in bases_of(*sides):
+            streams, faults = _set_up(*sides, bases, motions)
+            found = _judge_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
+            if not found.unbalanced:
+                return found
     except (np.linalg.LinAlgError, ValueError):
-        return None
-    share = min(unexplained_share(streams[0].base, sides[1]), 1.0)
-    return replace(found, faulty_share=share, by_force=by_force, step_s=streams[0].row_s)
+        pass
+    return None
 
 
-def _set_up(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> tuple[list[Stream], list[Fault], bool]:
+def _set_up(
+    clean: tuple[Part, ...], faulty: tuple[Part, ...], bases: Sequence[Base], motions: tuple[Motion, ...]
+) -> tuple[list[Stream], list[Fault]]:
     recording = clean[0].recording
-    bases, motions = bases_of(clean, faulty)
     by_force = isinstance(bases[0], ForceBase)
     timed = bool(motions) and np.isfinite(motions[0].band_hz)
     band_hz, step = (motions[0].band_hz, motions[0].step) if motions else (np.inf, 1)
@@ -152,7 +165,7 @@ def _set_up(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> tuple[list[Str
         faults += faults_of_all((*clean, *faulty), rows)
     if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"}:
         faults.append(sensor_misalignment())
-    return streams, faults, by_force
+    return streams, faults
 
 
 def _judge_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Comparison:
@@ -178,7 +191,32 @@ def _judge_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left:
     apart = zip(SIXTHS, _leave_out_blocks(bare), strict=True)
     held = sum(held_out_error(kept, np.zeros(0), out) for out, kept in apart)
     usual = [max(_excesses_within_a_set(each)) for each in (clean, [pair.with_it.blocks for pair in bare])]
-    return Comparison(tuple(weighed), plain.errors, samples, own, held, 0.0, max(usual), usual[0], True, 0.0, complete)
+    by_force = isinstance(streams[0].base, ForceBase)
+    return Comparison(
+        tuple(weighed), plain.errors, samples, own, held,
+        min(unexplained_share(streams[0].base, streams[0].other.parts), 1.0), max(usual), usual[0],
+        by_force, by_force and not _balances(streams, best[:1]), streams[0].row_s, complete,
+    )  # fmt: skip
+
+
+def _balances(streams: Sequence[Stream], best: Sequence[Tried]) -> bool:
+    """Whether the forces of the faulty set balance, with nothing or with the best fault undone. best: at most one."""
+    device = [stream for stream in streams if isinstance(stream.base, ForceBase)]
+    ways = [[stream.other.rows for stream in device], *([_undo(stream, each) for stream in device] for each in best)]
+    return any(
+        all(unexplained_share_of_rows(rows, stream.other.masks) < BALANCE_HOLDS
+            for rows, stream in zip(way, device, strict=True)) for way in ways
+    )  # fmt: skip
+
+
+def _undo(stream: Stream, found: Tried) -> tuple[FloatArray, ...]:
+    """The rows of the faulty set with a fault undone."""
+    fit, fault, variant, _ = found
+    changed = rows_with_fault_undone(stream, stream.other, fault, variant)
+    return tuple(
+        plain + sum(size * (each.rows[k] - plain) for size, each in zip(fit.sizes, changed, strict=True))
+        for k, plain in enumerate(stream.other.rows)
+    )
 
 
 def _try_variant(bare: Sequence[Pair], streams: Sequence[Stream], fault: Fault, variant: Variant) -> Tried | None:

@@ -124,7 +124,7 @@ def held_out_change(sound: Recording, rest: Recording, spoiled: Recording) -> fl
     if not before or not after or not clean:
         return None
     try:
-        bases = bases_of(clean, ())[0]
+        bases = next(bases_of(clean, ()))[0]
         found = [_error(base, clean, after) / max(_error(base, clean, before), 1e-300) for base in bases]
     except (np.linalg.LinAlgError, ValueError):
         return None

@@ -14,14 +14,14 @@ from analysis.diagnosis.contrast.stream import REACH, Stream, Undone, stream_of
 @pytest.fixture(scope="module")
 def stream(rig) -> Stream:
     clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
-    return stream_of(bases_of(clean, other)[0][0], clean, other)
+    return stream_of(next(bases_of(clean, other))[0][0], clean, other)
 
 
 def test_the_ends_of_a_part_and_what_lies_beside_a_gap_do_not_count(rig):
     clean = split_into_parts([rig.recording(1)])
     gap = np.arange(rig.COUNT) == 2500
     with_gap = replace(clean[0], known=clean[0].known & ~gap)
-    (mask,) = stream_of(bases_of(clean, ())[0][0], (with_gap,), clean).clean.masks
+    (mask,) = stream_of(next(bases_of(clean, ()))[0][0], (with_gap,), clean).clean.masks
     assert len(mask) == rig.COUNT
     assert not mask[:REACH].any() and not mask[-REACH:].any()
     assert not mask[2500 - REACH : 2501 + REACH].any()
@@ -35,7 +35,7 @@ def test_sparse_losses_leave_most_rows_to_compare_by(lost, rig):
     gone = np.arange(rig.COUNT) % 30 == 0 if lost == "every 30th" else random.random(rig.COUNT) < 0.1
     clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
     lossy = replace(other[0], known=other[0].known & ~gone)
-    compared = stream_of(bases_of(clean, other)[0][0], clean, (lossy,))
+    compared = stream_of(next(bases_of(clean, other))[0][0], clean, (lossy,))
     assert compared.other.count > 0.8 * compared.clean.count
 
 
@@ -43,7 +43,7 @@ def test_a_side_with_too_few_rows_is_not_compared(rig):
     clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
     bare = replace(other[0], known=np.arange(rig.COUNT) < 60)
     with pytest.raises(ValueError, match="too few rows"):
-        stream_of(bases_of(clean, other)[0][0], clean, (bare,))
+        stream_of(next(bases_of(clean, other))[0][0], clean, (bare,))
 
 
 def test_what_undoing_a_fault_loses_stays_as_it_was(stream):
