@@ -89,8 +89,21 @@ def test_a_drive_that_follows_slowly_is_named(rig):
         reached += np.clip(wanted - reached, -limit, limit)
         given[k] = reached
     part = split_into_parts([replace(plain, command=replace(plain.command, samples=asked[:, None]))])
-    (fault,) = [each for each in actuator_faults(0, "fx", part, True) if each.effect == "slew_limit"]
+    (fault,) = [each for each in actuator_faults(0, "fx", part, True, ()) if each.effect == "slew_limit"]
     left = [np.std(variant.undo[0](part[0]).command[:, 0] - given) for variant in fault.variants]
     best = fault.variants[int(np.argmin(left))]
     assert best.values(np.ones(1))["rate"] == pytest.approx(40.0, rel=0.5)
     assert min(left) < 0.3 * np.std(asked - given)
+
+
+def test_a_force_that_upsets_the_balance_of_forces_is_named_by_it(rig):
+    """Without it, half of that recording's forces are left over."""
+    plain = rig.recording(2)
+    pull = 2.5 * np.sin(2 * np.pi * plain.response.samples / 0.012 + 0.3)
+    drawn = replace(plain, command=replace(plain.command, samples=plain.command.samples + pull))
+    found = compare([drawn], [rig.recording(1)], frozenset(), rig.time_left)
+    assert found is not None and found.by_force and found.faulty_share > 0.4
+    best = found.faults[0]
+    assert best.fault.effect == "cogging"
+    assert best.values["pitch"] == pytest.approx(0.012, rel=0.05)
+    assert best.values["amplitude"] == pytest.approx(2.5, rel=0.1)
