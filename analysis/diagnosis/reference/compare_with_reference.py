@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.contrast.compare import Comparison, compare
+from analysis.diagnosis.contrast.compare import compare
+from analysis.diagnosis.contrast.comparison import Comparison
 from analysis.diagnosis.contrast.decide import Decision, decide
 from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.signal_faults import SignalFault, find_hum, find_quantization, find_sensor_noise

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.contrast.compare import Comparison, JudgedFault
+from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
 from analysis.diagnosis.contrast.decide import BOUND, Decision
 from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
