@@ -4,5 +4,6 @@
 the device is, faults or not; `mechanism_faults`, `actuator_faults` and `sensor_faults` list what may have come since,
 each as something that can be undone (`fault`); `stream` and `joint_products` fit one base to both sets with a fault
 undone in one, by products of columns; `compare` tests all faults, against what sets stretches of one set apart, too;
-`comparison` holds what it found; `decide` says what may be named. `signal_faults` finds hum, white noise and a quantized command.
+`comparison` holds what it found; `decide` says what may be named. `signal_faults` finds hum, white noise and a
+quantized command.
 """
