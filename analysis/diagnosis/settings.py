@@ -285,7 +285,6 @@ RESPONSE_BAND_SHARE = 0.999  # share of the response's power below the band's en
 RESPONSE_OVERSAMPLED = 3.0  # samples per period of the band's end, at least
 SENSOR_TAPS = 2  # samples before and after that predict a reading: filters of the two sensors differ by so much
 PART_LEAST_SAMPLES = 64  # samples of a part at least
-PART_FIRST_SAMPLES = 3  # first known samples of a part that are left out: what is late by less read before it began
 # samples of a recording that are used at most, its last: enough to find a fault that matters, in bounded time
 PART_MOST_SAMPLES = 40000
 # blocks of each set: a fault that acts in a small part of a recording, such as a stop that is hit twice, must be

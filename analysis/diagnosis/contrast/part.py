@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.data.measured_motion import fill_gaps
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import part_of, parts_of
-from analysis.diagnosis.settings import PART_FIRST_SAMPLES, PART_LEAST_SAMPLES, PART_MOST_SAMPLES
+from analysis.diagnosis.settings import PART_LEAST_SAMPLES, PART_MOST_SAMPLES
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -55,16 +55,14 @@ class Part:
 
 
 def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
-    """The parts of recordings, each from its first known responses to its last; short ones are left out. What is late
-    may read before a part began, and a law with memory would begin from there."""
+    """The parts of recordings, each from its first known response to its last; short ones are left out."""
     found: list[Part] = []
     for recording in recordings:
         for start, stop in parts_of(recording):
             begin = max(start, len(recording) - PART_MOST_SAMPLES)
             known = np.flatnonzero(_finite_samples(part_of(recording, begin, stop)))
             if len(known) and known[-1] - known[0] + 1 >= PART_LEAST_SAMPLES:
-                first = int(known[0]) + PART_FIRST_SAMPLES
-                found.append(_fill_part(recording, begin + first, begin + int(known[-1]) + 1))
+                found.append(_fill_part(recording, begin + int(known[0]), begin + int(known[-1]) + 1))
     return tuple(found)
 
 

@@ -113,7 +113,8 @@ def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Strea
     valid = tuple(base.valid_samples(parts) for parts in (clean, other))
     gap_reach = min(_reach_of_gaps(side) for side in valid)
     masks = tuple(tuple(_settled(mask, gap_reach) for mask in side) for side in valid)
-    fewest = max(CONTRAST_BLOCKS, 2 * rows[0][0].shape[1])
+    # A block must be longer than errors are correlated: of shorter ones, resampling them says nothing.
+    fewest = max(CONTRAST_BLOCKS * REACH, 2 * rows[0][0].shape[1])
     if any(sum(int(mask.sum()) for mask in side) < fewest for side in masks):
         raise ValueError("too few rows are left of one set to be compared by")
     everything = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
