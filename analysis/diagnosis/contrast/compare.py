@@ -2,6 +2,7 @@
 removes between stretches of one set, for no real device repeats itself exactly."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -62,14 +63,12 @@ def compare(
     sides = split_into_parts(clean), split_into_parts(recordings)
     if not all(sides) or not move_alike(*sides):
         return None
-    try:
-        for bases, motions in bases_of(*sides):
+    for bases, motions in bases_of(*sides):
+        with suppress(np.linalg.LinAlgError, ValueError):
             streams, faults = _set_up(*sides, bases, motions)
             found = _judge_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
             if not found.unbalanced:
                 return found
-    except (np.linalg.LinAlgError, ValueError):
-        pass
     return None
 
 
