@@ -26,10 +26,13 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tupl
         first = motions_of([part.to_observed() for part in clean])
         more = motions_of([part.to_observed() for part in faulty], first[0].band_hz) if faulty else ()
         motions = (*first, *more)
+    forces: list[Base] = []
     if motions and np.isfinite(motions[0].band_hz):
-        bases: list[Base] = [force_base(motions, axis, turning) for axis in range(len(recording.command.channels))]
-        if all(unexplained_share(base, clean) < BALANCE_HOLDS for base in bases):
-            yield bases, motions
+        with suppress(np.linalg.LinAlgError, ValueError):
+            bases: list[Base] = [force_base(motions, axis, turning) for axis in range(len(recording.command.channels))]
+            forces = bases if all(unexplained_share(base, clean) < BALANCE_HOLDS for base in bases) else []
+    if forces:
+        yield forces, motions
     step = likely_step((*clean, *faulty))
     channels = range(len(recording.response.channels))
     yield [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step) for channel in channels], motions

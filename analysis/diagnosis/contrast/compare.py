@@ -63,12 +63,13 @@ def compare(
     sides = split_into_parts(clean), split_into_parts(recordings)
     if not all(sides) or not move_alike(*sides):
         return None
-    for bases, motions in bases_of(*sides):
-        with suppress(np.linalg.LinAlgError, ValueError):
-            streams, faults = _set_up(*sides, bases, motions)
-            found = _judge_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
-            if not found.unbalanced:
-                return found
+    with suppress(np.linalg.LinAlgError, ValueError):  # of the bases themselves: there is no other left
+        for bases, motions in bases_of(*sides):
+            with suppress(np.linalg.LinAlgError, ValueError):
+                streams, faults = _set_up(*sides, bases, motions)
+                found = _judge_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
+                if not found.unbalanced:
+                    return found
     return None
 
 

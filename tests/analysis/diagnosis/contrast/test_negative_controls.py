@@ -61,3 +61,13 @@ def test_what_is_cut_short_ends_with_what_it_has(rig):
     found = compare([rig.recording(2, "added_mass", 0.3)], [rig.recording(1)], frozenset(), lambda: False)
     assert found is not None and not found.complete
     assert decide(found, 1).named is None
+
+
+def test_a_balance_that_cannot_be_solved_leaves_the_other_base_to_compare_by(rig, monkeypatch):
+    def unsolvable(*of: object) -> None:
+        raise np.linalg.LinAlgError("singular matrix")
+
+    monkeypatch.setattr("analysis.diagnosis.contrast.bases.force_base", unsolvable)
+    monkeypatch.setattr("analysis.diagnosis.contrast.bases.likely_step", lambda parts: 1)
+    found = compare([rig.recording(2)], [rig.recording(1)], frozenset(), lambda: False)
+    assert found is not None and not found.by_force
