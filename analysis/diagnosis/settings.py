@@ -332,4 +332,5 @@ NOISE_EVEN = 1.6  # ratio of the powers of white noise in two bands at most
 NOISE_STRETCHES = 6
 REVERSAL_OF_GAP = 0.05  # share of a gap by which a reading must go back to count as a reversal
 CLOCK_FASTEST = 0.05  # relative rate error of a clock at most
+LATE_STEP = 0.25  # rows from one delay to the next that are tried about that of a cross-correlation
 LONGEST_DELAY = 0.3  # largest delay, over the period of the command's median frequency

@@ -6,7 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from analysis.diagnosis.contrast.fault import ColumnChange, Fault, Numbers, Undo, Variant, proportional_number
+from analysis.diagnosis.contrast.fault import (
+    ColumnChange,
+    Fault,
+    Numbers,
+    Rows,
+    Undo,
+    Variant,
+    fix_size,
+    proportional_number,
+)
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import LONGEST_DELAY
 from equalizer.effects.simulation.sensor_path import filter_one_pole
@@ -39,11 +48,9 @@ class _Axis:
         return undo
 
 
-def actuator_faults(
-    number: int, name: str, parts: Sequence[Part], by_force: bool, late_s: Sequence[float]
-) -> Iterator[Fault]:
+def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: bool, rows: Rows) -> Iterator[Fault]:
     """All faults of the actuator of axis `number`. parts: all compared ones, which the grids span. by_force: the base
-    predicts the command, not the response. late_s: see `likely_delays_s`."""
+    predicts the command, not the response."""
     axis = _Axis(number, name)
     whole = np.concatenate([part.command[:, number] for part in parts])
     top = float(np.abs(whole).max(initial=0.0)) or 1.0
@@ -54,7 +61,10 @@ def actuator_faults(
     yield axis.fault("actuator_cubic", [cubed])
     longest = max(parts, key=lambda part: len(part.command))
     times = delays_to_try(longest.command[:, number], longest.rate_hz)
-    yield axis.fault("transport_delay", [_delay(axis, time_s) for time_s in (*times, *late_s)])
+    yield axis.fault("transport_delay", [
+        *(_delay(axis, time_s) for time_s in times),
+        *(replace(fix_size(_delay(axis, time_s), rows.late_step_s), column_change=None) for time_s in rows.late_s),
+    ])  # fmt: skip
     yield axis.fault("amplifier_lag", [_lag(axis, time_s) for time_s in times])
     shares = np.quantile(np.abs(whole), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / top
     limits = sorted(top * share for share in (*shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)
@@ -101,7 +111,12 @@ def drift_course(part: Part, begun: float) -> FloatArray:
 
 def _delay(axis: _Axis, time_s: float) -> Variant:
     change: ColumnChange = lambda x, rate, part: shift_samples(x, -time_s * rate)  # noqa: E731
-    undo = axis.of(lambda u, rate: shift_samples(u[:, None], time_s * rate)[:, 0])
+
+    def undo(part: Part) -> Part:
+        late = time_s * part.rate_hz
+        undone = axis.of(lambda u, rate: shift_samples(u[:, None], late)[:, 0])(part)
+        return replace(undone, known=part.known & (np.arange(len(part.known)) >= late))
+
     about = lambda size: _delay(axis, size * time_s)  # noqa: E731
     return Variant((undo,), proportional_number("delay", time_s), *AROUND, column_change=change, about=about)
 

@@ -1,7 +1,7 @@
 """Base model by autoregression: each response from its past and the commands (ARX; Ljung, System Identification, 2nd
 ed., chapter 4.2). For devices that no force balance describes: voltages as responses, many modes."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,20 +15,24 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AutoregressiveBase:
-    """One response. Rows are its next value, then the past of all responses and commands, and 1."""
+    """One response. Rows are its second difference, then the past of all responses and commands, and 1.
+
+    The past is given as the last value, its difference, and second differences: of smooth readings the values are so
+    alike that their products, in double precision, leave errors below 1e-5 of them to rounding."""
 
     channel: int
     order: int
     step: int
     """Decimation step, after a low pass."""
+    responses: int
+    """Number of response channels."""
 
     def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
         return tuple(self._rows(part) for part in parts)
 
-    def command_columns(self, part: Part) -> Mask:
-        """(1 + columns,): which columns commands make."""
-        past, pushed = self.order * part.response.shape[1], (self.order + 1) * part.command.shape[1]
-        return np.array([False] * (1 + past) + [True] * pushed + [False])
+    def command_columns(self, width: int) -> Mask:
+        """(width,): which columns commands make."""
+        return (np.arange(width) > self.order * self.responses) & (np.arange(width) < width - 1)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         found = []
@@ -42,19 +46,21 @@ class AutoregressiveBase:
 
     def _rows(self, part: Part) -> FloatArray:
         response, command = (decimate(samples, part.rate_hz, self.step) for samples in (part.response, part.command))
-        count = len(response) - self.order
-        past = [course[self.order - lag : self.order - lag + count] for lag, course in self._past(response)]
-        pushed = [command[self.order - lag : self.order - lag + count] for lag in range(self.order + 1)]
-        now = response[self.order :, [self.channel]]
-        return np.hstack([now, *past, *pushed, np.ones((count, 1))])
+        count = max(len(response) - self.order, 0)
+        first = np.diff(response, axis=0, prepend=response[:1])
+        second = np.diff(first, axis=0, prepend=first[:1])
 
-    def _past(self, response: FloatArray) -> Iterator[tuple[int, FloatArray]]:
-        """The last `order` values as a value, its change, and the changes of that change, each with its lag. Of smooth
-        readings the values themselves are so alike that products of them leave errors below 1e-5 to rounding."""
-        change = np.diff(response, axis=0, prepend=response[:1])
-        again = np.diff(change, axis=0, prepend=change[:1])
-        yield from [(1, response), (1, change)][: self.order]
-        yield from ((lag, again) for lag in range(1, self.order - 1))
+        def before(samples: FloatArray, lag: int) -> FloatArray:
+            return samples[self.order - lag : self.order - lag + count]
+
+        past = [before(second, lag) for lag in range(1, self.order - 1)]
+        pushed = [before(command, lag) for lag in range(self.order + 1)]
+        now = before(second[:, [self.channel]], 0)
+        return np.hstack([now, before(response, 1), before(first, 1), *past, *pushed, np.ones((count, 1))])
+
+    def values(self, rows: FloatArray) -> FloatArray:
+        """(n,): the response itself: its second difference, the value before, and the difference before."""
+        return np.asarray(rows[:, 0] + rows[:, 1 + self.channel] + rows[:, 1 + self.responses + self.channel])
 
 
 def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:

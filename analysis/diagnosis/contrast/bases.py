@@ -1,4 +1,4 @@
-"""Chooses the base model of a comparison: a force balance where it fits, else an autoregressive model (ARX)."""
+"""Lists the base models of a comparison: first a force balance where it fits, then an autoregressive model (ARX)."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -9,7 +9,7 @@ from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase, likely_step
 from analysis.diagnosis.contrast.force_base import force_base
 from analysis.diagnosis.contrast.part import Part
-from analysis.diagnosis.contrast.stream import Base
+from analysis.diagnosis.contrast.stream import FEWEST_ROWS, Base
 from analysis.diagnosis.settings import AUTOREGRESSIVE_ORDER, BALANCE_HOLDS, CONSTANT_SIGNAL, MOTIONS_APART
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording
@@ -33,9 +33,10 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tupl
             forces = bases if all(unexplained_share(base, clean) < BALANCE_HOLDS for base in bases) else []
     if forces:
         yield forces, motions
-    step = likely_step((*clean, *faulty))
-    channels = range(len(recording.response.channels))
-    yield [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step) for channel in channels], motions
+    fewest = min(sum(len(part.known) for part in side) for side in (clean, faulty) if side)
+    step = max(min(likely_step((*clean, *faulty)), fewest // (2 * FEWEST_ROWS)), 1)
+    count = len(recording.response.channels)
+    yield [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step, count) for channel in range(count)], motions
 
 
 def move_alike(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
@@ -58,16 +59,17 @@ def is_rotational(recording: Recording) -> bool:
 
 
 def unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:
-    """Standard deviation of a base's residual over that of what it predicts; infinite where that is constant."""
-    return unexplained_share_of_rows(base.rows(parts), base.valid_samples(parts))
+    """Standard deviation of a base's residual over that of the signal; infinite where that is constant."""
+    return unexplained_share_of_rows(base, base.rows(parts), base.valid_samples(parts))
 
 
-def unexplained_share_of_rows(parts: Sequence[FloatArray], masks: Sequence[Mask]) -> float:
+def unexplained_share_of_rows(base: Base, parts: Sequence[FloatArray], masks: Sequence[Mask]) -> float:
     """The same from the base's rows of each part, and which of them are valid."""
     rows = np.vstack([part[mask] for part, mask in zip(parts, masks, strict=True)])
+    signal = base.values(rows) if isinstance(base, AutoregressiveBase) else rows[:, 0]
     size = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
-    spread = float(np.std(rows[:, 0]))
-    if spread <= CONSTANT_SIGNAL * size[0]:
+    spread = float(np.std(signal))
+    if spread <= CONSTANT_SIGNAL * float(np.sqrt(np.mean(signal**2))):
         return np.inf
     weights = np.linalg.lstsq(rows[:, 1:] / size[1:], rows[:, 0], rcond=1e-10)[0]
     return float(np.std(rows[:, 0] - rows[:, 1:] / size[1:] @ weights)) / spread

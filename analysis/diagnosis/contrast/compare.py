@@ -3,7 +3,7 @@ removes between stretches of one set, for no real device repeats itself exactly.
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from analysis.diagnosis.contrast.bases import (
     unexplained_share_of_rows,
 )
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
-from analysis.diagnosis.contrast.fault import Fault, Variant
+from analysis.diagnosis.contrast.fault import Fault, Rows, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import (
     Fit,
@@ -31,22 +31,35 @@ from analysis.diagnosis.contrast.joint_products import (
 from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
-from analysis.diagnosis.contrast.sensor_faults import Rows, faults_of_all, sensor_faults, sensor_misalignment
+from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
 from analysis.diagnosis.contrast.stream import Base, Stream, likely_delays_s, rows_with_fault_undone, stream_of
 from analysis.diagnosis.settings import (
     BALANCE_HOLDS,
     BOOTSTRAP_LEVEL,
     CONTRAST_BLOCKS,
+    LATE_STEP,
     LEAST_FAULT_GAIN,
     SIZE_IS_NEAR,
     UNDOING_ROUNDS,
 )
-from analysis.diagnosis.types import TimeBudget
+from analysis.diagnosis.types import Mask, TimeBudget
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 Tried = tuple[Fit, Fault, Variant, list[Pair]]
 """A variant of a fault with its best size."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    bare: list[Pair]
+    """Per base, the products of both sets with nothing undone."""
+    tried: list[Tried]
+    """Each fault by its best variant; the one that leaves least first."""
+    complete: bool
+    """All faults were tried before the time ran out."""
+
+
 ALL = tuple(range(CONTRAST_BLOCKS))
 SIXTHS, THIRDS = (tuple(tuple(ALL[k : k + size]) for k in ALL[::size]) for size in (len(ALL) // 6, len(ALL) // 3))
 FOLDS = len(SIXTHS)
@@ -63,13 +76,12 @@ def compare(
     sides = split_into_parts(clean), split_into_parts(recordings)
     if not all(sides) or not move_alike(*sides):
         return None
-    with suppress(np.linalg.LinAlgError, ValueError):  # of the bases themselves: there is no other left
-        for bases, motions in bases_of(*sides):
-            with suppress(np.linalg.LinAlgError, ValueError):
-                streams, faults = _set_up(*sides, bases, motions)
-                found = _judge_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
-                if not found.unbalanced:
-                    return found
+    for bases, motions in bases_of(*sides):
+        with suppress(np.linalg.LinAlgError, ValueError):
+            streams, faults = _set_up(*sides, bases, motions)
+            trial = _try_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
+            if not isinstance(bases[0], ForceBase) or _balances(streams, trial.tried):
+                return _judge_faults(streams, trial)
     return None
 
 
@@ -81,16 +93,20 @@ def _set_up(
     timed = bool(motions) and np.isfinite(motions[0].band_hz)
     band_hz, step = (motions[0].band_hz, motions[0].step) if motions else (np.inf, 1)
     table = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=False)}
-    streams = [stream_of(base, clean, faulty) for base in (*bases, *sensor_bases(clean, band_hz, step))]
-    late_s = likely_delays_s(streams)
-    rows = Rows(clean[0].rate_hz, 1 if by_force else round(streams[0].row_s * clean[0].rate_hz), late_s)
+    streams = [stream_of(base, clean, faulty) for base in bases]
+    for base in sensor_bases(clean, band_hz, step):
+        with suppress(ValueError):  # too few rows of it: the others are compared
+            streams.append(stream_of(base, clean, faulty))
+    row_s = streams[0].row_s
+    lag_samples = 1 if by_force else round(row_s * clean[0].rate_hz)
+    rows = Rows(lag_samples, likely_delays_s(streams), LATE_STEP * row_s)
     faults: list[Fault] = []
     turns = is_rotational(recording)
     for axis, name in enumerate(recording.command.channels):
         if timed:
             faults += mechanism_faults(axis, name, motions, lambda part: table[id(part.recording)], turns)
         if not recording.meta.get("imposed"):
-            faults += actuator_faults(axis, name, (*clean, *faulty), by_force, late_s)
+            faults += actuator_faults(axis, name, (*clean, *faulty), by_force, rows)
     for channel, name in enumerate(recording.response.channels):
         faults += sensor_faults(channel, name, (*clean, *faulty), rows)
     if len(recording.response.channels) > 1:
@@ -100,12 +116,9 @@ def _set_up(
     return streams, faults
 
 
-def _judge_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Comparison:
+def _try_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Trial:
     clean = [stream.grams(stream.clean, []).blocks for stream in streams]
     bare = [Pair(stream.grams(stream.other, []), ALL, tuple(own)) for stream, own in zip(streams, clean, strict=True)]
-    plain = fit_sizes(bare, None)
-    own = sum(stream.other.count for stream in streams)
-    samples = own + sum(stream.clean.count for stream in streams)
     best: list[Tried] = []
     complete = False
     for fault in faults:
@@ -116,39 +129,50 @@ def _judge_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left:
             best.append(_approach(min(tried, key=_error_of), bare, streams))
     else:
         complete = True
-    best.sort(key=_error_of)
+    return Trial(bare, sorted(best, key=_error_of), complete)
+
+
+def _judge_faults(streams: Sequence[Stream], trial: Trial) -> Comparison:
+    bare = trial.bare
+    plain = fit_sizes(bare, None)
+    own = sum(stream.other.count for stream in streams)
+    samples = own + sum(stream.clean.count for stream in streams)
     weighed = sorted(
-        (_judge_fault(streams, found, plain, samples) for found in best), key=lambda each: float(each.errors.sum())
+        (_judge_fault(streams, found, plain, samples) for found in trial.tried),
+        key=lambda each: float(each.errors.sum()),
     )
     apart = zip(SIXTHS, _leave_out_blocks(bare), strict=True)
     held = sum(held_out_error(kept, np.zeros(0), out) for out, kept in apart)
-    usual = [max(_excesses_within_a_set(each)) for each in (clean, [pair.with_it.blocks for pair in bare])]
-    by_force = isinstance(streams[0].base, ForceBase)
+    blocks = [pair.without for pair in bare], [pair.with_it.blocks for pair in bare]
+    usual = [max(_excesses_within_a_set([np.array(products) for products in side])) for side in blocks]
+    first = streams[0]
     return Comparison(
-        tuple(weighed), plain.errors, samples, own, held,
-        min(unexplained_share(streams[0].base, streams[0].other.parts), 1.0), max(usual), usual[0],
-        by_force, by_force and not _balances(streams, best[:1]), streams[0].row_s, complete,
+        tuple(weighed), plain.errors, samples, own, held, min(unexplained_share(first.base, first.other.parts), 1.0),
+        max(usual), usual[0], isinstance(first.base, ForceBase), first.row_s, trial.complete,
     )  # fmt: skip
 
 
-def _balances(streams: Sequence[Stream], best: Sequence[Tried]) -> bool:
-    """Whether the forces of the faulty set balance, with nothing or with the best fault undone. best: at most one."""
+def _balances(streams: Sequence[Stream], tried: Sequence[Tried]) -> bool:
+    """Whether the forces of the faulty set balance, with nothing or with the best fault undone. tried: the best
+    first."""
     device = [stream for stream in streams if isinstance(stream.base, ForceBase)]
-    ways = [[stream.other.rows for stream in device], *([_undo(stream, each) for stream in device] for each in best)]
+    if all(unexplained_share_of_rows(each.base, each.other.rows, each.other.masks) < BALANCE_HOLDS for each in device):
+        return True
     return any(
-        all(unexplained_share_of_rows(rows, stream.other.masks) < BALANCE_HOLDS
-            for rows, stream in zip(way, device, strict=True)) for way in ways
-    )  # fmt: skip
+        all(unexplained_share_of_rows(each.base, *_undo(each, found)) < BALANCE_HOLDS for each in device)
+        for found in tried[:1]
+    )
 
 
-def _undo(stream: Stream, found: Tried) -> tuple[FloatArray, ...]:
-    """The rows of the faulty set with a fault undone."""
+def _undo(stream: Stream, found: Tried) -> tuple[list[FloatArray], list[Mask]]:
+    """The rows of the faulty set with a fault undone, and those of which something is left."""
     fit, fault, variant, _ = found
     changed = rows_with_fault_undone(stream, stream.other, fault, variant)
-    return tuple(
-        plain + sum(size * (each.rows[k] - plain) for size, each in zip(fit.sizes, changed, strict=True))
-        for k, plain in enumerate(stream.other.rows)
-    )
+    rows, masks = list(stream.other.rows), list(stream.other.masks)
+    for k, (plain, mask) in enumerate(zip(stream.other.rows, stream.other.masks, strict=True)):
+        rows[k] = plain + sum(size * (each.rows[k] - plain) for size, each in zip(fit.sizes, changed, strict=True))
+        masks[k] = mask & ~np.any([each.lost[k] for each in changed if each.lost], axis=0)
+    return rows, masks
 
 
 def _try_variant(bare: Sequence[Pair], streams: Sequence[Stream], fault: Fault, variant: Variant) -> Tried | None:
@@ -197,8 +221,12 @@ def _judge_fault(streams: Sequence[Stream], found: Tried, plain: Fit, samples: i
     fits = [fit_sizes(kept, variant) for kept in apart]
     sides = [[variant.values(fit.sizes) for fit in fits], _values_without_clean_blocks(pairs, variant)]
     held = sum(held_out_error(kept, each.sizes, out) for out, kept, each in zip(SIXTHS, apart, fits, strict=True))
-    spread = {name: float(np.sqrt(sum(_jackknife_variance([other[name] for other in side]) for side in sides)))
-              for name in values}  # fmt: skip
+    spread = {
+        name: float(
+            np.sqrt(variant.grid_error**2 + sum(_jackknife_variance([o[name] for o in side]) for side in sides))
+        )
+        for name in values
+    }
     gains = (
         list(_gains_within_a_set(streams, fault, variant, fit.sizes))
         if plain.error > (1 + LEAST_FAULT_GAIN) * fit.error

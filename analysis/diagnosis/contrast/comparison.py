@@ -53,8 +53,6 @@ class Comparison:
     usual_clean: float
     """The same of the clean set alone."""
     by_force: bool
-    unbalanced: bool
-    """The forces of the faulty set do not balance, not even with the best fault undone."""
     step_s: float
     complete: bool
     """All faults were tested before the time ran out."""

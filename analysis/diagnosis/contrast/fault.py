@@ -1,7 +1,7 @@
 """A fault as something that can be undone: what would have been recorded without it, of a given size."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,8 @@ class Variant:
     column_change: ColumnChange | None = None
     """How the predicted command changes with the fault, where that is known. Undoing a gain or a lag in the recorded
     command instead would make errors smaller that the fault did not cause."""
+    grid_error: float = 0.0
+    """Standard error of its number where its size is fixed, from the distance to the next variant."""
     about: Callable[[float], "Variant"] | None = None
     """The fault about another size, where undoing it is not linear: that size is its size 1."""
 
@@ -55,6 +57,23 @@ class Fault:
     """Faults that it holds as special cases."""
     varies: bool = False
     """It changes in the course of a recording, so that stretches of a faulty one differ by it, too."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Spacing of the rows of a base, and the delays that a cross-correlation suggests."""
+
+    lag_samples: int
+    """Samples of the recordings over which a lag of the responses is inverted: one row of an autoregression."""
+    late_s: tuple[float, ...]
+    """See `likely_delays_s`."""
+    late_step_s: float
+    """From one of these delays to the next."""
+
+
+def fix_size(variant: Variant, grid_error: float) -> Variant:
+    """The variant at size 1 alone. A delay of many oscillations, undone by half, is no delay of half its length."""
+    return replace(variant, least=1.0, most=1.0, about=None, grid_error=grid_error)
 
 
 def proportional_number(name: str, of_one: float = 1.0) -> Numbers:

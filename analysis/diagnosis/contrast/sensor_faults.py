@@ -16,7 +16,7 @@ from analysis.diagnosis.contrast.actuator_faults import (
     resample,
     shift_samples,
 )
-from analysis.diagnosis.contrast.fault import EVERY, Fault, Numbers, Undo, Variant, proportional_number
+from analysis.diagnosis.contrast.fault import EVERY, Fault, Numbers, Rows, Undo, Variant, fix_size, proportional_number
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import CLOCK_FASTEST, REVERSAL_OF_GAP
 from equalizer.effects.simulation.bristle_kernel import bristle_bend
@@ -61,18 +61,6 @@ class _Channel:
         return undo
 
 
-@dataclass(frozen=True, slots=True)
-class Rows:
-    """Of the base that predicts the responses."""
-
-    rate_hz: float
-    """Sample rate of the recordings."""
-    step: int
-    """Samples from one row to the next."""
-    late_s: tuple[float, ...]
-    """How late the readings seem to be; see `likely_delays_s`."""
-
-
 def sensor_faults(number: int, name: str, parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
     """All faults of response channel `number`. parts: all compared ones, which the grids span."""
     whole = np.concatenate([part.response[:, number] for part in parts])
@@ -111,8 +99,12 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray,
     yield channel.fault("sensor_offset", [_offset(channel, shift) for shift in shifts])
     drifts = [_drift(channel, shift, begun) for shift in shifts for begun in BEGUN]
     yield replace(channel.fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
-    yield channel.fault("logger_offset", [_logger_offset(channel, time_s) for time_s in (*times, *rows.late_s)])
-    yield channel.fault("sensor_lag", [_lag(channel, time_s, rows) for time_s in times])
+    yield channel.fault("logger_offset", [
+        *(_logger_offset(channel, time_s) for time_s in times),
+        *(fix_size(_logger_offset(channel, time_s), rows.late_step_s) for time_s in rows.late_s),
+    ])  # fmt: skip
+    lags = [time_s for time_s in times if time_s * longest.rate_hz >= 0.1 * rows.lag_samples]
+    yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz, rows.lag_samples) for time_s in lags])
     period = longest.rate_hz / median_frequency_hz(course, longest.rate_hz)
     rates = [side * late * period / longest.whole for late in LATE for side in (1.0, -1.0)]
     runs_on = (True, False) if any(part.start > 0 for part in parts) else (True,)
@@ -181,14 +173,14 @@ def _logger_offset(channel: _Channel, time_s: float) -> Variant:
     return Variant((undo,), proportional_number("offset", time_s), *AROUND, about=about)
 
 
-def _lag(channel: _Channel, time_s: float, rows: Rows) -> Variant:
-    """A first-order low pass, y += (1 - kept) (x - y) per row, inverted exactly. A row is predicted from rows alone, so
-    that samples between them, which come later, may not enter here either. The one-step prediction error shrinks by
-    the geometric mean of the low pass's gain (Kolmogorov's formula), which is 1 - kept."""
-    kept = float(np.exp(-rows.step / (time_s * rows.rate_hz)))
-    undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1]] * rows.step + [y])[: len(y)]) / (1 - kept))
+def _lag(channel: _Channel, time_s: float, rate_hz: float, samples: int) -> Variant:
+    """A first-order low pass, y += (1 - kept) (x - y) per `samples`, inverted exactly. An autoregression predicts a row
+    from rows alone, so that samples between them, which come later, may not enter here either. Its one-step error
+    shrinks by the geometric mean of the low pass's gain (Kolmogorov's formula), which is 1 - kept."""
+    kept = float(np.exp(-samples / (time_s * rate_hz)))
+    undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1]] * samples + [y])[: len(y)]) / (1 - kept))
     numbers: Numbers = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
-    about = lambda size: _lag(channel, size * time_s, rows)  # noqa: E731
+    about = lambda size: _lag(channel, size * time_s, rate_hz, samples)  # noqa: E731
     return Variant((undo,), numbers, *AROUND, 1 - kept, about=about)
 
 

@@ -14,14 +14,17 @@ from analysis.diagnosis.contrast.joint_products import Grams, Places, weights_of
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
 from analysis.diagnosis.data.lagged_products import lagged_products
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_KEPT
+from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LATE_STEP, LEAST_KEPT
 from analysis.diagnosis.types import Mask
+from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 Base = ForceBase | AutoregressiveBase | SensorBase
 REACH = 2 * CONTRAST_WHITENING_ORDER
 """Rows that ends of a part and rare gaps reach: by the filter that whitens, which begins from rest, and by what is left
 of those that differentiate. On real recordings, errors there were up to 20 times the rms."""
+FEWEST_ROWS = CONTRAST_BLOCKS * REACH
+"""Of each set. A block must be longer than errors are correlated: of shorter ones, resampling them says nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,12 +112,15 @@ def _changed_columns(rows: Sequence[FloatArray], plain: Sequence[FloatArray]) ->
 
 
 def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Stream:
+    """Raises ValueError where too few rows of a set are left, numpy.linalg.LinAlgError where no base can be fitted."""
+    if isinstance(base, AutoregressiveBase):
+        least = (base.order + 2 * REACH) * base.step
+        clean, other = ([part for part in side if len(part.known) > least] for side in (clean, other))
     rows = base.rows(clean), base.rows(other)
     valid = tuple(base.valid_samples(parts) for parts in (clean, other))
     gap_reach = min(_reach_of_gaps(side) for side in valid)
     masks = tuple(tuple(_settled(mask, gap_reach) for mask in side) for side in valid)
-    # A block must be longer than errors are correlated: of shorter ones, resampling them says nothing.
-    fewest = max(CONTRAST_BLOCKS * REACH, 2 * rows[0][0].shape[1])
+    fewest = max(FEWEST_ROWS, 2 * rows[0][0].shape[1])
     if any(sum(int(mask.sum()) for mask in side) < fewest for side in masks):
         raise ValueError("too few rows are left of one set to be compared by")
     everything = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
@@ -206,40 +212,30 @@ def _lost_rows(stream: Stream, side: Side, undone: Sequence[Part]) -> tuple[Mask
 
 
 def likely_delays_s(streams: Sequence[Stream]) -> tuple[float, ...]:
-    """Per base of the device, how late the responses of the faulty set seem to be beside its commands, where they do.
+    """How late the responses of the faulty set may be beside its commands: per base of the device, the delay by
+    cross-correlation, if it is at least a row, and delays up to half a row away from it.
 
     With the weights of the clean set, errors are the sum of a part that the responses make and one that the commands
-    make. How they fit at all shifts is their cross-correlation: no grid is so fine that it would surely meet the narrow
-    valley about the delay of a signal with many oscillations in it.
+    make. How well they cancel has a narrow valley about the delay of a signal with many oscillations in it.
     """
     found = []
     for stream in streams:
-        if not isinstance(stream.base, SensorBase):
-            late = _best_shift(stream) * stream.row_s
-            found += [late] if late > 0 else []
-    return tuple(found)
+        late = 0.0 if isinstance(stream.base, SensorBase) else _rows_late(stream)
+        found += [float(late + by) * stream.row_s for by in np.arange(-0.5, 0.51, LATE_STEP) if late]
+    return tuple(dict.fromkeys(found))
 
 
-def _best_shift(stream: Stream) -> int:
-    """Rows by which the responses of the faulty set are to be moved ahead for the least mean square error, by at most
-    a quarter of each part."""
+def _rows_late(stream: Stream) -> float:
+    """Rows by which the responses lag the commands in the longest part of the faulty set; 0 for less than one."""
     weights = weights_of(stream.clean.white.T @ stream.clean.white) / stream.columns
     pushed = np.arange(len(weights)) == 0
     if isinstance(stream.base, AutoregressiveBase):
-        pushed = stream.base.command_columns(stream.clean.parts[0])
-    shares = np.column_stack([weights * ~pushed, weights * pushed])
-    made = [apply_filter(stream.colour, rows @ shares)[REACH:-REACH] for rows in stream.other.rows]
-    most = max(min(len(part) for part in made) // 4, 1)
-    errors = np.sum([_errors_by_shift(part[:, 0], part[:, 1], most) for part in made if len(part)], axis=0)
-    counts = np.sum([len(part) - np.arange(most) for part in made if len(part)], axis=0)
-    return int(np.argmin(errors / counts)) if np.ndim(errors) else 0
-
-
-def _errors_by_shift(read: FloatArray, driven: FloatArray, most: int) -> FloatArray:
-    """(most,): sums of squares of read(t + shift) + driven(t) over the times that both have."""
-    room = next_fast_len(2 * len(read), True)
-    common = irfft(np.conj(rfft(driven, room)) * rfft(read, room), room)[:most]
-    return np.asarray(np.cumsum(read[::-1] ** 2)[::-1][:most] + np.cumsum(driven**2)[::-1][:most] + 2 * common)
+        pushed = stream.base.command_columns(len(weights))
+    rows = max(stream.other.rows, key=len)
+    made = apply_filter(stream.colour, rows @ np.column_stack([weights * ~pushed, weights * pushed]))[REACH:-REACH]
+    longest = len(made) // 4
+    late = lateness(made[:, [0]], -made[:, [1]], longest)
+    return late if 1 <= late < longest else 0.0
 
 
 def _source_of(base: Base) -> tuple[str, int]:

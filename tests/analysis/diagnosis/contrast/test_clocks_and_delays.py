@@ -1,6 +1,7 @@
 """Late readings: by a clock that runs on through a file, or by a delay of any length."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,8 +9,13 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.contrast.actuator_faults import AROUND, delays_to_try, resample, shift_samples
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
+from analysis.diagnosis.contrast.bases import bases_of, unexplained_share
+from analysis.diagnosis.contrast.compare import compare
+from analysis.diagnosis.contrast.decide import decide
+from analysis.diagnosis.contrast.fault import Rows
 from analysis.diagnosis.contrast.part import split_into_parts
-from analysis.diagnosis.contrast.stream import likely_delays_s, stream_of
+from analysis.diagnosis.contrast.sensor_faults import sensor_faults
+from analysis.diagnosis.contrast.stream import FEWEST_ROWS, likely_delays_s, rows_with_fault_undone, stream_of
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -51,10 +57,11 @@ POLES = np.exp([-0.01 + 0.02j, -0.01 - 0.02j, -0.02 + 0.05j, -0.02 - 0.05j])
 """Of a response 60 times slower than the samples: each changes it by 1e-5 of its size."""
 
 
-def oscillator(seed: int, late: int = 0) -> tuple[Recording, float]:
+def oscillator(seed: int, late: int = 0, period: int = 6000) -> tuple[Recording, float]:
     """A smooth response, read late beside its command, and what the command's next value does to it."""
-    force = np.random.default_rng(seed).normal(size=6000)
-    read = lfilter([0.0, 1.0], np.poly(POLES).real, force)
+    force = np.resize(np.random.default_rng(seed).normal(size=period), 6000)
+    noise = 1e-3 * np.random.default_rng(seed + 100).normal(size=6000)
+    read = lfilter([0.0, 1.0], np.poly(POLES).real, force + noise)
     recording = Recording(
         "rig",
         Signal(force[late:, None], 1000.0, "force", "N", ("fx",)),
@@ -63,16 +70,82 @@ def oscillator(seed: int, late: int = 0) -> tuple[Recording, float]:
     return recording, float(1 / read.std())
 
 
-@pytest.mark.parametrize("late", [0, 37, 400])
-def test_how_late_readings_are_is_found_however_narrow_the_valley_of_their_error_is(late):
-    clean, other = (split_into_parts([oscillator(seed, at)[0]]) for seed, at in ((1, 0), (2, late)))
-    stream = stream_of(AutoregressiveBase(0, 24, 1), clean, other)
-    assert likely_delays_s([stream]) == pytest.approx((late / 1000.0,) if late else ())
+def cut(recording: Recording, *lengths: int) -> list[Recording]:
+    """Pieces of a recording, from its begin."""
+    ends = np.cumsum((0, *lengths))
+    return [
+        replace(
+            recording,
+            command=replace(recording.command, samples=recording.command.samples[begin:end]),
+            response=replace(recording.response, samples=recording.response.samples[begin:end]),
+        )
+        for begin, end in pairwise(ends.tolist())
+    ]
+
+
+def suggested_delay_s(faulty: list[Recording], step: int = 1, period: int = 6000) -> float:
+    """The middle of the delays that are suggested for these recordings; 0 if none is."""
+    clean = split_into_parts([oscillator(1, 0, period)[0]])
+    found = likely_delays_s([stream_of(AutoregressiveBase(0, 24, step, 1), clean, split_into_parts(faulty))])
+    return float(np.median(found)) if found else 0.0
+
+
+@pytest.mark.parametrize("step", [1, 4])
+@pytest.mark.parametrize("late", [0, 37, 402])
+def test_a_delay_is_suggested_to_a_part_of_a_row_however_narrow_its_valley_is(late, step):
+    assert suggested_delay_s([oscillator(2, late)[0]], step) == pytest.approx(late / 1000.0, abs=1e-4 * step)
+
+
+@pytest.mark.parametrize("short", [100, 200])
+def test_a_short_part_hides_no_delay(short):
+    """Before, the shortest part said how far to look."""
+    assert suggested_delay_s(cut(oscillator(2, 400)[0], 5000, short)) == pytest.approx(0.4, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(2, 6))
+def test_a_periodic_command_gives_no_delay_of_whole_periods_more(seed):
+    late = oscillator(seed, 20, 500)[0]
+    assert suggested_delay_s([late], period=500) == pytest.approx(0.02, abs=1e-3)
+
+
+@pytest.mark.parametrize("late", [37, 393])
+def test_a_long_delay_is_named_with_an_interval_that_holds_it(late):
+    """Half of a delay of many oscillations, undone, was taken for a delay of half its length."""
+    found = compare([oscillator(2, late)[0]], [oscillator(1)[0]], frozenset(), lambda: True)
+    assert found is not None
+    named = decide(found, 1).named
+    assert named is not None and named.fault.effect in ("transport_delay", "logger_offset")
+    (seconds,), (error,) = named.values.values(), named.spread.values()
+    assert abs(seconds - late / 1000.0) < 2 * error < 0.01
 
 
 def test_a_smooth_response_is_predicted_as_well_as_its_past_allows():
     """Products of readings that are so alike left three times the error."""
     late, innovation = oscillator(1, 400)
     parts = split_into_parts([late])
-    stream = stream_of(AutoregressiveBase(0, 24, 1), parts, parts)
-    assert stream.clean.scale == pytest.approx(innovation, rel=0.1)
+    stream = stream_of(AutoregressiveBase(0, 24, 1, 1), parts, parts)
+    assert stream.clean.scale * stream.columns[0] == pytest.approx(innovation, rel=0.1)
+    assert unexplained_share(stream.base, parts) == pytest.approx(innovation, rel=0.1)
+
+
+def test_sensor_faults_of_a_response_with_hardly_any_noise_can_be_undone():
+    """Errors of 1e-8 of its size are beyond products of values in double precision, and not of second differences."""
+    parts = split_into_parts([oscillator(2)[0]])
+    stream = stream_of(AutoregressiveBase(0, 24, 1, 1), split_into_parts([oscillator(1)[0]]), parts)
+    gains = [fault for fault in sensor_faults(0, "x", parts, Rows(1, (), 0.0)) if fault.effect == "sensor_gain"]
+    for variant in gains[0].variants:
+        assert stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, gains[0], variant)).sound
+
+
+def test_a_slow_response_is_compared_by_as_many_rows_as_it_takes():
+    """Decimated as its band allows, it had too few."""
+    slow = np.sin(2 * np.pi * 0.9 * np.arange(6000) / 1000.0)
+    random = np.random.default_rng(1)
+    parts = [
+        split_into_parts([replace(each, response=replace(each.response, samples=(slow + noise)[:, None]))])
+        for each in (oscillator(1)[0], oscillator(2)[0])
+        for noise in [1e-4 * random.normal(size=6000)]
+    ]
+    (base,), _ = next(bases_of(parts[0], parts[1]))
+    assert isinstance(base, AutoregressiveBase) and base.step > 1
+    assert stream_of(base, parts[0], parts[1]).other.count >= FEWEST_ROWS

@@ -7,6 +7,7 @@ import pytest
 
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
 from analysis.diagnosis.contrast.compare import compare
+from analysis.diagnosis.contrast.fault import Rows
 from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.settings import BALANCE_HOLDS, CONTRAST_BLOCKS
 from equalizer.signals.signal import FloatArray
@@ -89,7 +90,7 @@ def test_a_drive_that_follows_slowly_is_named(rig):
         reached += np.clip(wanted - reached, -limit, limit)
         given[k] = reached
     part = split_into_parts([replace(plain, command=replace(plain.command, samples=asked[:, None]))])
-    (fault,) = [each for each in actuator_faults(0, "fx", part, True, ()) if each.effect == "slew_limit"]
+    (fault,) = [each for each in actuator_faults(0, "fx", part, True, Rows(1, (), 0.0)) if each.effect == "slew_limit"]
     left = [np.std(variant.undo[0](part[0]).command[:, 0] - given) for variant in fault.variants]
     best = fault.variants[int(np.argmin(left))]
     assert best.values(np.ones(1))["rate"] == pytest.approx(40.0, rel=0.5)
