@@ -112,6 +112,8 @@ class RealtimeDrive:
 
         False, and nothing begins, where something moves already or nothing may move any more.
         """
+        if self._closing:  # its thread may have ended already, as it should
+            return False
         if not (self._thread.is_alive() and self._lock.acquire(timeout=JOIN_S)):
             self._runner.give_up(TimeoutError("its loop hangs"))
             return False

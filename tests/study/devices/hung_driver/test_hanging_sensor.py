@@ -129,8 +129,12 @@ def test_a_rig_that_was_given_up_gets_no_force_even_from_a_tick_that_was_under_w
     runner.disconnect()
 
 
-def test_nothing_begins_while_the_loop_is_being_closed(device, rigs, rig):
+@pytest.mark.parametrize("ended", [False, True])
+def test_nothing_begins_while_the_loop_is_being_closed(device, rigs, rig, ended):
     device._drive._closing = True
+    if ended:
+        device._drive.close()
+        assert not device._drive._thread.is_alive()
     with pytest.raises(DeviceError, match="cannot do this now"):
         device.hold(rigs.push())
     assert rig.written_n == []
