@@ -28,11 +28,12 @@ from analysis.diagnosis.contrast.joint_products import (
     fit_sizes,
     held_out_error,
 )
+from analysis.diagnosis.contrast.likely_delays import likely_clock_rates, likely_delays_s
 from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
-from analysis.diagnosis.contrast.stream import Base, Stream, likely_delays_s, rows_with_fault_undone, stream_of
+from analysis.diagnosis.contrast.stream import Base, Stream, rows_with_fault_undone, stream_of
 from analysis.diagnosis.settings import (
     BALANCE_HOLDS,
     BOOTSTRAP_LEVEL,
@@ -99,7 +100,7 @@ def _set_up(
             streams.append(stream_of(base, clean, faulty))
     row_s = streams[0].row_s
     lag_samples = 1 if by_force else round(row_s * clean[0].rate_hz)
-    rows = Rows(lag_samples, likely_delays_s(streams), LATE_STEP * row_s)
+    rows = Rows(lag_samples, likely_delays_s(streams), LATE_STEP * row_s, likely_clock_rates(streams))
     faults: list[Fault] = []
     turns = is_rotational(recording)
     for axis, name in enumerate(recording.command.channels):
@@ -181,7 +182,11 @@ def _try_variant(bare: Sequence[Pair], streams: Sequence[Stream], fault: Fault, 
         replace(pair, with_it=stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, fault, variant)))
         for stream, pair in zip(streams, bare, strict=True)
     ]
-    return (fit_sizes(pairs, variant), fault, variant, pairs) if all(pair.with_it.sound for pair in pairs) else None
+    return (
+        (fit_sizes(pairs, variant), fault, variant, pairs)
+        if all(pair.with_it.is_sound(variant) for pair in pairs)
+        else None
+    )
 
 
 def _error_of(tried: Tried) -> float:

@@ -60,8 +60,20 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
+class ClockRate:
+    """A rate with which the delay of the readings may grow in the course of the faulty set."""
+
+    rate: float
+    """Of the clock of the readings, relative: 0 is right."""
+    step: float
+    """From one of the rates that are tried to the next."""
+    runs_on: bool
+    """Its time counts from the begin of the file, else of each part."""
+
+
+@dataclass(frozen=True, slots=True)
 class Rows:
-    """Spacing of the rows of a base, and the delays that a cross-correlation suggests."""
+    """Spacing of the rows of a base, and the delays and clock rates that cross-correlations suggest."""
 
     lag_samples: int
     """Samples of the recordings over which a lag of the responses is inverted: one row of an autoregression."""
@@ -69,6 +81,8 @@ class Rows:
     """See `likely_delays_s`."""
     late_step_s: float
     """From one of these delays to the next."""
+    clocks: tuple[ClockRate, ...]
+    """See `likely_clock_rates`."""
 
 
 def fix_size(variant: Variant, grid_error: float) -> Variant:

@@ -19,7 +19,7 @@ Places = npt.NDArray[np.intp]
 RIDGE = 1e-9
 """Ridge over a column's mean power."""
 BLOWN_UP = 1e16
-"""Product of columns of size 1 above which undoing a fault is ill-conditioned."""
+"""Product of columns above which undoing a fault of a size about 1 is ill-conditioned."""
 ROUNDS = 3
 """Gauss-Newton steps."""
 
@@ -33,10 +33,11 @@ class Grams:
     """Per size, which columns change."""
     width: int
 
-    @property
-    def sound(self) -> bool:
-        """Whether undoing the fault is well-conditioned."""
-        return bool(np.isfinite(self.blocks).all() and np.abs(self.blocks).max(initial=0.0) < BLOWN_UP)
+    def is_sound(self, variant: Variant) -> bool:
+        """Whether undoing the fault is well-conditioned. Where any size may be, size 1 is 1 in SI units (a mass of 1 kg
+        on a device of 1 mg): its products may be of any magnitude."""
+        most = BLOWN_UP if np.isfinite(variant.most) else np.inf
+        return bool(np.isfinite(self.blocks).all() and np.abs(self.blocks).max(initial=0.0) < most)
 
     def spread(self, sizes: FloatArray) -> FloatArray:
         """(width, k): the matrix that turns the products into those of the rows with faults of these sizes undone."""

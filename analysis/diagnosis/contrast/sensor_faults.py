@@ -109,6 +109,7 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray,
     rates = [side * late * period / longest.whole for late in LATE for side in (1.0, -1.0)]
     runs_on = (True, False) if any(part.start > 0 for part in parts) else (True,)
     clocks = [_clock_drift(channel, rate, on) for rate in rates if abs(rate) < CLOCK_FASTEST for on in runs_on]
+    clocks += [fix_size(_clock_drift(channel, each.rate, each.runs_on), 1e6 * each.step) for each in rows.clocks]
     yield replace(channel.fault("clock_drift", clocks), varies=True)
 
 

@@ -14,9 +14,8 @@ from analysis.diagnosis.contrast.joint_products import Grams, Places, weights_of
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
 from analysis.diagnosis.data.lagged_products import lagged_products
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LATE_STEP, LEAST_KEPT
+from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_KEPT
 from analysis.diagnosis.types import Mask
-from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 Base = ForceBase | AutoregressiveBase | SensorBase
@@ -209,33 +208,6 @@ def _lost_rows(stream: Stream, side: Side, undone: Sequence[Part]) -> tuple[Mask
     """Rows that were known, and that what is unknown now reaches."""
     valid = stream.base.valid_samples(undone)
     return tuple(mask & ~_settled(now, stream.gap_reach) for mask, now in zip(side.masks, valid, strict=True))
-
-
-def likely_delays_s(streams: Sequence[Stream]) -> tuple[float, ...]:
-    """How late the responses of the faulty set may be beside its commands: per base of the device, the delay by
-    cross-correlation, if it is at least a row, and delays up to half a row away from it.
-
-    With the weights of the clean set, errors are the sum of a part that the responses make and one that the commands
-    make. How well they cancel has a narrow valley about the delay of a signal with many oscillations in it.
-    """
-    found = []
-    for stream in streams:
-        late = 0.0 if isinstance(stream.base, SensorBase) else _rows_late(stream)
-        found += [float(late + by) * stream.row_s for by in np.arange(-0.5, 0.51, LATE_STEP) if late]
-    return tuple(dict.fromkeys(found))
-
-
-def _rows_late(stream: Stream) -> float:
-    """Rows by which the responses lag the commands in the longest part of the faulty set; 0 for less than one."""
-    weights = weights_of(stream.clean.white.T @ stream.clean.white) / stream.columns
-    pushed = np.arange(len(weights)) == 0
-    if isinstance(stream.base, AutoregressiveBase):
-        pushed = stream.base.command_columns(len(weights))
-    rows = max(stream.other.rows, key=len)
-    made = apply_filter(stream.colour, rows @ np.column_stack([weights * ~pushed, weights * pushed]))[REACH:-REACH]
-    longest = len(made) // 4
-    late = lateness(made[:, [0]], -made[:, [1]], longest)
-    return late if 1 <= late < longest else 0.0
 
 
 def _source_of(base: Base) -> tuple[str, int]:

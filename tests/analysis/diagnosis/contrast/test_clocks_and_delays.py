@@ -13,9 +13,10 @@ from analysis.diagnosis.contrast.bases import bases_of, unexplained_share
 from analysis.diagnosis.contrast.compare import compare
 from analysis.diagnosis.contrast.decide import decide
 from analysis.diagnosis.contrast.fault import Rows
+from analysis.diagnosis.contrast.likely_delays import likely_delays_s
 from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.sensor_faults import sensor_faults
-from analysis.diagnosis.contrast.stream import FEWEST_ROWS, likely_delays_s, rows_with_fault_undone, stream_of
+from analysis.diagnosis.contrast.stream import FEWEST_ROWS, rows_with_fault_undone, stream_of
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -132,9 +133,11 @@ def test_sensor_faults_of_a_response_with_hardly_any_noise_can_be_undone():
     """Errors of 1e-8 of its size are beyond products of values in double precision, and not of second differences."""
     parts = split_into_parts([oscillator(2)[0]])
     stream = stream_of(AutoregressiveBase(0, 24, 1, 1), split_into_parts([oscillator(1)[0]]), parts)
-    gains = [fault for fault in sensor_faults(0, "x", parts, Rows(1, (), 0.0)) if fault.effect == "sensor_gain"]
+    gains = [fault for fault in sensor_faults(0, "x", parts, Rows(1, (), 0.0, ())) if fault.effect == "sensor_gain"]
     for variant in gains[0].variants:
-        assert stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, gains[0], variant)).sound
+        assert stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, gains[0], variant)).is_sound(
+            variant
+        )
 
 
 def test_a_slow_response_is_compared_by_as_many_rows_as_it_takes():

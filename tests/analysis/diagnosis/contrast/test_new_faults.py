@@ -7,6 +7,7 @@ import pytest
 
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
 from analysis.diagnosis.contrast.compare import compare
+from analysis.diagnosis.contrast.decide import decide
 from analysis.diagnosis.contrast.fault import Rows
 from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.settings import BALANCE_HOLDS, CONTRAST_BLOCKS
@@ -90,7 +91,9 @@ def test_a_drive_that_follows_slowly_is_named(rig):
         reached += np.clip(wanted - reached, -limit, limit)
         given[k] = reached
     part = split_into_parts([replace(plain, command=replace(plain.command, samples=asked[:, None]))])
-    (fault,) = [each for each in actuator_faults(0, "fx", part, True, Rows(1, (), 0.0)) if each.effect == "slew_limit"]
+    (fault,) = [
+        each for each in actuator_faults(0, "fx", part, True, Rows(1, (), 0.0, ())) if each.effect == "slew_limit"
+    ]
     left = [np.std(variant.undo[0](part[0]).command[:, 0] - given) for variant in fault.variants]
     best = fault.variants[int(np.argmin(left))]
     assert best.values(np.ones(1))["rate"] == pytest.approx(40.0, rel=0.5)
@@ -107,3 +110,18 @@ def test_a_fault_that_upsets_the_balance_of_forces_is_undone_in_it(rig):
     assert found is not None and found.by_force and found.faulty_share > BALANCE_HOLDS
     assert found.faults[0].fault.effect == "force_deadband"
     assert found.faults[0].values["width"] == pytest.approx(8.0, rel=0.1)
+
+
+def test_a_mass_of_a_device_of_a_few_nanograms_is_named_too(rig):
+    """1 in SI units is far beyond such a device: products of size 1 are of no magnitude that tells anything."""
+
+    def of_nano(whole):
+        return replace(whole, command=replace(whole.command, samples=1e-11 * whole.command.samples))
+
+    found = compare(
+        [of_nano(rig.recording(2, "added_mass", 0.3))], [of_nano(rig.recording(1))], frozenset(), lambda: True
+    )
+    assert found is not None
+    named = decide(found, 1).named
+    assert named is not None and named.fault.effect == "added_mass"
+    assert named.values["mass"] == pytest.approx(0.3e-11, rel=0.15)

@@ -1,0 +1,106 @@
+"""Delays and clock rates of the faulty set that cross-correlations of responses and commands suggest.
+
+With the weights of the clean set, errors are the sum of a part that the responses make and one that the commands make.
+How well they cancel has a valley about the true delay that is narrower than any grid of delays, where a signal has many
+oscillations in it. The cross-correlation of both parts has its peak there.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+
+from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
+from analysis.diagnosis.contrast.fault import ClockRate
+from analysis.diagnosis.contrast.joint_products import weights_of
+from analysis.diagnosis.contrast.sensor_base import SensorBase
+from analysis.diagnosis.contrast.stream import REACH, Stream, apply_filter
+from analysis.diagnosis.settings import CLOCK_FASTEST, CONTRAST_BLOCKS, LATE_STEP
+from equalizer.effects.starts.response_starts import lateness
+from equalizer.signals.signal import FloatArray
+
+
+def likely_delays_s(streams: Sequence[Stream]) -> tuple[float, ...]:
+    """How late the responses of the faulty set may be beside its commands: per base of the device, the delay by
+    cross-correlation, if it is at least a row, and delays up to half a row away from it."""
+    found = []
+    for stream in _of_device(streams):
+        late = _rows_late(stream)
+        found += [float(late + by) * stream.row_s for by in _around() if late]
+    return tuple(dict.fromkeys(found))
+
+
+def likely_clock_rates(streams: Sequence[Stream]) -> tuple[ClockRate, ...]:
+    """Clock rates with which the delay may grow in the course of the faulty set, per base of the device: the likeliest,
+    if it makes a row until the end, and those within half a row there."""
+    found = []
+    for stream in _of_device(streams):
+        for runs_on in (True, False) if any(part.start > 0 for part in stream.other.parts) else (True,):
+            rate, end = _likeliest_rate(stream, runs_on)
+            if abs(rate) * end >= 1:
+                found += [ClockRate(rate + by / end, LATE_STEP / end, runs_on) for by in _around()]
+    return tuple(found)
+
+
+def _around() -> list[float]:
+    """Rows from a likely delay to those that are tried."""
+    return [float(by) for by in np.arange(-0.5, 0.51, LATE_STEP)]
+
+
+def _of_device(streams: Sequence[Stream]) -> list[Stream]:
+    return [stream for stream in streams if not isinstance(stream.base, SensorBase)]
+
+
+def _made_by(stream: Stream, rows: FloatArray) -> FloatArray:
+    """(n, 2): whitened errors of the clean set's base, as what the responses make and what the commands take away."""
+    weights = weights_of(stream.clean.white.T @ stream.clean.white) / stream.columns
+    pushed = np.arange(len(weights)) == 0
+    if isinstance(stream.base, AutoregressiveBase):
+        pushed = stream.base.command_columns(len(weights))
+    return apply_filter(stream.colour, rows @ np.column_stack([weights * ~pushed, -weights * pushed]))[REACH:-REACH]
+
+
+def _rows_late(stream: Stream) -> float:
+    """Rows by which the responses lag the commands in the longest part of the faulty set; 0 for less than one."""
+    made = _made_by(stream, max(stream.other.rows, key=len))
+    longest = len(made) // 4
+    late = lateness(made[:, [0]], made[:, [1]], longest)
+    return late if 1 <= late < longest else 0.0
+
+
+def _likeliest_rate(stream: Stream, runs_on: bool) -> tuple[float, float]:
+    """The relative clock rate along whose delays the cross-correlations of short blocks have the largest sum (a Radon
+    transform of their peaks), and the last block's time, in rows. 0 where that is the fastest of all."""
+    times, correlations = _correlate_blocks(stream, runs_on)
+    end, longest = float(times.max()), correlations.shape[1] // 2
+    rates = np.arange(-longest, longest + LATE_STEP, LATE_STEP) / end
+    # Readings of a clock that is fast by `rate` show at row t what was at t (1 + rate): they are early.
+    at = np.clip(longest - rates[:, None] * times, 0.0, 2 * longest - 1e-9)
+    whole = at.astype(np.intp)
+    block, beyond = np.arange(len(times)), at - whole
+    alike = np.sum((1 - beyond) * correlations[block, whole] + beyond * correlations[block, whole + 1], axis=1)
+    best = int(np.argmax(alike))
+    return (float(rates[best]) if 0 < best < len(rates) - 1 else 0.0), end
+
+
+def _correlate_blocks(stream: Stream, runs_on: bool) -> tuple[FloatArray, FloatArray]:
+    """Times of blocks (b,) in rows, and per block the correlation coefficients at each lag (b, 2 longest + 1) of what
+    its responses make with what all commands of its part make."""
+    starts = [part.start / (part.rate_hz * stream.row_s) if runs_on else 0.0 for part in stream.other.parts]
+    whole = sum(len(rows) for rows in stream.other.rows)
+    longest = int(CLOCK_FASTEST * max(start + len(rows) for start, rows in zip(starts, stream.other.rows, strict=True)))
+    times, found = [], []
+    for start, rows in zip(starts, stream.other.rows, strict=True):
+        made = _made_by(stream, rows)
+        room = next_fast_len(len(made) + longest, True)
+        commands, size = rfft(made[:, 1], room).conj(), float(np.linalg.norm(made[:, 1]))
+        for block in np.array_split(np.arange(len(made)), max(round(CONTRAST_BLOCKS * len(rows) / whole), 1)):
+            responses = np.zeros(len(made))
+            responses[block] = made[block, 0]
+            alike = irfft(rfft(responses, room) * commands, room)
+            times.append(start + REACH + float(block.mean()))
+            found.append(
+                np.concatenate([alike[room - longest :], alike[: longest + 1]])
+                / max(size * float(np.linalg.norm(responses)), 1e-300)
+            )
+    return np.array(times), np.array(found)
