@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from analysis.diagnosis.contrast.fault import (
     ColumnChange,
@@ -16,6 +15,7 @@ from analysis.diagnosis.contrast.fault import (
     fix_size,
     proportional_number,
 )
+from analysis.diagnosis.contrast.interpolation import shift_samples
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import LONGEST_DELAY
 from equalizer.effects.simulation.sensor_path import filter_one_pole
@@ -118,7 +118,8 @@ def _delay(axis: _Axis, time_s: float) -> Variant:
         return replace(undone, known=part.known & (np.arange(len(part.known)) >= late))
 
     about = lambda size: _delay(axis, size * time_s)  # noqa: E731
-    return Variant((undo,), proportional_number("delay", time_s), *AROUND, column_change=change, about=about)
+    delay = proportional_number("delay", time_s)
+    return Variant((undo,), delay, *AROUND, column_change=change, about=about, exact=True)
 
 
 def _lag(axis: _Axis, time_s: float) -> Variant:
@@ -158,25 +159,6 @@ def median_frequency_hz(samples: FloatArray, rate_hz: float) -> float:
     power = np.abs(np.fft.rfft(samples - samples.mean())) ** 2
     line = int(np.searchsorted(np.cumsum(power), 0.5 * power.sum()))
     return max(line, 1) * rate_hz / len(samples)
-
-
-SMOOTH = 5
-"""Degree of the splines through samples: of short reach, where a shift of the spectrum's phase rings from the ends on,
-and hardly a low pass, as straight lines would be."""
-
-
-def resample(samples: FloatArray, at: FloatArray) -> FloatArray:
-    """Samples (n,) interpolated at times `at` (n,), in samples; held beyond the ends."""
-    spline = make_interp_spline(np.arange(len(samples)), samples, SMOOTH)
-    return np.asarray(spline(np.clip(at, 0, len(samples) - 1)))
-
-
-def shift_samples(samples: FloatArray, by: float) -> FloatArray:
-    """Samples (n, k) delayed by `by` samples, a real number; continued beyond both ends as an odd function."""
-    room = int(np.ceil(abs(by))) + SMOOTH
-    wide = np.pad(samples, ((room, room), (0, 0)), mode="reflect", reflect_type="odd")
-    spline = make_interp_spline(np.arange(-room, len(samples) + room), wide, SMOOTH)
-    return np.asarray(spline(np.arange(len(samples)) - by))
 
 
 def apply_lag(samples: FloatArray, constant: float) -> FloatArray:

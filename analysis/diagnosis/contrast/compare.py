@@ -18,7 +18,7 @@ from analysis.diagnosis.contrast.bases import (
     unexplained_share_of_rows,
 )
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
-from analysis.diagnosis.contrast.fault import Fault, Rows, Variant
+from analysis.diagnosis.contrast.fault import Fault, Rows, Variant, fix_size
 from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import (
     Fit,
@@ -63,6 +63,8 @@ class Trial:
 
 ALL = tuple(range(CONTRAST_BLOCKS))
 SIXTHS, THIRDS = (tuple(tuple(ALL[k : k + size]) for k in ALL[::size]) for size in (len(ALL) // 6, len(ALL) // 3))
+VARIANTS_APPROACHED = 3
+"""Variants of a fault that are undone anew about their best sizes."""
 FOLDS = len(SIXTHS)
 """Parts of each set that are left out in turn."""
 APART = (*THIRDS, ALL[: CONTRAST_BLOCKS // 2])
@@ -119,7 +121,10 @@ def _set_up(
 
 def _try_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Trial:
     clean = [stream.grams(stream.clean, []).blocks for stream in streams]
-    bare = [Pair(stream.grams(stream.other, []), ALL, tuple(own)) for stream, own in zip(streams, clean, strict=True)]
+    bare = [
+        Pair(stream.grams(stream.other, []), ALL, tuple(own), (stream.clean.scale / stream.other.scale) ** 2)
+        for stream, own in zip(streams, clean, strict=True)
+    ]
     best: list[Tried] = []
     complete = False
     for fault in faults:
@@ -127,7 +132,7 @@ def _try_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: T
             break
         tried = [found for variant in fault.variants if (found := _try_variant(bare, streams, fault, variant))]
         if tried:
-            best.append(_approach(min(tried, key=_error_of), bare, streams))
+            best.append(_best_of(tried, bare, streams))
     else:
         complete = True
     return Trial(bare, sorted(best, key=_error_of), complete)
@@ -193,17 +198,40 @@ def _error_of(tried: Tried) -> float:
     return tried[0].error
 
 
+def _best_of(tried: Sequence[Tried], bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
+    """The variant that leaves least, after it was undone anew about its size. Of faults that are only of size 1 what
+    they say, several are, for at another size any of them may leave less than the true one."""
+    first = min(tried, key=_error_of)
+    if not first[2].exact:
+        return _approach(first, bare, streams)
+    at_size_1 = sorted(tried, key=lambda each: _error_of(_at_allowed_size(each)))[:VARIANTS_APPROACHED]
+    return min((_approach(each, bare, streams) for each in (first, *at_size_1)), key=_error_of)
+
+
 def _approach(found: Tried, bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
     """The fault undone about the size that was found, again and again: beside it, the change was only extrapolated."""
+    best = _at_allowed_size(found)
     for _ in range(UNDOING_ROUNDS):
         fit, fault, variant, _ = found
         if variant.about is None or abs(float(fit.sizes[0]) - 1) < SIZE_IS_NEAR:
             break
         again = _try_variant(bare, streams, fault, variant.about(float(fit.sizes[0])))
-        if again is None or _error_of(again) >= _error_of(found):
+        if again is None:
             break
-        found = again
-    return found
+        found, before = again, best
+        best = min(best, _at_allowed_size(found), key=_error_of)
+        if best is before and not variant.exact:
+            break
+    return best
+
+
+def _at_allowed_size(found: Tried) -> Tried:
+    _, fault, variant, pairs = found
+    return (fit_sizes(pairs, _allowed(variant)), fault, variant, pairs) if variant.exact else found
+
+
+def _allowed(variant: Variant) -> Variant:
+    return fix_size(variant, 0.0) if variant.exact else variant
 
 
 def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
@@ -233,7 +261,7 @@ def _judge_fault(streams: Sequence[Stream], found: Tried, plain: Fit, samples: i
         for name in values
     }
     gains = (
-        list(_gains_within_a_set(streams, fault, variant, fit.sizes))
+        list(_gains_within_a_set(streams, fault, _allowed(variant), fit.sizes))
         if plain.error > (1 + LEAST_FAULT_GAIN) * fit.error
         else [0.0]
     )

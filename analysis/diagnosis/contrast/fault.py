@@ -19,6 +19,10 @@ ColumnChange = Callable[[FloatArray, float, Part], FloatArray]
 Numbers = Callable[[FloatArray], dict[str, float]]
 
 
+Curve = Callable[[FloatArray], FloatArray]
+"""Maps readings (n,) to readings."""
+
+
 EVERY = -1
 """Site number of a fault of all channels."""
 
@@ -36,6 +40,11 @@ class Variant:
     """Bounds of each size: about 1 where undoing is not linear in the size."""
     unit: float = 1.0
     """Factor by which the errors of a faulty sensor are scaled: else a gain that makes every error small would win."""
+    curve: Curve | None = None
+    """Where undoing is a map of single readings: by its slope, errors change that were there before."""
+    passed: float = 1.0
+    """Factor by which undoing makes prediction errors of all samples smaller by interpolation alone: see
+    `noise_kept`."""
     column_change: ColumnChange | None = None
     """How the predicted command changes with the fault, where that is known. Undoing a gain or a lag in the recorded
     command instead would make errors smaller that the fault did not cause."""
@@ -43,6 +52,9 @@ class Variant:
     """Standard error of its number where its size is fixed, from the distance to the next variant."""
     about: Callable[[float], "Variant"] | None = None
     """The fault about another size, where undoing it is not linear: that size is its size 1."""
+    exact: bool = False
+    """Only of size 1 it is the fault: a delay undone by half is no delay, but the mean of two readings, in which noise
+    is smaller."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

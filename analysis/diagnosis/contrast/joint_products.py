@@ -75,6 +75,9 @@ class Pair:
     at: tuple[int, ...]
     without: tuple[FloatArray, ...]
     """Products of plain rows (width, width), one per block."""
+    may_grow: float = 1.0
+    """Factor by which undoing the fault may raise the sum of squares of the first blocks' own base without counting
+    against it. Where the clean set leaves more than the faulty one, a faulty sensor may have hidden errors."""
 
     @cached_property
     def whole(self) -> FloatArray:
@@ -170,9 +173,18 @@ def _errors(pair: Pair, sizes: FloatArray) -> FloatArray:
     weights = weights_of(joined)
     at = spread.T @ weights
     blocks = pair.with_it.blocks[list(pair.at)]
-    with_it = np.einsum("i,bij,j->b", at, blocks, at)
+    with_it = np.einsum("i,bij,j->b", at, blocks, at) / _growth(pair, spread)
     without = [float(weights @ plain @ weights) for plain in pair.without]
     return np.asarray(np.maximum(np.concatenate([with_it, np.array(without)]), 0.0))
+
+
+def _growth(pair: Pair, spread: FloatArray) -> float:
+    """By which undoing the fault raises the error of the blocks' own base, up to `may_grow`."""
+    if pair.may_grow <= 1.0:
+        return 1.0
+    plain = pair.whole[: pair.with_it.width, : pair.with_it.width]
+    grown = error_of_own_fit(spread @ pair.whole @ spread.T) / max(error_of_own_fit(plain), 1e-300)
+    return float(np.clip(grown, 1.0, pair.may_grow))
 
 
 def held_out_error(pairs: Sequence[Pair], sizes: FloatArray, out: Sequence[int]) -> float:

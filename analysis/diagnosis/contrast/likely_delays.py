@@ -86,7 +86,8 @@ def _likeliest_rate(stream: Stream, runs_on: bool) -> tuple[float, float]:
 def _correlate_blocks(stream: Stream, runs_on: bool) -> tuple[FloatArray, FloatArray]:
     """Times of blocks (b,) in rows, and per block the correlation coefficients at each lag (b, 2 longest + 1) of what
     its responses make with what all commands of its part make."""
-    starts = [part.start / (part.rate_hz * stream.row_s) if runs_on else 0.0 for part in stream.other.parts]
+    before = stream.base.order if isinstance(stream.base, AutoregressiveBase) else 0
+    starts = [before + (part.start / (part.rate_hz * stream.row_s) if runs_on else 0.0) for part in stream.other.parts]
     whole = sum(len(rows) for rows in stream.other.rows)
     longest = int(CLOCK_FASTEST * max(start + len(rows) for start, rows in zip(starts, stream.other.rows, strict=True)))
     times, found = [], []

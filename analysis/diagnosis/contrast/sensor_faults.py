@@ -13,10 +13,19 @@ from analysis.diagnosis.contrast.actuator_faults import (
     delays_to_try,
     drift_course,
     median_frequency_hz,
-    resample,
-    shift_samples,
 )
-from analysis.diagnosis.contrast.fault import EVERY, Fault, Numbers, Rows, Undo, Variant, fix_size, proportional_number
+from analysis.diagnosis.contrast.fault import (
+    EVERY,
+    Curve,
+    Fault,
+    Numbers,
+    Rows,
+    Undo,
+    Variant,
+    fix_size,
+    proportional_number,
+)
+from analysis.diagnosis.contrast.interpolation import noise_kept, resample, shift_samples
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import CLOCK_FASTEST, REVERSAL_OF_GAP
 from equalizer.effects.simulation.bristle_kernel import bristle_bend
@@ -100,16 +109,16 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray,
     drifts = [_drift(channel, shift, begun) for shift in shifts for begun in BEGUN]
     yield replace(channel.fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
     yield channel.fault("logger_offset", [
-        *(_logger_offset(channel, time_s) for time_s in times),
-        *(fix_size(_logger_offset(channel, time_s), rows.late_step_s) for time_s in rows.late_s),
+        *(_logger_offset(channel, time_s, longest.rate_hz) for time_s in times),
+        *(fix_size(_logger_offset(channel, time_s, longest.rate_hz), rows.late_step_s) for time_s in rows.late_s),
     ])  # fmt: skip
     lags = [time_s for time_s in times if time_s * longest.rate_hz >= 0.1 * rows.lag_samples]
     yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz, rows.lag_samples) for time_s in lags])
     period = longest.rate_hz / median_frequency_hz(course, longest.rate_hz)
     rates = [side * late * period / longest.whole for late in LATE for side in (1.0, -1.0)]
     runs_on = (True, False) if any(part.start > 0 for part in parts) else (True,)
-    clocks = [_clock_drift(channel, rate, on) for rate in rates if abs(rate) < CLOCK_FASTEST for on in runs_on]
-    clocks += [fix_size(_clock_drift(channel, each.rate, each.runs_on), 1e6 * each.step) for each in rows.clocks]
+    clocks = [_clock_drift(channel, rate, on, parts) for rate in rates if abs(rate) < CLOCK_FASTEST for on in runs_on]
+    clocks += [fix_size(_clock_drift(channel, each.rate, each.runs_on, parts), 1e6 * each.step) for each in rows.clocks]
     yield replace(channel.fault("clock_drift", clocks), varies=True)
 
 
@@ -164,14 +173,15 @@ def _drift(channel: _Channel, total: float, begun: float) -> Variant:
     return Variant((undo,), proportional_number("total", total), *WIDELY)
 
 
-def _logger_offset(channel: _Channel, time_s: float) -> Variant:
+def _logger_offset(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
     def undo(part: Part) -> Part:
         late = time_s * part.rate_hz
         undone = channel.of(lambda y, rate: shift_samples(y[:, None], -late)[:, 0])(part)
         return replace(undone, known=part.known & (np.arange(len(part.known)) < len(part.known) - late))
 
-    about = lambda size: _logger_offset(channel, size * time_s)  # noqa: E731
-    return Variant((undo,), proportional_number("offset", time_s), *AROUND, about=about)
+    about = lambda size: _logger_offset(channel, size * time_s, rate_hz)  # noqa: E731
+    passed = noise_kept(time_s * rate_hz)
+    return Variant((undo,), proportional_number("offset", time_s), *AROUND, passed=passed, about=about, exact=True)
 
 
 def _lag(channel: _Channel, time_s: float, rate_hz: float, samples: int) -> Variant:
@@ -187,9 +197,10 @@ def _lag(channel: _Channel, time_s: float, rate_hz: float, samples: int) -> Vari
 
 def _nonlinearity(channel: _Channel, share: float, power: int, number: str) -> Variant:
     top = channel.top
-    undo = channel.of(lambda y, rate: _invert_power_law(y / top, share, power) * top)
+    curve: Curve = lambda y: _invert_power_law(y / top, share, power) * top  # noqa: E731
     about = lambda size: _nonlinearity(channel, size * share, power, number)  # noqa: E731
-    return Variant((undo,), proportional_number(number, share / top ** (power - 1)), *WIDELY, about=about)
+    numbers = proportional_number(number, share / top ** (power - 1))
+    return Variant((channel.of(lambda y, rate: curve(y)),), numbers, *WIDELY, curve=curve, about=about)
 
 
 def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
@@ -201,18 +212,22 @@ def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
     return np.asarray(np.clip(x, -3.0, 3.0))
 
 
-def _clock_drift(channel: _Channel, late: float, runs_on: bool) -> Variant:
+def _clock_drift(channel: _Channel, late: float, runs_on: bool, parts: Sequence[Part]) -> Variant:
     """Readings taken at t (1 + late), resampled to t. runs_on: t counts from the begin of the file, else of each
     part."""
 
-    def undo(part: Part) -> Part:
+    def taken(part: Part) -> FloatArray:
         before = part.start if runs_on else 0
-        at = (before + np.arange(len(part.response))) / (1 + late) - before
+        return np.asarray((before + np.arange(len(part.response))) / (1 + late) - before)
+
+    def undo(part: Part) -> Part:
+        at = taken(part)
         undone = channel.of(lambda y, rate: resample(y, at))(part)
         return replace(undone, known=part.known & (at >= 0) & (at <= len(at) - 1))
 
-    about = lambda size: _clock_drift(channel, size * late, runs_on)  # noqa: E731
-    return Variant((undo,), proportional_number("ppm", 1e6 * late), *AROUND, about=about)
+    about = lambda size: _clock_drift(channel, size * late, runs_on, parts)  # noqa: E731
+    passed = noise_kept(np.concatenate([taken(part) for part in parts]))
+    return Variant((undo,), proportional_number("ppm", 1e6 * late), *AROUND, passed=passed, about=about, exact=True)
 
 
 ROTATIONS = (

@@ -8,7 +8,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
-from analysis.diagnosis.contrast.fault import EVERY, Fault, Variant
+from analysis.diagnosis.contrast.fault import EVERY, Curve, Fault, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import Grams, Places, weights_of
 from analysis.diagnosis.contrast.part import Part
@@ -197,6 +197,10 @@ def rows_with_fault_undone(stream: Stream, side: Side, fault: Fault, variant: Va
         still = all(a.response is b.response for a, b in zip(undone, side.parts, strict=True))
         rows = stream.base.rows(undone, side.rows if still else None)
         unit = variant.unit if tells else 1.0
+        unit *= _unit_of_curve(stream, side, variant.curve) if tells and variant.curve is not None else 1.0
+        unit /= (
+            variant.passed if tells and isinstance(stream.base, AutoregressiveBase) and stream.base.step == 1 else 1.0
+        )
         known = all(a.known is b.known for a, b in zip(undone, side.parts, strict=True))
         lost = None if known else _lost_rows(stream, side, undone)
         unit *= _spread_ratio(side, rows) if tells and fault.place == "actuator" else 1.0
@@ -208,6 +212,20 @@ def _lost_rows(stream: Stream, side: Side, undone: Sequence[Part]) -> tuple[Mask
     """Rows that were known, and that what is unknown now reaches."""
     valid = stream.base.valid_samples(undone)
     return tuple(mask & ~_settled(now, stream.gap_reach) for mask, now in zip(side.masks, valid, strict=True))
+
+
+def _unit_of_curve(stream: Stream, side: Side, curve: Curve) -> float:
+    """The factor that takes back what a curve does to errors by its slope, which is no gain: to errors of one size
+    everywhere, by the geometric mean of the slope, or to those that a base of the side's own leaves, if that is more.
+    Else a curve would win that is flat where errors are large, or steep where the sets differ least."""
+    weights = weights_of(side.white.T @ side.white) * stream.columns[0] / stream.columns
+    rows = np.concatenate([part[mask] for part, mask in zip(side.rows, side.masks, strict=True)])
+    errors = rows @ weights
+    predicted = (stream.base.values(rows) if isinstance(stream.base, AutoregressiveBase) else rows[:, 0]) - errors
+    size = max(float(np.sqrt(np.mean(errors**2))), 1e-300)
+    slope = np.maximum(np.abs(curve(predicted + size) - curve(predicted - size)) / (2 * size), 1e-6)
+    bent = max(float(np.mean((curve(predicted + errors) - curve(predicted)) ** 2)), 1e-300)
+    return max(float(np.exp(-np.mean(np.log(slope)))), size / float(np.sqrt(bent)))
 
 
 def _source_of(base: Base) -> tuple[str, int]:

@@ -1,0 +1,43 @@
+"""Samples between samples, and the share of white noise that they keep."""
+
+from functools import cache
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from equalizer.signals.signal import FloatArray
+
+SMOOTH = 5
+"""Degree of the splines through samples: of short reach, where a shift of the spectrum's phase rings from the ends on,
+and hardly a low pass, as straight lines would be."""
+FRACTIONS = np.linspace(0.0, 1.0, 41)
+"""Of a sample, at which the share that is kept is tabulated."""
+
+
+def resample(samples: FloatArray, at: FloatArray) -> FloatArray:
+    """Samples (n,) interpolated at times `at` (n,), in samples; held beyond the ends."""
+    spline = make_interp_spline(np.arange(len(samples)), samples, SMOOTH)
+    return np.asarray(spline(np.clip(at, 0, len(samples) - 1)))
+
+
+def shift_samples(samples: FloatArray, by: float) -> FloatArray:
+    """Samples (n, k) delayed by `by` samples, a real number; continued beyond both ends as an odd function."""
+    room = int(np.ceil(abs(by))) + SMOOTH
+    wide = np.pad(samples, ((room, room), (0, 0)), mode="reflect", reflect_type="odd")
+    spline = make_interp_spline(np.arange(-room, len(samples) + room), wide, SMOOTH)
+    return np.asarray(spline(np.arange(len(samples)) - by))
+
+
+def noise_kept(at: FloatArray | float) -> float:
+    """The factor by which interpolation at times `at`, in samples, makes one-step prediction errors smaller: the
+    geometric mean of its gain over frequency (Kolmogorov's formula), and over the times."""
+    return float(np.exp(np.mean(np.interp(np.mod(at, 1.0), FRACTIONS, _log_gains()))))
+
+
+@cache
+def _log_gains() -> FloatArray:
+    """Mean logarithm of the interpolation's gain over frequency, at each of `FRACTIONS`."""
+    impulse = np.zeros((401, 1))
+    impulse[200] = 1.0
+    gains = [np.abs(np.fft.rfft(shift_samples(impulse, by)[:, 0], 4096)) for by in FRACTIONS]
+    return np.array([np.mean(np.log(np.maximum(gain, 1e-6))) for gain in gains])
