@@ -3,7 +3,7 @@ removes between stretches of one set, for no real device repeats itself exactly.
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from analysis.diagnosis.contrast.bases import (
     unexplained_share_of_rows,
 )
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
-from analysis.diagnosis.contrast.fault import Fault, Rows, Variant, fix_size
+from analysis.diagnosis.contrast.fault import Fault, Rows, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import (
     Fit,
@@ -34,37 +34,19 @@ from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
 from analysis.diagnosis.contrast.stream import Base, Stream, rows_with_fault_undone, stream_of
+from analysis.diagnosis.contrast.try_faults import ALL, Trial, Tried, allowed_sizes, try_faults
 from analysis.diagnosis.settings import (
     BALANCE_HOLDS,
     BOOTSTRAP_LEVEL,
     CONTRAST_BLOCKS,
     LATE_STEP,
     LEAST_FAULT_GAIN,
-    SIZE_IS_NEAR,
-    UNDOING_ROUNDS,
 )
 from analysis.diagnosis.types import Mask, TimeBudget
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-Tried = tuple[Fit, Fault, Variant, list[Pair]]
-"""A variant of a fault with its best size."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Trial:
-    bare: list[Pair]
-    """Per base, the products of both sets with nothing undone."""
-    tried: list[Tried]
-    """Each fault by its best variant; the one that leaves least first."""
-    complete: bool
-    """All faults were tried before the time ran out."""
-
-
-ALL = tuple(range(CONTRAST_BLOCKS))
 SIXTHS, THIRDS = (tuple(tuple(ALL[k : k + size]) for k in ALL[::size]) for size in (len(ALL) // 6, len(ALL) // 3))
-VARIANTS_APPROACHED = 3
-"""Variants of a fault that are undone anew about their best sizes."""
 FOLDS = len(SIXTHS)
 """Parts of each set that are left out in turn."""
 APART = (*THIRDS, ALL[: CONTRAST_BLOCKS // 2])
@@ -82,7 +64,7 @@ def compare(
     for bases, motions in bases_of(*sides):
         with suppress(np.linalg.LinAlgError, ValueError):
             streams, faults = _set_up(*sides, bases, motions)
-            trial = _try_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
+            trial = try_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
             if not isinstance(bases[0], ForceBase) or _balances(streams, trial.tried):
                 return _judge_faults(streams, trial)
     return None
@@ -117,25 +99,6 @@ def _set_up(
     if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"}:
         faults.append(sensor_misalignment())
     return streams, faults
-
-
-def _try_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Trial:
-    clean = [stream.grams(stream.clean, []).blocks for stream in streams]
-    bare = [
-        Pair(stream.grams(stream.other, []), ALL, tuple(own), (stream.clean.scale / stream.other.scale) ** 2)
-        for stream, own in zip(streams, clean, strict=True)
-    ]
-    best: list[Tried] = []
-    complete = False
-    for fault in faults:
-        if not time_left():
-            break
-        tried = [found for variant in fault.variants if (found := _try_variant(bare, streams, fault, variant))]
-        if tried:
-            best.append(_best_of(tried, bare, streams))
-    else:
-        complete = True
-    return Trial(bare, sorted(best, key=_error_of), complete)
 
 
 def _judge_faults(streams: Sequence[Stream], trial: Trial) -> Comparison:
@@ -181,59 +144,6 @@ def _undo(stream: Stream, found: Tried) -> tuple[list[FloatArray], list[Mask]]:
     return rows, masks
 
 
-def _try_variant(bare: Sequence[Pair], streams: Sequence[Stream], fault: Fault, variant: Variant) -> Tried | None:
-    """None where undoing the fault is ill-conditioned. bare: the pairs with nothing undone."""
-    pairs = [
-        replace(pair, with_it=stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, fault, variant)))
-        for stream, pair in zip(streams, bare, strict=True)
-    ]
-    return (
-        (fit_sizes(pairs, variant), fault, variant, pairs)
-        if all(pair.with_it.is_sound(variant) for pair in pairs)
-        else None
-    )
-
-
-def _error_of(tried: Tried) -> float:
-    return tried[0].error
-
-
-def _best_of(tried: Sequence[Tried], bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
-    """The variant that leaves least, after it was undone anew about its size. Of faults that are only of size 1 what
-    they say, several are, for at another size any of them may leave less than the true one."""
-    first = min(tried, key=_error_of)
-    if not first[2].exact:
-        return _approach(first, bare, streams)
-    at_size_1 = sorted(tried, key=lambda each: _error_of(_at_allowed_size(each)))[:VARIANTS_APPROACHED]
-    return min((_approach(each, bare, streams) for each in (first, *at_size_1)), key=_error_of)
-
-
-def _approach(found: Tried, bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
-    """The fault undone about the size that was found, again and again: beside it, the change was only extrapolated."""
-    best = _at_allowed_size(found)
-    for _ in range(UNDOING_ROUNDS):
-        fit, fault, variant, _ = found
-        if variant.about is None or abs(float(fit.sizes[0]) - 1) < SIZE_IS_NEAR:
-            break
-        again = _try_variant(bare, streams, fault, variant.about(float(fit.sizes[0])))
-        if again is None:
-            break
-        found, before = again, best
-        best = min(best, _at_allowed_size(found), key=_error_of)
-        if best is before and not variant.exact:
-            break
-    return best
-
-
-def _at_allowed_size(found: Tried) -> Tried:
-    _, fault, variant, pairs = found
-    return (fit_sizes(pairs, _allowed(variant)), fault, variant, pairs) if variant.exact else found
-
-
-def _allowed(variant: Variant) -> Variant:
-    return fix_size(variant, 0.0) if variant.exact else variant
-
-
 def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
     """Error of stretches of one set with a common base over that with a base each, less 1. sides: per stream, products
     (blocks, k, k)."""
@@ -261,7 +171,7 @@ def _judge_fault(streams: Sequence[Stream], found: Tried, plain: Fit, samples: i
         for name in values
     }
     gains = (
-        list(_gains_within_a_set(streams, fault, _allowed(variant), fit.sizes))
+        list(_gains_within_a_set(streams, fault, allowed_sizes(variant), fit.sizes))
         if plain.error > (1 + LEAST_FAULT_GAIN) * fit.error
         else [0.0]
     )

@@ -1,0 +1,96 @@
+"""Finds for each fault the variant and the size that leave least when they are undone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from analysis.diagnosis.contrast.fault import Fault, Variant, fix_size
+from analysis.diagnosis.contrast.joint_products import Fit, Pair, fit_sizes
+from analysis.diagnosis.contrast.stream import Stream, rows_with_fault_undone
+from analysis.diagnosis.settings import CONTRAST_BLOCKS, SIZE_IS_NEAR, UNDOING_ROUNDS
+from analysis.diagnosis.types import TimeBudget
+
+ALL = tuple(range(CONTRAST_BLOCKS))
+VARIANTS_APPROACHED = 3
+"""Variants of a fault that are undone anew about their best sizes."""
+
+Tried = tuple[Fit, Fault, Variant, list[Pair]]
+"""A variant of a fault with its best size."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    bare: list[Pair]
+    """Per base, the products of both sets with nothing undone."""
+    tried: list[Tried]
+    """Each fault by its best variant; the one that leaves least first."""
+    complete: bool
+    """All faults were tried before the time ran out."""
+
+
+def try_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Trial:
+    clean = [stream.grams(stream.clean, []).blocks for stream in streams]
+    bare = [
+        Pair(stream.grams(stream.other, []), ALL, tuple(own), (stream.clean.scale / stream.other.scale) ** 2)
+        for stream, own in zip(streams, clean, strict=True)
+    ]
+    best: list[Tried] = []
+    complete = False
+    for fault in faults:
+        if not time_left():
+            break
+        tried = [found for variant in fault.variants if (found := _try_variant(bare, streams, fault, variant))]
+        if tried:
+            best.append(_best_of(tried, bare, streams))
+    else:
+        complete = True
+    return Trial(bare, sorted(best, key=_error_of), complete)
+
+
+def _try_variant(bare: Sequence[Pair], streams: Sequence[Stream], fault: Fault, variant: Variant) -> Tried | None:
+    """None where undoing the fault is ill-conditioned. bare: the pairs with nothing undone."""
+    pairs = [
+        replace(pair, with_it=stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, fault, variant)))
+        for stream, pair in zip(streams, bare, strict=True)
+    ]
+    sound = all(pair.with_it.is_sound(variant) for pair in pairs)
+    return (fit_sizes(pairs, variant), fault, variant, pairs) if sound else None
+
+
+def _error_of(tried: Tried) -> float:
+    return tried[0].error
+
+
+def _best_of(tried: Sequence[Tried], bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
+    """The variant that leaves least, after it was undone anew about its size. Of faults that are only of size 1 what
+    they say, several are, for at another size any of them may leave less than the true one."""
+    first = min(tried, key=_error_of)
+    if not first[2].exact:
+        return _approach(first, bare, streams)
+    at_size_1 = sorted(tried, key=lambda each: _error_of(_at_allowed_size(each)))[:VARIANTS_APPROACHED]
+    return min((_approach(each, bare, streams) for each in (first, *at_size_1)), key=_error_of)
+
+
+def _approach(found: Tried, bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
+    """The fault undone about the size that was found, again and again: beside it, the change was only extrapolated."""
+    best = _at_allowed_size(found)
+    for _ in range(UNDOING_ROUNDS):
+        fit, fault, variant, _ = found
+        if variant.about is None or abs(float(fit.sizes[0]) - 1) < SIZE_IS_NEAR:
+            break
+        again = _try_variant(bare, streams, fault, variant.about(float(fit.sizes[0])))
+        if again is None:
+            break
+        found, before = again, best
+        best = min(best, _at_allowed_size(found), key=_error_of)
+        if best is before and not variant.exact:
+            break
+    return best
+
+
+def _at_allowed_size(found: Tried) -> Tried:
+    _, fault, variant, pairs = found
+    return (fit_sizes(pairs, allowed_sizes(variant)), fault, variant, pairs) if variant.exact else found
+
+
+def allowed_sizes(variant: Variant) -> Variant:
+    return fix_size(variant, 0.0) if variant.exact else variant
