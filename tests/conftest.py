@@ -1,5 +1,6 @@
 """Shared by all tests: small protocols, and where shared test material lies."""
 
+import gc
 import importlib.util
 import os
 import signal
@@ -23,6 +24,9 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False, deadline=None)
 settings.load_profile("repeatable")
 
+
+# Ten thousand tests keep much alive that the garbage collector would look through again and again (6 % of their time).
+gc.set_threshold(100_000, 50, 50)
 
 # People read times by the clock of the machine: here it stands in one place, for programs that tests start as well.
 os.environ["TZ"] = "UTC"

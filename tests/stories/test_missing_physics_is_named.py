@@ -87,6 +87,7 @@ def test_what_no_catalogue_holds_is_never_explained(short):
     assert found.fit.test.retuned > 3 * found.fit.test.noise
 
 
+@pytest.mark.slow
 def test_without_the_true_effect_no_other_one_explains(short):
     found = found_in(short(SEED, SATURATION), without=["force_saturation"])
     assert found.verdict in ("unexplained", "partly_explained")

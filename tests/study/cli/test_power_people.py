@@ -15,6 +15,7 @@ def plan_of(out, *more):
     return json.loads((out / FINISHED_NAME).read_text().splitlines()[0])["plan"]["crowd"]
 
 
+@pytest.mark.slow
 def test_a_plan_without_habits_says_nothing_of_them_so_that_older_folders_go_on(tmp_path):
     crowd = plan_of(tmp_path / "plain")
     assert set(crowd) == {

@@ -43,6 +43,7 @@ def bank(done, tmp_path):
     return tmp_path / "proof"
 
 
+@pytest.mark.slow
 def test_it_says_misses_first_and_leaves_table_and_page(done, run, tmp_path):
     code, out, _ = run(*given(done, "--table", tmp_path / "small.csv"))
     assert code == 0

@@ -122,6 +122,7 @@ def test_what_is_left_of_a_command_drives_one_body(of_both):
     assert model.mass[0, 0] == pytest.approx(MASS, rel=0.1)
 
 
+@pytest.mark.slow
 def test_where_only_accelerations_were_measured_a_hardening_spring_is_found(recording_of, balance_of):
     mass, damping, stiffness, cubic, rate_hz = 0.1, 1.0, 2000.0, 6e6, 500.0
     times_s, at = np.arange(0, 16, 1 / rate_hz), _force(9, 25.0)[1]

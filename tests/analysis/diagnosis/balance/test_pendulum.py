@@ -43,6 +43,7 @@ def test_a_balanced_lever_has_no_weight(balance):
     assert "gravity_torque" not in {law.law.effect for law in balance(0.0, RUBBING).named}
 
 
+@pytest.mark.slow
 def test_a_weight_that_a_spring_would_have_to_cancel_is_not_named(recording_of, balance_of):
     """A weak bend of a spring over a small travel is what is left of a huge weight beside its tangent."""
     rng = np.random.default_rng(SEED)

@@ -144,6 +144,7 @@ def test_no_clock_rate_is_suggested_for_a_clock_in_order(period):
     assert likely_clock_rates(streams_beside([oscillator(2, 0, period)[0]], period)) == ()
 
 
+@pytest.mark.slow
 def test_a_fast_clock_is_named_with_its_rate():
     faulty = by_other_clock(oscillator(2)[0], -0.02)
     found = compare([faulty], [oscillator(1)[0]], frozenset(), lambda: True)
@@ -167,7 +168,7 @@ def test_interpolation_makes_prediction_errors_of_noise_smaller_by_what_is_said(
     assert smaller == pytest.approx(noise_kept(by), rel=0.03)
 
 
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_noise_of_a_reading_is_neither_late_nor_bent(seed):
     """The mean of two readings has less noise than either, and so has a reading on the flat part of a curve: late
     readings and curves gained 0.3 by that."""

@@ -16,6 +16,7 @@ def test_another_recording_of_the_same_device_names_nothing(rig, seed):
     assert found is not None and found.named is None
 
 
+@pytest.mark.slow
 def test_a_fault_that_may_sit_on_either_of_two_axes_is_not_named(rig):
     found = rig.contrast("added_mass", 0.3).comparison
     assert found is not None

@@ -65,6 +65,7 @@ def in_turns(seed: int, late: FloatArray) -> Recording:
     )
 
 
+@pytest.mark.slow
 def test_a_logger_that_reads_all_channels_late_is_named_once(rig):
     found = compare([in_turns(2, np.full(6, 2.0))], [in_turns(1, np.zeros(6))], frozenset(), rig.time_left)
     assert found is not None

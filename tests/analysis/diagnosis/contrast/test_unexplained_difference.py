@@ -45,6 +45,7 @@ def test_where_nothing_sets_the_sets_apart_only_what_was_not_compared_is_named(r
     assert not found.contradicts(frozenset(), explained=False)
 
 
+@pytest.mark.slow
 def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_is(rig, monkeypatch):
     asked = []
 

@@ -45,6 +45,7 @@ def named(found):
     return [effect.effect for effect in found.diagnosis.effects]
 
 
+@pytest.mark.slow
 def test_what_an_intact_device_differs_by_is_named_only_without_clean_recordings(diagnosed, clean, found_in):
     same = diagnosed.recorded(1, (LAG,), seed=4)
     assert named(found_in(same)) == ["amplifier_lag"]

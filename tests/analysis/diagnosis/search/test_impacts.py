@@ -58,6 +58,7 @@ def told(loose):
     return explain_impacts(*loose, CATALOGUE)
 
 
+@pytest.mark.slow
 def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
     (claim,) = told.after.fitted.hypothesis.claims
     assert (claim.effect.name, claim.sites) == ("backlash", (AXIS,))

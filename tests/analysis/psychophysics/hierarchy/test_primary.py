@@ -70,6 +70,7 @@ def test_above_the_cap_there_is_a_bound_and_no_size():
     assert high.lower_n > 2.0
 
 
+@pytest.mark.slow
 def test_answers_that_contradict_nothing_give_no_lower_bound():
     """Two people with one wrong answer each at 45 Hz: even a median of 0.05 N may have given them."""
     level = np.concatenate([np.tile([0.0, -3.0, -6.0, -9.0], 6), [9.0, 9.0]])

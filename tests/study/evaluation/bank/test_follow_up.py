@@ -70,6 +70,7 @@ def followed(tmp_path_factory):
     return folder, outcome, menu, found, seen
 
 
+@pytest.mark.slow
 def test_the_right_name_is_left_by_the_recording_that_was_proposed(followed):
     _, outcome, menu, (found,), seen = followed
     assert outcome.returned == ("sensor_gain", "force_gain")

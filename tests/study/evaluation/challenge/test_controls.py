@@ -14,6 +14,7 @@ def asked():
     return {control.name: control.draw(50_031, SHORT) for control in CONTROLS}
 
 
+@pytest.mark.slow
 def test_shuffling_keeps_the_command_and_each_sample(asked):
     (shuffled,), whole = asked["a recording shuffled in time"], asked["irrelevant hypotheses added"][1]
     assert np.array_equal(shuffled.recording.command.samples, whole.recording.command.samples)

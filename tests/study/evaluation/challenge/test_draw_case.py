@@ -26,6 +26,7 @@ def friction_case():
     return draw_case(5, ["coulomb_friction"], strength=0.5)
 
 
+@pytest.mark.slow
 def test_a_draw_repeats_from_its_seed(friction_case):
     again = draw_case(5, ["coulomb_friction"], strength=0.5)
     np.testing.assert_array_equal(again.recording.response.samples, friction_case.recording.response.samples)

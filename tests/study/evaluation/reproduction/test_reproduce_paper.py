@@ -61,6 +61,7 @@ def written(plan):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_all_five_figures_come_out_beside_what_is_published(written, plan):
     assert [figure.figure for figure in written.reproduction.figures] == [1, 2, 3, 4, 5]

@@ -93,6 +93,7 @@ def recording(*laws) -> Recording:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_later_diagnosis_names_it_and_writes_it_into_the_model(model_file, tmp_path):
     write_entry(model_file, tmp_path / "drag_of_oil.py")
     kept = (read_entry(tmp_path / "drag_of_oil.py"),)

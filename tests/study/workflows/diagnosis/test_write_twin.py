@@ -61,6 +61,7 @@ def twin(protocol):
     return plan, write_twin(plan, shares.append), shares
 
 
+@pytest.mark.slow
 def test_the_model_predicts_what_was_kept_for_a_test(twin):
     plan, written, _ = twin
     assert written.fit.held_out is not None and written.fit.held_out < 0.3

@@ -25,6 +25,7 @@ def decisions(folder):
     return [(t.run, t.trial, t.level_n, t.correct) for t in fold_session(folder).state.trials if t.counts]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(200)
 def test_a_rehearsal_that_was_cut_off_continues_and_ends_the_same(rehearsal, sitter, session_logs):
     done = []

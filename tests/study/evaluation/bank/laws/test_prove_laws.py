@@ -24,6 +24,7 @@ def sealed(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_the_diagnosis_is_told_to_look_for_laws_and_not_for_which(sealed):
     place = next(sealed.open.iterdir())
     asked = json.loads((place / SETTINGS).read_text())

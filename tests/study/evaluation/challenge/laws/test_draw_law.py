@@ -23,6 +23,7 @@ def _simple(drawn):
     return kind is not None and kind.code >= 0 and len(drawn.rig.axes) == 1 and not kind.memory
 
 
+@pytest.mark.slow
 def test_the_same_number_is_the_same_device(found):
     number, case = found
     again = law_case(draw_law(SEED, number, brief=True), "first")

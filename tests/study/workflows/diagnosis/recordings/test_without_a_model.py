@@ -34,6 +34,7 @@ def test_where_no_model_can_be_fitted_it_is_asked_for(files, findings, tmp_path,
     assert "--model" in error.do_now
 
 
+@pytest.mark.slow
 def test_two_commands_of_one_motion_are_made_one_and_reported(files, findings, tmp_path, recording):
     pushed = recording.command.samples
     both = replace(recording.command, samples=np.hstack([pushed, 0.5 * pushed[::-1]]), channels=("fx", "fy"))
