@@ -113,6 +113,18 @@ def opened(stub, rigs):
         yield device
 
 
+def hold_force(device, rigs, stub) -> None:
+    """Waits for the force. Where a busy computer gave this program or the loop no processor, so that the device let go
+    before that could be seen, it is held again."""
+    for _ in range(STARTS):
+        device.hold(rigs.sine(2.0, 25))
+        becomes(lambda: device.keep_alive() or device.fault() is not Fault.NONE or stub.get("last_write") > 0.5)
+        if device.fault() is Fault.NONE:
+            return
+        assert device.release().health.fault is Fault.STALLED
+    pytest.fail(f"the force was let go {STARTS} times before it was seen")
+
+
 @pytest.mark.parametrize("plays", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_when_its_program_is_killed_the_loop_fades_brakes_and_ends(stub, rigs, holding, plays):
     held = holding(plays)
@@ -184,8 +196,7 @@ def check_it_is_lost(device, rigs, said: str) -> None:
 def test_a_loop_that_is_killed_or_stopped_loses_its_force_by_the_watchdog_and_the_program_says_so(
     stub, rigs, opened, end
 ):
-    opened.hold(rigs.sine(2.0, 25))
-    becomes(lambda: opened.keep_alive() or stub.get("last_write") > 0.5)
+    hold_force(opened, rigs, stub)
     stub.set("stretch_in_use", 1)
     os.kill(opened._process.pid, end)
     becomes(lambda: stub.safe)
@@ -200,8 +211,7 @@ def test_a_loop_that_is_killed_or_stopped_loses_its_force_by_the_watchdog_and_th
 
 @pytest.mark.slow
 def test_a_loop_that_is_told_to_end_fades_first(stub, rigs, opened):
-    opened.hold(rigs.sine(2.0, 25))
-    becomes(lambda: opened.keep_alive() or stub.get("last_write") > 0.5)
+    hold_force(opened, rigs, stub)
     os.kill(opened._process.pid, signal.SIGTERM)
     becomes(lambda: opened.fault() is Fault.LOST)
     assert stub.safe and stub.get("cause") == PROGRAM_CLOSED
@@ -209,8 +219,7 @@ def test_a_loop_that_is_told_to_end_fades_first(stub, rigs, opened):
 
 
 def test_a_loop_that_was_stopped_for_a_moment_lets_go_and_serves_again(stub, rigs, opened):
-    opened.hold(rigs.sine(2.0, 25))
-    becomes(lambda: opened.keep_alive() or stub.get("last_write") > 0.5)
+    hold_force(opened, rigs, stub)
     os.kill(opened._process.pid, signal.SIGSTOP)
     time.sleep(0.3)
     os.kill(opened._process.pid, signal.SIGCONT)

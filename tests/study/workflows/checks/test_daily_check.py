@@ -24,7 +24,6 @@ def changed_kinds(baseline, today) -> set[str]:
     return {change.kind for change in compare_recordings(baseline, today) if change.changed}
 
 
-@pytest.mark.slow
 def test_an_unchanged_device_passes_and_what_was_planted_is_named(recorded):
     baseline = recorded(1)
     assert changed_kinds(baseline, recorded(2)) == set()
