@@ -17,7 +17,7 @@ from study.devices.clock import RealClock
 from study.devices.device import Fault
 from study.devices.opening import open_device
 from study.errors import DeviceError
-from tests.study.devices.loop_process.awaited import becomes, runs
+from tests.study.devices.loop_process.awaited import STARTS, becomes, hold_force, runs
 
 pytestmark = pytest.mark.real_time
 
@@ -26,7 +26,6 @@ PATIENT = {"stretch_in_use": 1000}
 
 PROGRAM_CLOSED, WATCHDOG = 4, 3
 """Why the force is off, as the device says."""
-STARTS = 3
 
 PROGRAM = """
 import pickle, sys, time
@@ -111,18 +110,6 @@ def opened(stub, rigs):
     set_switches(stub, PATIENT)
     with contextlib.closing(open_device("omega3", rigs.SETTINGS, RealClock(), seed=1)) as device:
         yield device
-
-
-def hold_force(device, rigs, stub) -> None:
-    """Waits for the force. Where a busy computer gave this program or the loop no processor, so that the device let go
-    before that could be seen, it is held again."""
-    for _ in range(STARTS):
-        device.hold(rigs.sine(2.0, 25))
-        becomes(lambda: device.keep_alive() or device.fault() is not Fault.NONE or stub.get("last_write") > 0.5)
-        if device.fault() is Fault.NONE:
-            return
-        assert device.release().health.fault is Fault.STALLED
-    pytest.fail(f"the force was let go {STARTS} times before it was seen")
 
 
 @pytest.mark.parametrize("plays", [pytest.param(False, marks=pytest.mark.slow), True])
