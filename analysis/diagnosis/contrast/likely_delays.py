@@ -64,6 +64,8 @@ def _rows_late(stream: Stream) -> float:
     """Rows by which the responses lag the commands in the longest part of the faulty set; 0 for less than one."""
     made = _made_by(stream, max(stream.other.rows, key=len))
     longest = len(made) // 4
+    if longest < 1:
+        return 0.0
     late = lateness(made[:, [0]], made[:, [1]], longest)
     return late if 1 <= late < longest else 0.0
 
@@ -72,6 +74,8 @@ def _likeliest_rate(stream: Stream, runs_on: bool) -> tuple[float, float]:
     """The relative clock rate along whose delays the cross-correlations of short blocks have the largest sum (a Radon
     transform of their peaks), and the last block's time, in rows. 0 where that is the fastest of all."""
     times, correlations = _correlate_blocks(stream, runs_on)
+    if not correlations.size:
+        return 0.0, 0.0
     end, longest = float(times.max()), correlations.shape[1] // 2
     rates = np.arange(-longest, longest + LATE_STEP, LATE_STEP) / end
     # Readings of a clock that is fast by `rate` show at row t what was at t (1 + rate): they are early.
@@ -85,14 +89,17 @@ def _likeliest_rate(stream: Stream, runs_on: bool) -> tuple[float, float]:
 
 def _correlate_blocks(stream: Stream, runs_on: bool) -> tuple[FloatArray, FloatArray]:
     """Times of blocks (b,) in rows, and per block the correlation coefficients at each lag (b, 2 longest + 1) of what
-    its responses make with what all commands of its part make."""
+    its responses make with what all commands of its part make. Empty where all parts are too short."""
     before = stream.base.order if isinstance(stream.base, AutoregressiveBase) else 0
     starts = [before + (part.start / (part.rate_hz * stream.row_s) if runs_on else 0.0) for part in stream.other.parts]
     whole = sum(len(rows) for rows in stream.other.rows)
     longest = int(CLOCK_FASTEST * max(start + len(rows) for start, rows in zip(starts, stream.other.rows, strict=True)))
-    times, found = [], []
+    times: list[float] = []
+    found: list[FloatArray] = []
     for start, rows in zip(starts, stream.other.rows, strict=True):
         made = _made_by(stream, rows)
+        if len(made) < CONTRAST_BLOCKS or longest < 1:
+            continue
         room = next_fast_len(len(made) + longest, True)
         commands, size = rfft(made[:, 1], room).conj(), float(np.linalg.norm(made[:, 1]))
         for block in np.array_split(np.arange(len(made)), max(round(CONTRAST_BLOCKS * len(rows) / whole), 1)):

@@ -17,7 +17,7 @@ from analysis.diagnosis.contrast.interpolation import noise_kept, resample, shif
 from analysis.diagnosis.contrast.likely_delays import likely_clock_rates, likely_delays_s
 from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.sensor_faults import sensor_faults
-from analysis.diagnosis.contrast.stream import FEWEST_ROWS, Stream, rows_with_fault_undone, stream_of
+from analysis.diagnosis.contrast.stream import FEWEST_ROWS, REACH, Stream, rows_with_fault_undone, stream_of
 from analysis.diagnosis.settings import LEAST_FAULT_GAIN
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -142,6 +142,14 @@ def test_a_clock_that_begins_anew_with_each_part_is_told_from_one_that_runs_on()
 @pytest.mark.parametrize("period", [500, 6000])
 def test_no_clock_rate_is_suggested_for_a_clock_in_order(period):
     assert likely_clock_rates(streams_beside([oscillator(2, 0, period)[0]], period)) == ()
+
+
+@pytest.mark.parametrize("rows", [20, 2 * REACH + 3])
+def test_parts_that_are_hardly_longer_than_the_filter_suggest_nothing(rows):
+    """Their blocks were empty, and their times no numbers."""
+    (stream,) = streams_beside([oscillator(2, 40)[0]])
+    short = replace(stream, other=replace(stream.other, rows=tuple(part[:rows] for part in stream.other.rows)))
+    assert likely_clock_rates([short]) == () and likely_delays_s([short]) == ()
 
 
 @pytest.mark.slow
