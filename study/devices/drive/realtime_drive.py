@@ -112,10 +112,9 @@ class RealtimeDrive:
 
         False, and nothing begins, where something moves already or nothing may move any more.
         """
-        if self._closing:  # its thread may have ended already, as it should
-            return False
         if not (self._thread.is_alive() and self._lock.acquire(timeout=JOIN_S)):
-            self._runner.give_up(TimeoutError("its loop hangs"))
+            if not self._closing:  # else its thread may have ended already, as it should
+                self._runner.give_up(TimeoutError("its loop hangs"))
             return False
         try:
             if self._runner.moving or self._closing or self._runner.failure is not None:
