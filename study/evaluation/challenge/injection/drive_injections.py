@@ -26,6 +26,8 @@ class ForceInjection:
     """A fault of the drive: it does not exist where the motion is imposed."""
     turns: bool = True
     """Also meaningful for an axis that rotates continuously."""
+    memory: bool = False
+    """Depends on what was before: begins anew with each take."""
 
 
 def rms(samples: FloatArray) -> float:
@@ -103,6 +105,7 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
         lambda motion, s, r: {"delay": max(0.3 * 0.02 * 50.0**s / _middle_turn(motion.command, motion.rate_hz), 1e-9)},
         lambda motion, numbers: _shift_later(motion.command, -numbers["delay"] * motion.rate_hz),
         actuator=True,
+        memory=True,
     ),
     ForceInjection(
         "amplifier_lag",
@@ -111,9 +114,10 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
             motion.command + numbers["time_constant"] * np.gradient(motion.command) * motion.rate_hz
         ),
         actuator=True,
+        memory=True,
     ),
     ForceInjection("force_saturation", _draw_limit, _undo_saturation, actuator=True),
-    ForceInjection("slew_limit", _draw_rate, _undo_slew_limit, actuator=True),
+    ForceInjection("slew_limit", _draw_rate, _undo_slew_limit, actuator=True, memory=True),
     ForceInjection(
         "force_quantization",
         lambda motion, s, r: {"step": level_of(motion, 0.3 + 0.7 * s)},

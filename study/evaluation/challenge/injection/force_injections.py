@@ -93,7 +93,7 @@ FORCE_INJECTIONS: tuple[ForceInjection, ...] = (
     _scaled_shape("quadratic_damping", lambda motion: motion.v * np.abs(motion.v)),
     _scaled_shape("coulomb_friction", _sign),
     ForceInjection("asymmetric_friction", _draw_asymmetric, _add_asymmetric_friction),
-    ForceInjection("presliding_hysteresis", _draw_bristles, _add_bristles),
+    ForceInjection("presliding_hysteresis", _draw_bristles, _add_bristles, memory=True),
     _scaled_shape("added_stiffness", _centre_position),
     _scaled_shape("hardening_stiffness", lambda motion: _centre_position(motion) ** 3),
     ForceInjection("cogging", _draw_cogging, _add_cogging),

@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.injection.axis_motion import axis_motion
+from study.evaluation.challenge.injection.axis_motion import axis_motion, takes_of
 from study.evaluation.challenge.injection.drive_injections import ForceInjection
 from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
 from study.evaluation.challenge.injection.spoiled_readings import (
@@ -69,6 +69,8 @@ class Injection:
     spoil: Spoil
     axes: int = 1
     """Number of response channels that it needs."""
+    memory: bool = False
+    """Depends on earlier readings: begins anew with each take."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +100,9 @@ def _either(random: np.random.Generator) -> float:
 
 
 INJECTIONS: tuple[Injection, ...] = (
-    Injection("sensor_lag", lambda at, s, r: {"bandwidth": at.middle_hz * _log_between(20.0, 0.5, s)}, lag),
+    Injection(
+        "sensor_lag", lambda at, s, r: {"bandwidth": at.middle_hz * _log_between(20.0, 0.5, s)}, lag, memory=True
+    ),
     Injection("sensor_clipping", lambda at, s, r: {"limit": at.peak * _log_between(0.95, 0.25, s)}, clip),
     Injection(
         "mains_hum",
@@ -123,7 +127,9 @@ INJECTIONS: tuple[Injection, ...] = (
     Injection(
         "sensor_gain", lambda at, s, r: {"gain": 1 + float(r.choice((-0.5, 1.0))) * _log_between(0.02, 0.8, s)}, scale
     ),
-    Injection("logger_offset", lambda at, s, r: {"offset": _log_between(0.005, 0.1, s) / at.middle_hz}, late),
+    Injection(
+        "logger_offset", lambda at, s, r: {"offset": _log_between(0.005, 0.1, s) / at.middle_hz}, late, memory=True
+    ),
     Injection(
         "sensor_nonlinearity", lambda at, s, r: {"cubic": _either(r) * _log_between(0.02, 0.3, s) / at.peak**2}, cubic
     ),
@@ -131,7 +137,7 @@ INJECTIONS: tuple[Injection, ...] = (
         "sensor_asymmetry", lambda at, s, r: {"square": _either(r) * _log_between(0.02, 0.4, s) / at.peak}, square
     ),
     Injection("sensor_noise", lambda at, s, r: {"rms": at.rms * _log_between(0.003, 0.5, s)}, noise),
-    Injection("sensor_play", lambda at, s, r: {"gap": at.rms * _log_between(0.01, 0.6, s)}, play),
+    Injection("sensor_play", lambda at, s, r: {"gap": at.rms * _log_between(0.01, 0.6, s)}, play, memory=True),
     Injection("cross_axis_sensitivity", lambda at, s, r: {"from_next": _log_between(0.02, 0.8, s)}, cross, axes=2),
     Injection("sensor_misalignment", _draw_turn, turn, axes=3),
 )
@@ -155,7 +161,9 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
     if samples.shape[1] < wanted.axes:
         raise ValueError(f"{effect} needs {wanted.axes} response channels, and there are {samples.shape[1]}")
     values = wanted.draw(describe_reading(recording), strength, random)
-    spoiled = np.asarray(wanted.spoil(samples, recording.sample_rate_hz, values, random))
+    takes = takes_of(recording) if wanted.memory else ((0, len(recording)),)
+    rate_hz = recording.sample_rate_hz
+    spoiled = np.vstack([wanted.spoil(samples[start:stop], rate_hz, values, random) for start, stop in takes])
     change = np.sqrt(np.nanmean((spoiled - samples) ** 2, axis=0))
     response = replace(recording.response, samples=spoiled)
     return Injected(replace(recording, response=response), effect, values, strength, np.asarray(change))
@@ -171,7 +179,8 @@ def _inject_force(
     if motion is None:
         raise ValueError(f"{wanted.effect} needs a motion along command {axis + 1}")
     values = wanted.draw(motion, strength, random)
-    samples[:, axis] = wanted.command(motion, values)
+    takes = takes_of(recording) if wanted.memory else ((0, len(recording)),)
+    samples[:, axis] = np.concatenate([wanted.command(motion.part(*take), values) for take in takes])
     change = np.sqrt(np.mean((samples - recording.command.samples) ** 2, axis=0))
     command = replace(recording.command, samples=samples)
     return Injected(replace(recording, command=command), wanted.effect, values, strength, np.asarray(change))

@@ -139,3 +139,27 @@ def test_what_cannot_be_injected_is_refused():
         injected("quantization", 1.5)
     with pytest.raises(ValueError, match="needs 3 response channels"):
         injected("sensor_misalignment", channels=1)
+
+
+def two_takes() -> Recording:
+    """The recording twice, moved by 50 in the second take, with its parts named."""
+    first = recording()
+    samples = np.vstack([first.response.samples, first.response.samples + 50.0])
+    return replace(
+        first,
+        command=replace(first.command, samples=np.vstack([first.command.samples] * 2)),
+        response=replace(first.response, samples=samples),
+        meta={"parts": [{"start": 0, "stop": 4000}, {"start": 4000, "stop": 8000}]},
+    )
+
+
+@pytest.mark.parametrize("effect", [injection.effect for injection in INJECTIONS if injection.memory])
+def test_what_a_sensor_remembers_ends_with_the_take(effect):
+    both = inject(two_takes(), effect, 0.9, np.random.default_rng(2))
+    change = (both.recording.response.samples - two_takes().response.samples)[4000:]
+    assert 0 < np.abs(change).max() < 5.0
+
+
+def test_a_motion_is_differentiated_within_each_take():
+    whole = axis_motion(two_takes(), 0)
+    assert np.abs(whole.v).max() == pytest.approx(np.abs(axis_motion(recording(), 0).v).max())
