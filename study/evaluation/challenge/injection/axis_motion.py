@@ -31,8 +31,8 @@ class AxisMotion:
 
     def part(self, start: int, stop: int) -> "AxisMotion":
         """Samples start to stop."""
-        taken = (each[start:stop] for each in (self.q, self.v, self.a, self.command))
-        return AxisMotion(*taken, self.rate_hz)
+        q, v, a, command = (each[start:stop] for each in (self.q, self.v, self.a, self.command))
+        return AxisMotion(q, v, a, command, self.rate_hz)
 
     @property
     def seconds(self) -> float:
