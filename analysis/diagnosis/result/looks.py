@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import without_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.localisation.distortion import Distortions, find_distortions
@@ -68,22 +71,28 @@ def _black_box(context: SearchContext, found: Explanation) -> BlackBox | None:
 
 
 def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, ...]:
-    """Each named effect's, against the final model without it alone."""
+    """Each named effect's, against the final model without it alone, in one record."""
     measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
     if not fitted.hypothesis.claims:
         return ()
-    recording = measure.records[0].recording
+    shown = _most_fitted(measure)
+    recording = measure.records[shown].recording
     said, drawn = labels_of(recording, tuning.model), []
     names = Names(
         tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.system
     )
-    complete = gather_evidence(measure, tuning, fitted)[0].predicted
+    complete = gather_evidence(measure, tuning, fitted)[shown].predicted
     for number in range(len(fitted.hypothesis.claims)):
         others = without_claim(fitted.hypothesis, number)
         bare = gather_evidence(measure, tuning, evaluate_fit(measure, tuning, fitted.deviations, others))
         main = max(fitted.hypothesis.of_claim(number), key=lambda placed: _strength(placed.values))
-        drawn.append(signature_of(bare[0], complete, main, names, recording.hold))
+        drawn.append(signature_of(bare[shown], complete, main, names, recording.hold))
     return tuple(drawn)
+
+
+def _most_fitted(measure: ErrorMeasure) -> int:
+    """Place of the first record with as many samples to fit or choose by as any: another one may be held out whole."""
+    return int(np.argmax([np.sum(record.fit | record.choose) for record in measure.records]))
 
 
 def _strength(values: Values) -> float:
