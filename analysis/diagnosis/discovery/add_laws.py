@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.discovery.discover import Discovery, discover
 from analysis.diagnosis.discovery.law_of_sum import laws_of
-from analysis.diagnosis.discovery.proof import beats, proof_sentence, reasons_against
+from analysis.diagnosis.discovery.proof import beats, choose_on_held_out, proof_sentence, reasons_against
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.search import SearchResult, Unconfirmed
@@ -25,6 +25,8 @@ def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) ->
     if not _needs_law(result) or not time_left():
         return result
     found = discover(context, known, progress, time_left)
+    if found is not None and time_left():
+        found = choose_on_held_out(context, found)
     if found is None or not _improves_held_out(found.found):
         return result
     rivals = _rivals(context, known)
@@ -42,7 +44,7 @@ def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) ->
         reasons = (*reasons, "what was kept for the test does not bear it out")
     if reasons:
         return replace(result, unconfirmed=(*result.unconfirmed, *_candidates(context, found, reasons)))
-    remarks = (proof_sentence(context, checked, rivals),)
+    remarks = (proof_sentence(context, checked, rivals, found.chosen_of),)
     return SearchResult(context, checked, judged, remarks, None if checked.errors is None else checked.errors[1])
 
 

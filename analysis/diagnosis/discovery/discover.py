@@ -16,7 +16,9 @@ from analysis.diagnosis.discovery.antisymmetric_pairs import (
     with_equal_halves,
 )
 from analysis.diagnosis.discovery.beam import best_sums
+from analysis.diagnosis.discovery.evaluate_shape import evaluate_shape
 from analysis.diagnosis.discovery.fit_sum import Sum
+from analysis.diagnosis.discovery.grammar import AXES
 from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, laws_of
 from analysis.diagnosis.discovery.matched_filter import View, views_of
 from analysis.diagnosis.discovery.screen_terms import cross_validate_terms, products_of
@@ -29,8 +31,10 @@ from analysis.diagnosis.search.explain import Explanation, is_worthwhile
 from analysis.diagnosis.search.same_within_errors import inseparable
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, FittedCandidate, SearchContext, sensitivity_at
 from analysis.diagnosis.settings import (
+    AT_RETUNING_BOUND,
     LAW_ALMOST_NOISE,
     LAW_AXES_SHARE,
+    LAW_COMMAND_TAKEN,
     LAW_FITTED,
     LAW_FITTED_WITHIN,
     LAW_MOST_ROUNDS,
@@ -52,8 +56,15 @@ class Round:
     """The screened sums in the order of `fitted_candidates`."""
     placebo: float
     """Largest share of the held-out squares that a term takes of a time-shuffled missing force."""
-    explained_share: float
-    """Share of the held-out squares that the law takes of the missing force itself."""
+
+    @property
+    def shares_above_noise(self) -> tuple[float, float]:
+        """Shares, at most 1, that the law takes of the missing force's held-out squares above the noise, and that
+        chance takes."""
+        first = self.sums[0]
+        above = max(first.without - 1.0, 1e-300)
+        taken, by_chance = first.without - first.cross_validated, self.placebo * first.without
+        return min(taken / above, 1.0), min(by_chance / above, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +72,8 @@ class Discovery:
     found: Explanation
     """`after` holds the laws; its rounds and steps are those of the laws."""
     rounds: tuple[Round, ...]
+    chosen_of: int = 1
+    """Number of laws that fitted alike, of which the last one was chosen by its error on held-out stretches."""
 
 
 def discover(context: SearchContext, known: Explanation, progress: Progress, time_left: TimeBudget) -> Discovery | None:
@@ -105,37 +118,51 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) 
     views = views_of(context.measure, context.tuning, base)
     searched = [(view, best_sums(products_of(view), view_terms(view), time_left)) for view in _views_to_search(views)]
     every = sorted(
-        (*(item for _, found in searched for item in found.sums), *antisymmetric_pairs(views)),
+        (
+            *(item for view, found in searched for item in found.sums if not _undoes_command(view, item)),
+            *antisymmetric_pairs(views),
+        ),
         key=lambda item: _explained_squares(views, item),
         reverse=True,
     )
-    sums = _choose_sums_to_fit(_keep_close_to_best(_best_of_each_structure(every)))
-    if not sums:
+    pairs = _fit_sums(context, base, _choose_sums_to_fit(_keep_close_to_best(_best_of_each_structure(every))))
+    if not pairs:
         return None
+    ranked = _put_plainest_first(context, pairs)
+    first = ranked[0][1]
+    # Of the axes that it acts along.
+    own = [(each.acts_on, each.axis) for each in (first, first.partner) if each is not None]
+    placebo = max((found.placebo for view, found in searched if (view.acts_on, view.axis) in own), default=0.0)
+    return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo)
+
+
+def _fit_sums(context: SearchContext, base: Fitted, sums: Sequence[Sum]) -> tuple[tuple[FittedCandidate, Sum], ...]:
+    """The sums fitted by output error: the best one, and plainer ones that are as good, until they converge."""
     known = sensitivity_at(context, base.deviations, base.hypothesis)
-    fits: list[tuple[Fitted, Sum]] = []
-    for each in sums:
-        start = _starting_fit(context, base, each)
-        if start is not None:
-            fits.append((fit(context.measure, context.tuning, start, known, FIRST_ROUNDS), each))
+    fits = [
+        (fit(context.measure, context.tuning, start, known, FIRST_ROUNDS), each)
+        for each in sums
+        for start in _starting_fits(context, base, each)
+    ]
     fits.sort(key=lambda pair: pair[0].cost)
     if not fits or not np.isfinite(fits[0][0].cost):
-        return None
-    refined = [(context.candidate(refine(context, fits[0][0])), fits[0][1])]
-    rest = [(context.candidate(_like_best(context, fits[0], refined[0][0], each)), each[1]) for each in fits[1:]]
+        return ()
+    best = fits[0]
+    # Of a law's two starts the cheaper one may be that which ends where re-tuning without the law did.
+    ends = [refine(context, start) for start, each in fits if each is best[1]]
+    refined = [(context.candidate(min(ends, key=lambda end: end.cost)), best[1])]
+    others = {id(each): (start, each) for start, each in reversed(fits) if each is not best[1]}
+    rest = [
+        (context.candidate(_like_best(context, best, refined[0][0], pair)), pair[1])
+        for pair in sorted(others.values(), key=lambda pair: pair[0].cost)
+    ]
     close = [
         pair
         for pair in rest
         if _count_numbers(pair) < _count_numbers(refined[0]) and inseparable(refined[0][0], pair[0])
     ]
     refined += [(context.candidate(refine(context, candidate.fitted)), item) for candidate, item in close]
-    ranked = _put_plainest_first(context, [*refined, *(pair for pair in rest if pair not in close)])
-    first = ranked[0][1]
-    # Of the axes that it acts along.
-    own = [(each.acts_on, each.axis) for each in (first, first.partner) if each is not None]
-    placebo = max((found.placebo for view, found in searched if (view.acts_on, view.axis) in own), default=0.0)
-    taken = 1 - first.cross_validated / max(first.without, 1e-300)
-    return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo, taken)
+    return (*refined, *(pair for pair in rest if pair not in close))
 
 
 def _like_best(
@@ -182,20 +209,25 @@ def _count_numbers(pair: tuple[FittedCandidate, Sum]) -> int:
     return count
 
 
-def _starting_fit(context: SearchContext, base: Fitted, each: Sum) -> Fitted | None:
+def _starting_fits(context: SearchContext, base: Fitted, each: Sum) -> list[Fitted]:
     """The sum added to the fit, with the model's own numbers as they were or shifted as the sum's fit has them,
-    whichever costs less."""
+    whichever costs less; where re-tuning ended at a bound, for want of this law, also with the numbers as given."""
     recording = context.measure.records[0].recording
     shifted = np.clip(base.deviations + each.model_shift, -RETUNING_BOUND, RETUNING_BOUND)
+    given = np.zeros_like(base.deviations)
+    at_bound = np.abs(base.deviations).max(initial=0.0) >= AT_RETUNING_BOUND * RETUNING_BOUND
     starts = (each,) if each.partner is None else pair_starts(each)
-    found: list[Fitted] = []
-    for start, deviations in product(starts, (base.deviations, shifted)):
-        whole = combine(base.hypothesis, hypothesis_of_sum(start, recording))
-        try:
-            found.append(evaluate_fit(context.measure, context.tuning, deviations, whole))
-        except (MechanicalModelError, np.linalg.LinAlgError):
-            continue
-    return min(found, key=lambda start: start.cost, default=None)
+    chosen: list[Fitted] = []
+    for several in ((base.deviations, shifted), *([(given,)] if at_bound else [])):
+        found: list[Fitted] = []
+        for start, deviations in product(starts, several):
+            whole = combine(base.hypothesis, hypothesis_of_sum(start, recording))
+            try:
+                found.append(evaluate_fit(context.measure, context.tuning, deviations, whole))
+            except (MechanicalModelError, np.linalg.LinAlgError):
+                continue
+        chosen += [min(found, key=lambda start: start.cost)] if found else []
+    return chosen
 
 
 def _views_to_search(views: Sequence[View]) -> list[View]:
@@ -209,6 +241,21 @@ def _views_to_search(views: Sequence[View]) -> list[View]:
             views[output] for excess, output in sorted(worth, reverse=True)[:2] if excess >= LAW_AXES_SHARE * most
         ]
     return found
+
+
+def _undoes_command(view: View, each: Sum) -> bool:
+    """Whether a force takes more than half of its axis's command away. With mass, damping and stiffness shrinking
+    alongside, the balance of forces then holds with nothing on either side: its trivial solution."""
+    if each.acts_on != "force":
+        return False
+    taken = power = 0.0
+    for record in view.records:
+        command = record.columns[f"f{AXES[each.axis]}"]
+        for term, factor in zip(each.terms, each.factors, strict=True):
+            force = factor * evaluate_shape(term.shape, term.numbers, record.columns, record.rate_hz)
+            taken -= float(force @ command)
+        power += float(command @ command)
+    return taken > LAW_COMMAND_TAKEN * power
 
 
 def _excess(view: View) -> float:
