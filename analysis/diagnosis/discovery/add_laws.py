@@ -8,7 +8,13 @@ import numpy as np
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.discovery.discover import Discovery, discover
 from analysis.diagnosis.discovery.law_of_sum import laws_of
-from analysis.diagnosis.discovery.proof import beats, choose_on_held_out, proof_sentence, reasons_against
+from analysis.diagnosis.discovery.proof import (
+    beats,
+    choose_on_held_out,
+    holds_elsewhere,
+    proof_sentence,
+    reasons_against,
+)
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.search import SearchResult, Unconfirmed
@@ -38,7 +44,7 @@ def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) ->
         reasons = (*reasons, "these recordings leave its numbers as good as open")
     judged = judge(checked)
     sealed = float(np.nanmax(checked.after.score.test, initial=0.0))
-    if sealed > NAMED_ERROR:
+    if sealed > NAMED_ERROR and not holds_elsewhere(checked):
         reasons = (*reasons, f"on what was kept for the test it leaves {sealed:.3g} times the noise")
     if not judged.named:
         reasons = (*reasons, "what was kept for the test does not bear it out")

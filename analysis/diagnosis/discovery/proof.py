@@ -86,7 +86,7 @@ def _reasons_against(context: SearchContext, of: Discovery, rivals: Sequence[Fit
         yield SAME_KIND
     for number, found in enumerate(of.rounds):
         first = found.sums[0]
-        if first.spread > LAW_STABLE and not _holds_elsewhere(of.found):
+        if first.spread > LAW_STABLE and not holds_elsewhere(of.found):
             yield f"its numbers differ by {100 * first.spread:.0f} % from stretch to stretch"
         taken, by_chance = found.shares_above_noise
         if 1 - taken > LAW_PLACEBO * (1 - by_chance):
@@ -105,11 +105,11 @@ def _reasons_against(context: SearchContext, of: Discovery, rivals: Sequence[Fit
         )
 
 
-def _holds_elsewhere(found: Explanation) -> bool:
+def holds_elsewhere(found: Explanation) -> bool:
     """Whether so little error is left on held-out stretches that the law's factor, fitted to others, is as stable as
     is asked for: a factor that is off by a share s leaves the share s^2 of the error's power above the noise."""
-    before, after = (np.sum(np.maximum(each.score.test**2 - 1, 0.0)) for each in (found.retuned, found.after))
-    return bool(after <= LAW_STABLE**2 * before)
+    before, after = (float(np.sum(np.maximum(each.score.test**2 - 1, 0.0))) for each in (found.retuned, found.after))
+    return before > 0 and after <= LAW_STABLE**2 * before
 
 
 def _insignificant_gain(

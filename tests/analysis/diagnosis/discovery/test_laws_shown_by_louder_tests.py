@@ -1,0 +1,85 @@
+"""Laws that hardly show where they are looked for, and prove themselves on a louder test. Compiles."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.discovery.add_laws import add_laws
+from analysis.diagnosis.discovery.discover import Discovery, Round, discover
+from analysis.diagnosis.discovery.fit_sum import Sum
+from analysis.diagnosis.discovery.law_of_sum import laws_of
+from analysis.diagnosis.discovery.proof import choose_on_held_out, holds_elsewhere
+from analysis.diagnosis.search.search import SearchResult
+from analysis.diagnosis.search.verdict import judge
+from tests.lawful import arena_of, law, recorded
+
+QUIET = (("multisine", 0.2, "fit"), ("multisine", 0.3, "fit"), ("multisine", 0.4, "fit"), ("sweep", 2.0, "test"))
+
+
+def quiet(said, share):
+    pass
+
+
+def always():
+    return True
+
+
+@pytest.fixture(scope="module")
+def searched():
+    context, known = arena_of(recorded((law("-p0*x**3", 4e5),), 3, plan=QUIET))
+    found = discover(context, known, quiet, always)
+    assert found is not None
+    return context, known, found
+
+
+def test_a_law_that_takes_nearly_all_of_a_louder_error_is_named_though_some_noises_are_left(searched):
+    context, known, found = searched
+    assert found.found.after.score.test.max() > 3
+    named = add_laws(SearchResult(context, known, judge(known)), quiet, always)
+    assert named.judgement.named
+    laws = laws_of(named.found.after.fitted.hypothesis)
+    assert laws[0].variables == ("x",)
+
+
+def test_a_law_holds_elsewhere_only_where_little_of_the_held_out_error_is_left(searched):
+    _, _, found = searched
+    assert holds_elsewhere(found.found)
+    half = replace(
+        found.found.retuned, score=replace(found.found.retuned.score, test=found.found.retuned.score.test / 2)
+    )
+    assert not holds_elsewhere(replace(found.found, after=half))
+    unknown = replace(found.found.retuned.score, test=np.full(2, np.nan))
+    assert not holds_elsewhere(replace(found.found, retuned=replace(found.found.retuned, score=unknown)))
+
+
+def test_of_laws_that_fit_alike_the_one_that_the_louder_test_bears_out_is_chosen(searched):
+    context, _, found = searched
+    last = found.rounds[-1]
+    cubic = last.sums[0].terms[0].shape
+    order = [2, 1, 0]
+    turned = Round(tuple(last.fitted_candidates[k] for k in order), tuple(last.sums[k] for k in order), last.placebo)
+    wrong = context.with_test_score(turned.fitted_candidates[0])
+    given = replace(found.found, after=wrong, steps=(wrong,))
+    chosen = choose_on_held_out(context, Discovery(given, (turned,)))
+    assert chosen.chosen_of == 3
+    assert turned.sums[0].terms[0].shape != cubic == chosen.rounds[-1].sums[0].terms[0].shape
+    assert chosen.found.after.score.test.max() < wrong.score.test.max()
+    assert chosen.found.steps[-1] is chosen.found.after
+
+
+def test_shares_are_of_what_is_no_noise():
+    first = Sum(0, (), (), cross_validated=1.01, without=1.13, spread=0.2, model_shift=())
+    taken, by_chance = Round((), (first,), placebo=0.0076).shares_above_noise
+    assert taken == pytest.approx(0.12 / 0.13)
+    assert by_chance == pytest.approx(0.0076 * 1.13 / 0.13)
+
+
+def test_a_force_that_undoes_the_command_hides_no_law():
+    """With mass, damping and stiffness shrinking alongside, it balances everything: it came first, and led nowhere."""
+    context, known = arena_of(recorded((law("-p0*maximum(sign(-x - p1), 0)*vx", 4.0, 0.002),), 1))
+    found = discover(context, known, quiet, always)
+    assert found is not None
+    drag = laws_of(found.found.after.fitted.hypothesis)[0]
+    assert drag.expression == "p0*maximum(sign(-x - p1), 0)*vx"
+    assert drag.numbers == pytest.approx((-4.0, 0.002), rel=0.02)
