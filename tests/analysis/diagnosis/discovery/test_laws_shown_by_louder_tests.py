@@ -81,5 +81,5 @@ def test_a_force_that_undoes_the_command_hides_no_law():
     found = discover(context, known, quiet, always)
     assert found is not None
     drag = laws_of(found.found.after.fitted.hypothesis)[0]
-    assert drag.expression == "p0*maximum(sign(-x - p1), 0)*vx"
+    assert drag.expression == "p0*maximum(sign((-x) - p1), 0)*vx"
     assert drag.numbers == pytest.approx((-4.0, 0.002), rel=0.02)
