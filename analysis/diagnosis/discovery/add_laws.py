@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
-from analysis.diagnosis.discovery.discover import Discovery, discover
+from analysis.diagnosis.discovery.discover import Discovery, Round, discover
 from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.discovery.proof import (
     beats,
@@ -22,6 +22,7 @@ from analysis.diagnosis.search.search_context import FittedCandidate, SearchCont
 from analysis.diagnosis.search.verdict import judge
 from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, SEALED_ALONE_ERROR
 from analysis.diagnosis.types import Progress, TimeBudget
+from equalizer.laws.law import Law
 
 
 def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) -> SearchResult:
@@ -31,16 +32,26 @@ def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) ->
     if not _needs_law(result) or not time_left():
         return result
     found = discover(context, known, progress, time_left)
-    if found is not None and time_left():
+    return result if found is None else weigh_laws(result, found, time_left)
+
+
+def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) -> SearchResult:
+    """The search with laws that pass all checks in place of its names, or with laws as candidates."""
+    context, known = result.context, result.found
+    if time_left():
         found = choose_on_held_out(context, found)
-    if found is None or not _improves_held_out(found.found):
+    if not _improves_held_out(found.found):
         return result
+    checked = keep_identifiable(context, found.found, time_left)
+    is_open = len(checked.steps) < len(found.found.steps)
+    if is_open and checked.steps and _improves_held_out(checked):
+        # A law too weak for these recordings to fix its numbers takes no other law's name away.
+        found, is_open = _keep_rounds_of(found, checked), False
     rivals = _rivals(context, known)
     reasons = reasons_against(context, found, rivals)
     if not all(beats(found.found.after, rival) for rival in rivals):
         reasons = (*reasons, "what the catalogue names leaves hardly more")
-    checked = keep_identifiable(context, found.found, time_left)
-    if len(checked.steps) < len(found.found.steps):
+    if is_open:
         reasons = (*reasons, "these recordings leave its numbers as good as open")
     judged = judge(checked)
     sealed = float(np.nanmax(checked.after.score.test, initial=0.0))
@@ -94,3 +105,21 @@ def _candidates(context: SearchContext, found: Discovery, reasons: tuple[str, ..
     for number, law in enumerate(laws_of(hypothesis)):
         if law is not None:
             yield Unconfirmed(hypothesis, 0.0 if gain is None else max(gain.gain, 0.0), "; ".join(reasons), number)
+
+
+def _keep_rounds_of(of: Discovery, fewer: Explanation) -> Discovery:
+    """With an explanation that holds some of the laws, in their order, and the first rounds that found such."""
+    kept = [_structure(law) for law in laws_of(fewer.after.fitted.hypothesis)[-len(fewer.steps) :]]
+    claims = [_structure(law) for law in laws_of(of.found.after.fitted.hypothesis)[-len(of.found.steps) :]]
+    rounds: list[Round] = []
+    for each in of.rounds:
+        size = 1 if each.sums[0].partner is None else 2
+        if kept[:size] == claims[:size]:
+            rounds.append(each)
+            kept = kept[size:]
+        claims = claims[size:]
+    return replace(of, found=fewer, rounds=tuple(rounds))
+
+
+def _structure(law: Law | None) -> tuple[str, str, str] | None:
+    return None if law is None else (law.expression, law.acts_on, law.axis)

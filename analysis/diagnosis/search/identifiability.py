@@ -69,7 +69,7 @@ def keep_identifiable(context: SearchContext, found: Explanation, time_left: Tim
         return replace(found, undetermined=known)
     fewer = without_effect(context, found, worst)
     rounds = tuple(
-        tuple(candidate for candidate in fitted_candidates if candidate.newest != name)
+        tuple(each for each in fitted_candidates if each.newest != name or any(each is step for step in fewer.steps))
         for fitted_candidates in fewer.rounds
     )
     return keep_identifiable(context, replace(fewer, rounds=rounds, undetermined=known), time_left)

@@ -5,13 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.discovery.add_laws import add_laws
+from analysis.diagnosis.discovery.add_laws import add_laws, weigh_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round, discover
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.discovery.proof import choose_on_held_out, holds_elsewhere
+from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.verdict import judge
+from equalizer.effects.discovered_law import law_channels, law_effect, law_values
 from tests.lawful import arena_of, law, recorded
 
 QUIET = (("multisine", 0.2, "fit"), ("multisine", 0.3, "fit"), ("multisine", 0.4, "fit"), ("sweep", 2.0, "test"))
@@ -66,6 +70,31 @@ def test_of_laws_that_fit_alike_the_one_that_the_louder_test_bears_out_is_chosen
     assert turned.sums[0].terms[0].shape != cubic == chosen.rounds[-1].sums[0].terms[0].shape
     assert chosen.found.after.score.test.max() < wrong.score.test.max()
     assert chosen.found.steps[-1] is chosen.found.after
+
+
+def test_a_law_too_weak_to_be_known_takes_no_other_laws_name_away(searched):
+    context, known, found = searched
+    weak = replace(law("p0*x*vx*abs(vx)", 1e-3), units=())
+    effect = law_effect(weak, law_channels(context.measure.records[0].recording))
+    alone = hypothesis_of_claim(Claim(effect, "one", (0,)), [law_values(weak)])
+    after = found.found.after.fitted
+    first, both = (
+        context.candidate(refine(context, evaluate_fit(context.measure, context.tuning, after.deviations, hypothesis)))
+        for hypothesis in (alone, combine(alone, after.hypothesis))
+    )
+    rounds = (
+        Round((first,), (replace(found.rounds[0].sums[0], spread=1.0),), 0.5),
+        replace(found.rounds[0], fitted_candidates=(both,), sums=found.rounds[0].sums[:1]),
+    )
+    whole = replace(
+        found.found,
+        after=context.with_test_score(both),
+        steps=(first, both),
+        rounds=tuple(each.fitted_candidates for each in rounds),
+    )
+    named = weigh_laws(SearchResult(context, known, judge(known)), Discovery(whole, rounds), always)
+    assert named.judgement.named
+    assert [each.variables for each in laws_of(named.found.after.fitted.hypothesis)] == [("x",)]
 
 
 def test_shares_are_of_what_is_no_noise():
