@@ -1,10 +1,11 @@
 """The primary analysis of a study, from its answers to medians, contrasts, spreads and the direction limit."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.psychophysics.group_contrasts import Contrast, contrasts
+from analysis.psychophysics.group_contrasts import Contrast, contrasts, pair_contrast
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit, fit_hierarchy
@@ -60,12 +61,19 @@ class PrimaryAnalysis:
     lapse: float
     goodness: GoodnessOfFit
     converged: bool
+    declared_contrast: Contrast | None = None
+    """Of the protocol's declared pair; None where none is declared, or where it cannot be judged."""
 
 
 def primary_analysis(
-    answers: Answers | None, cap_n: float, family: Family = Family.WEIBULL, confidence: float = CONFIDENCE
+    answers: Answers | None,
+    cap_n: float,
+    family: Family = Family.WEIBULL,
+    confidence: float = CONFIDENCE,
+    declared_hz: Sequence[float] = (),
 ) -> PrimaryAnalysis | None:
-    """None below two persons or two frequencies with answers: there is nothing to compare."""
+    """None below two persons or two frequencies with answers: there is nothing to compare. declared_hz: the two
+    frequencies of the declared contrast, first minus second, or none."""
     if answers is None or answers.persons < 2:
         return None
     played = np.unique(answers.run % len(answers.frequencies_hz))
@@ -96,6 +104,7 @@ def primary_analysis(
         lapse=fit.lapse,
         goodness=goodness_of_fit(fit),
         converged=fit.converged,
+        declared_contrast=pair_contrast(frequencies, pseudo, declared_hz, confidence),
     )
 
 
