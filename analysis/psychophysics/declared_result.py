@@ -7,11 +7,12 @@ from typing import Literal
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
+from analysis.wording import conjoin
 from protocols.definition.declared_analysis import AnalysisSettings
 
 UNSETTLED = "The search ended before it had settled: do not use these numbers."
 TUKEY = "Reversal means in newtons, one-way; Tukey's interval and p, which hold for all pairs together."
-NO_MODEL = "The model needs answers of two participants at every frequency of the protocol."
+NO_MODEL = "The model needs answers of two participants, at two frequencies."
 NO_DIFFERENCE = "It needs two participants, with differences that are not all equal."
 NO_PAIR = "It needs thresholds at both frequencies, and a spread within frequencies."
 
@@ -83,8 +84,7 @@ def declared_result(
 def _by_model(pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, declared: bool) -> ContrastResult:
     contrast = primary.declared_contrast if primary is not None else None
     if primary is None or contrast is None:
-        people = len(primary.persons) if primary is not None else 0
-        reason = NO_MODEL if primary is None else NO_DIFFERENCE
+        people, reason = (0, NO_MODEL) if primary is None else (len(primary.persons), _no_contrast(pair_hz, primary))
         return ContrastResult("hierarchical", declared, "dB", (people, people), None, None, None, None, (reason,))
     return ContrastResult(
         analysis="hierarchical",
@@ -97,6 +97,11 @@ def _by_model(pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, dec
         p=contrast.p,
         notes=(*_cap_notes(pair_hz, primary), *(() if primary.converged else (UNSETTLED,))),
     )
+
+
+def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
+    missing = [f"{frequency_hz:g} Hz" for frequency_hz in pair_hz if frequency_hz in primary.missing_hz]
+    return f"There is no answer at {conjoin(missing)} yet." if missing else NO_DIFFERENCE
 
 
 def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[str, ...]:

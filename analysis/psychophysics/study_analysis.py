@@ -98,9 +98,9 @@ class StudyAnalysis(Summarised):
     difference: str
     """What separates the published one-way analysis from the one within participants, here."""
     primary: PrimaryAnalysis | None
-    """The hierarchical model of all answers. None below two participants with answers at every frequency."""
+    """The hierarchical model of all answers. None below two participants, and below two frequencies with answers."""
     mean_contrasts: tuple[Contrast, ...]
-    """Reversal means in dB against the lowest frequency, within participants."""
+    """Reversal means in dB against the lowest frequency with answers, within participants."""
     declared: str
     """What the protocol declared before the data, in words."""
     declared_result: DeclaredResult
@@ -148,7 +148,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
     detection_table = threshold_table(detection, protocol.detection.frequencies_hz)
     anova, within = one_way_anova(table.groups()), repeated_measures(table.subjects, table.values)
     comparisons, primary = compare_all(anova, CONFIDENCE), _model(tested, protocol)
-    means, cues, gaps = _mean_contrasts(rows, protocol), cue_findings(tested), cue_gaps(tested)
+    means, cues, gaps = _mean_contrasts(rows, primary, protocol), cue_findings(tested), cue_gaps(tested)
     return StudyAnalysis(
         protocol=protocol,
         population=population,
@@ -195,8 +195,12 @@ def _model(trials: Sequence[Trial], protocol: StudyProtocol) -> PrimaryAnalysis 
     return primary_analysis(answers, protocol.staircase.cap_n, declared_hz=protocol.analysis.contrast_hz)
 
 
-def _mean_contrasts(rows: Sequence[Threshold], protocol: StudyProtocol) -> tuple[Contrast, ...]:
-    table = threshold_table(rows, protocol.stimulus.frequencies_hz, "threshold_db")
+def _mean_contrasts(
+    rows: Sequence[Threshold], primary: PrimaryAnalysis | None, protocol: StudyProtocol
+) -> tuple[Contrast, ...]:
+    """At the frequencies of the model where there is one, so that both compare with the same lowest frequency."""
+    frequencies_hz = primary.frequencies_hz if primary is not None else protocol.stimulus.frequencies_hz
+    table = threshold_table(rows, frequencies_hz, "threshold_db")
     if not table.subjects or not table.frequencies_hz:
         return ()
     return contrasts(table.frequencies_hz, np.array(table.values, dtype=np.float64), CONFIDENCE)

@@ -62,26 +62,31 @@ def comparison_text(
     staircase that was played."""
     if primary is None:
         return (
-            "The hierarchical model needs answers of two participants at every frequency of the protocol; these data "
-            "have fewer, so the published analysis stands alone."
+            "The hierarchical model needs answers of two participants, at two frequencies; these data have fewer, so "
+            "the published analysis stands alone."
         )
-    by_frequency = {contrast.frequency_hz: contrast for contrast in means}
-    apart = []
-    for contrast in primary.contrasts:
-        mean = by_frequency.get(contrast.frequency_hz)
-        if mean is not None and abs(contrast.difference_db - mean.difference_db) >= NOTABLE_DB:
-            apart.append(
-                f"at {contrast.frequency_hz:g} Hz {signed_number(contrast.difference_db, 1)} dB against "
-                f"{signed_number(mean.difference_db, 1)} dB"
-            )
-    against = f"{primary.frequencies_hz[0]:g} Hz"
-    size = (
-        f"Differences to {against} by the model and by reversal means are apart: {conjoin(apart)}."
-        if apart
-        else f"Differences to {against} by the model and by reversal means agree within {NOTABLE_DB:g} dB."
-    )
+    missing = [f"{frequency_hz:g} Hz" for frequency_hz in primary.missing_hz]
+    left_out = f"The model leaves {conjoin(missing)} out, where there is no answer yet." if missing else ""
     cut = [NEAR_CAP, NEAR_PUBLISHED_CAP if rule == SIMULATED_RULE else ""] if table.cut else []
-    return " ".join(filter(None, [size, _verdict_text(primary, comparisons), *cut]))
+    return " ".join(filter(None, [left_out, _sizes_text(primary, means), _verdict_text(primary, comparisons), *cut]))
+
+
+def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast]) -> str:
+    """How far differences by the model and by reversal means are apart, as text."""
+    by_frequency = {contrast.frequency_hz: contrast for contrast in means}
+    against = f"{primary.frequencies_hz[0]:g} Hz"
+    pairs = [(contrast, by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]
+    if not any(mean for _, mean in pairs):
+        return f"Reversal means tell no difference to {against} yet that could be held against the model's."
+    apart = [
+        f"at {contrast.frequency_hz:g} Hz {signed_number(contrast.difference_db, 1)} dB against "
+        f"{signed_number(mean.difference_db, 1)} dB"
+        for contrast, mean in pairs
+        if mean is not None and abs(contrast.difference_db - mean.difference_db) >= NOTABLE_DB
+    ]
+    if apart:
+        return f"Differences to {against} by the model and by reversal means are apart: {conjoin(apart)}."
+    return f"Differences to {against} by the model and by reversal means agree within {NOTABLE_DB:g} dB."
 
 
 def _verdict_text(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
