@@ -18,12 +18,14 @@ _MARKER_STEP = 0.12
 """Between the curves' markers, in participants, so that their bars do not hide each other."""
 
 
-def power_picture(points: Sequence[PowerPoint], effect_db: float) -> Picture:
-    """points: one sample size each, at least one. effect_db: true difference of the highest frequency, 0 for none."""
+def power_picture(points: Sequence[PowerPoint], effect_db: float, pair_hz: tuple[float, float]) -> Picture:
+    """points: one sample size each, at least one. effect_db: true difference, 0 for none, of the first frequency of
+    pair_hz from the second."""
     found = "finds the difference" if effect_db else "finds a difference that is not there (type-1 error)"
     return Picture(
         name="power",
-        title=f"Of {points[0].studies} simulated studies of each size, with a difference of {effect_db:g} dB",
+        title=f"Of {points[0].studies} simulated studies of each size, with a difference of {effect_db:g} dB "
+        f"between {pair_hz[0]:g} and {pair_hz[1]:g} Hz",
         caption=f"Above: share of the studies in which each analysis {found}. Below: share in which the primary "
         f"analysis's {100 * CONFIDENCE:g} % interval holds the true difference. Bars: 95 % intervals of the shares.",
         figure=_draw(points, effect_db),

@@ -1,4 +1,4 @@
-"""Contrasts within participants, each frequency against the lowest: difference, equivalence, equality of spread.
+"""Contrasts within participants, each frequency against the lowest or a declared pair: difference, equivalence, spread.
 
 Sources: S. Holm, Scand. J. Stat. 6 (1979), 65-70; D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987), 657-680 (two
 one-sided tests); E. J. G. Pitman, Biometrika 31 (1939), 9-12 and W. A. Morgan, Biometrika 31 (1939), 13-19 (equal
@@ -61,6 +61,20 @@ def contrasts(frequencies_hz: Sequence[float], values_db: FloatArray, confidence
     )
 
 
+def pair_contrast(
+    frequencies_hz: Sequence[float], values_db: FloatArray, pair_hz: Sequence[float], confidence: float
+) -> Contrast | None:
+    """The first frequency of the pair minus the second. values_db: (n, k), NaN for a gap.
+
+    None without a pair, where one of the two was not played, and where `contrasts` leaves it out. A family of its own:
+    Holm's p is the plain one.
+    """
+    if len(pair_hz) != 2 or not set(pair_hz) <= set(frequencies_hz):
+        return None
+    first, second = (list(frequencies_hz).index(frequency_hz) for frequency_hz in pair_hz)
+    return next(iter(contrasts((pair_hz[1], pair_hz[0]), values_db[:, [second, first]], confidence)), None)
+
+
 def holm_correction(p_values: Sequence[float]) -> tuple[float, ...]:
     """Holm's step-down correction for multiple tests, in the order given."""
     corrected, worst = [0.0] * len(p_values), 0.0
@@ -86,7 +100,7 @@ def _compute_contrast(
         p=p,
         p_holm=p_holm,
         effect_size=mean / sd,
-        p_equivalence=equivalence_p(differences) if frequency_hz <= EQUIVALENCE_UP_TO_HZ else None,
+        p_equivalence=equivalence_p(differences) if max(frequency_hz, against_hz) <= EQUIVALENCE_UP_TO_HZ else None,
         p_spread=float(pearsonr(both.sum(axis=1), differences).pvalue) if n > 2 else None,
     )
 

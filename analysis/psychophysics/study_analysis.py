@@ -11,6 +11,7 @@ from analysis.psychophysics.catch_trials import CatchTally, catch_tallies
 from analysis.psychophysics.comparisons import Comparisons, compare_all
 from analysis.psychophysics.cues.cue_findings import CueFinding, cue_findings, cue_warnings
 from analysis.psychophysics.cues.delivered_cues import CueGap, cue_gaps
+from analysis.psychophysics.declared_result import DeclaredResult, declared_result
 from analysis.psychophysics.detection import detection_thresholds
 from analysis.psychophysics.equalized_delivery import deliveries, delivery_warning
 from analysis.psychophysics.group_contrasts import Contrast, contrasts
@@ -97,11 +98,12 @@ class StudyAnalysis(Summarised):
     difference: str
     """What separates the published one-way analysis from the one within participants, here."""
     primary: PrimaryAnalysis | None
-    """The hierarchical model of all answers. None below two participants with answers at every frequency."""
+    """The hierarchical model of all answers. None below two participants, and below two frequencies with answers."""
     mean_contrasts: tuple[Contrast, ...]
-    """Reversal means in dB against the lowest frequency, within participants."""
+    """Reversal means in dB against the lowest frequency with answers, within participants."""
     declared: str
     """What the protocol declared before the data, in words."""
+    declared_result: DeclaredResult
     compared: str
     """Where the published and the primary analysis differ, in words."""
     warnings: tuple[str, ...]
@@ -130,9 +132,10 @@ def _mean_text(values: Sequence[float | None]) -> str:
     return f"mean threshold {sum(known) / len(known):.3g} N of {len(known)}" if known else "no threshold"
 
 
-def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnalysis:
+def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Sequence[str] = ()) -> StudyAnalysis:
     """Thresholds and statistics of trials of one population that followed one protocol.
 
+    left_out: sessions and trials that are not among these, and why, in sentences; shown beside declared exclusions.
     Raises ValueError when the trials mix people, simulated participants and people who felt nothing (split them
     with `split_by_population` first), and InconsistentTrialsError when rows contradict the protocol's staircase.
     """
@@ -144,9 +147,8 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
     detection, catches = detection_thresholds(trials, protocol), catch_tallies(trials)
     detection_table = threshold_table(detection, protocol.detection.frequencies_hz)
     anova, within = one_way_anova(table.groups()), repeated_measures(table.subjects, table.values)
-    comparisons = compare_all(anova, CONFIDENCE)
-    primary = primary_analysis(count_answers(tested, table.frequencies_hz), rule.cap_n)
-    means, cues, gaps = _mean_contrasts(rows, protocol), cue_findings(tested), cue_gaps(tested)
+    comparisons, primary = compare_all(anova, CONFIDENCE), _model(tested, protocol)
+    means, cues, gaps = _mean_contrasts(rows, primary, protocol), cue_findings(tested), cue_gaps(tested)
     return StudyAnalysis(
         protocol=protocol,
         population=population,
@@ -162,6 +164,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
         primary=primary,
         mean_contrasts=means,
         declared=declaration_text(protocol.analysis),
+        declared_result=declared_result(protocol.analysis, primary, comparisons, table, left_out),
         compared=comparison_text(primary, means, comparisons, table, rule),
         warnings=(
             *study_warnings(tested, rows, table, protocol),
@@ -187,8 +190,17 @@ def _single_population(trials: Sequence[Trial]) -> Population | None:
     return next(iter(parts), None)
 
 
-def _mean_contrasts(rows: Sequence[Threshold], protocol: StudyProtocol) -> tuple[Contrast, ...]:
-    table = threshold_table(rows, protocol.stimulus.frequencies_hz, "threshold_db")
+def _model(trials: Sequence[Trial], protocol: StudyProtocol) -> PrimaryAnalysis | None:
+    answers = count_answers(trials, protocol.stimulus.frequencies_hz)
+    return primary_analysis(answers, protocol.staircase.cap_n, declared_hz=protocol.analysis.contrast_hz)
+
+
+def _mean_contrasts(
+    rows: Sequence[Threshold], primary: PrimaryAnalysis | None, protocol: StudyProtocol
+) -> tuple[Contrast, ...]:
+    """At the frequencies of the model where there is one, so that both compare with the same lowest frequency."""
+    frequencies_hz = primary.frequencies_hz if primary is not None else protocol.stimulus.frequencies_hz
+    table = threshold_table(rows, frequencies_hz, "threshold_db")
     if not table.subjects or not table.frequencies_hz:
         return ()
     return contrasts(table.frequencies_hz, np.array(table.values, dtype=np.float64), CONFIDENCE)
@@ -215,11 +227,19 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "primary": asdict(analysis.primary) if analysis.primary else None,
         "mean_contrasts_db": [asdict(contrast) for contrast in analysis.mean_contrasts],
         "declared": asdict(analysis.protocol.analysis),
+        "declared_result": _declared_document(analysis.declared_result),
         "compared": analysis.compared,
         "cues": [asdict(cue) for cue in analysis.cues],
         "cue_gaps": [asdict(gap) for gap in analysis.cue_gaps],
         "warnings": list(analysis.warnings),
     }
+
+
+def _declared_document(result: DeclaredResult) -> dict[str, Any]:
+    """What was left out as a number: its sentences name sessions of people who withdrew."""
+    document = asdict(result)
+    document["left_out_count"] = len(document.pop("left_out"))
+    return document
 
 
 def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:

@@ -14,6 +14,10 @@ NOTABLE_DB = 1.0
 """A difference between the two analyses that is worth a sentence: the small step of the staircase."""
 SIMULATED_RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
 """The published staircase and cap: `NEAR_PUBLISHED_CAP` was simulated with it and holds for no other."""
+NOTHING_DECLARED = (
+    "The protocol declares no primary analysis, contrast, sample size or exclusions; the hierarchical model is put "
+    "first because it needs the fewest excuses near the cap, and a choice made after the data is no declaration."
+)
 NEAR_CAP = (
     'Near the cap the published intervals do not hold what they say, and the published "not significant" says little.'
 )
@@ -26,6 +30,8 @@ NEAR_PUBLISHED_CAP = (
 
 def declaration_text(declared: AnalysisSettings) -> str:
     """What the protocol fixed before the data, and what it did not, as text."""
+    if declared == AnalysisSettings():
+        return NOTHING_DECLARED
     named = {"hierarchical": "the hierarchical model of all answers", "published": "the published one-way analysis"}
     if declared.primary == "undeclared":
         primary = (
@@ -56,26 +62,31 @@ def comparison_text(
     staircase that was played."""
     if primary is None:
         return (
-            "The hierarchical model needs answers of two participants at every frequency of the protocol; these data "
-            "have fewer, so the published analysis stands alone."
+            "The hierarchical model needs answers of two participants, at two frequencies; these data have fewer, so "
+            "the published analysis stands alone."
         )
-    by_frequency = {contrast.frequency_hz: contrast for contrast in means}
-    apart = []
-    for contrast in primary.contrasts:
-        mean = by_frequency.get(contrast.frequency_hz)
-        if mean is not None and abs(contrast.difference_db - mean.difference_db) >= NOTABLE_DB:
-            apart.append(
-                f"at {contrast.frequency_hz:g} Hz {signed_number(contrast.difference_db, 1)} dB against "
-                f"{signed_number(mean.difference_db, 1)} dB"
-            )
-    against = f"{primary.frequencies_hz[0]:g} Hz"
-    size = (
-        f"Differences to {against} by the model and by reversal means are apart: {conjoin(apart)}."
-        if apart
-        else f"Differences to {against} by the model and by reversal means agree within {NOTABLE_DB:g} dB."
-    )
+    missing = [f"{frequency_hz:g} Hz" for frequency_hz in primary.missing_hz]
+    left_out = f"The model leaves {conjoin(missing)} out, where there is no answer yet." if missing else ""
     cut = [NEAR_CAP, NEAR_PUBLISHED_CAP if rule == SIMULATED_RULE else ""] if table.cut else []
-    return " ".join(filter(None, [size, _verdict_text(primary, comparisons), *cut]))
+    return " ".join(filter(None, [left_out, _sizes_text(primary, means), _verdict_text(primary, comparisons), *cut]))
+
+
+def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast]) -> str:
+    """How far differences by the model and by reversal means are apart, as text."""
+    by_frequency = {contrast.frequency_hz: contrast for contrast in means}
+    against = f"{primary.frequencies_hz[0]:g} Hz"
+    pairs = [(contrast, by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]
+    if not any(mean for _, mean in pairs):
+        return f"Reversal means tell no difference to {against} yet that could be held against the model's."
+    apart = [
+        f"at {contrast.frequency_hz:g} Hz {signed_number(contrast.difference_db, 1)} dB against "
+        f"{signed_number(mean.difference_db, 1)} dB"
+        for contrast, mean in pairs
+        if mean is not None and abs(contrast.difference_db - mean.difference_db) >= NOTABLE_DB
+    ]
+    if apart:
+        return f"Differences to {against} by the model and by reversal means are apart: {conjoin(apart)}."
+    return f"Differences to {against} by the model and by reversal means agree within {NOTABLE_DB:g} dB."
 
 
 def _verdict_text(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:

@@ -18,13 +18,13 @@ MEANING = (
 )
 
 
-def primary_section(primary: PrimaryAnalysis | None, words: Sequence[str], means: Sequence[Contrast]) -> Section:
-    """words: what was declared, and where the analyses differ."""
+def primary_section(primary: PrimaryAnalysis | None, compared: str, means: Sequence[Contrast]) -> Section:
+    """compared: where the analyses differ, in words."""
     if primary is None:
-        return Section("All answers in one model", paragraphs=tuple(words))
+        return Section("All answers in one model", paragraphs=(compared,))
     return Section(
         "All answers in one model",
-        paragraphs=(MEANING, *words, _overall(primary), limit_words(primary)),
+        paragraphs=(MEANING, compared, _overall(primary), limit_words(primary)),
         tables=(
             _medians(primary),
             _contrasts("Differences by the model (dB)", primary.contrasts, primary.medians),

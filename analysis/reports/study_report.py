@@ -7,6 +7,7 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.population import Population
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.cue_tables import cue_section
+from analysis.reports.declared_section import declared_section
 from analysis.reports.methods_text import methods_text
 from analysis.reports.page import Page, Section, render_page
 from analysis.reports.primary_tables import primary_section
@@ -50,6 +51,7 @@ def render_study_report(
     """
     by_name = {picture.name: picture for picture in pictures}
     sections = [
+        *_declared(analysis),
         *_models(qualities),
         _warnings(analysis),
         *_results(analysis, by_name),
@@ -91,8 +93,15 @@ def _detection_summary(analysis: StudyAnalysis) -> str:
     return f"No test run; {runs} detection run{'s' if runs != 1 else ''}."
 
 
+def _declared(analysis: StudyAnalysis) -> list[Section]:
+    """First: what was declared before the data is the result, all else is beside it."""
+    if not analysis.protocol.stimulus.frequencies_hz:
+        return []
+    return [declared_section(analysis.declared, analysis.declared_result)]
+
+
 def _models(qualities: Sequence[tuple[str, str]]) -> list[Section]:
-    """First: accelerations are as good as the model that turned them into forces."""
+    """Before all numbers of the device: accelerations are as good as the model that turned them into forces."""
     if not qualities:
         return []
     points = tuple(f"{sessions}: {sentence}" for sessions, sentence in qualities)
@@ -120,8 +129,8 @@ def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Se
         paragraphs=(analysis.difference,),
         tables=(one_way_table(analysis), *pairs, within_table(analysis)),
     )
-    words = (analysis.declared, analysis.compared)
-    return [thresholds, primary_section(analysis.primary, words, analysis.mean_contrasts), comparison]
+    model = primary_section(analysis.primary, analysis.compared, analysis.mean_contrasts)
+    return [thresholds, model, comparison]
 
 
 def _side_sections(analysis: StudyAnalysis) -> list[Section]:

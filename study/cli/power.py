@@ -17,7 +17,17 @@ if TYPE_CHECKING:
     from analysis.psychophysics.power.felt_delivery import FeltDelivery
     from analysis.psychophysics.power.simulated_study import Crowd
     from protocols.definition.study_protocol import StudyProtocol
+    from study.workflows.planning.simulate_power import PowerPlan
 
+EffectOption = Annotated[
+    float,
+    typer.Option(
+        min=-40,
+        max=40,
+        help="True difference of the declared contrast's first frequency from its second (none declared: of the "
+        "highest from the lowest); 0 gives the type-1 error.",
+    ),
+]
 CurveOption = Annotated[
     str, typer.Option(help="Curve of the people: weibull, logistic or gauss; the analysis assumes weibull.")
 ]
@@ -42,10 +52,7 @@ DeliveredOption = Annotated[
 
 def power(
     subjects: Annotated[str, typer.Option(help="Sample sizes: 5:40:5 (from, to, step), or one number.")] = "5:40:5",
-    effect_db: Annotated[
-        float,
-        typer.Option(min=-40, max=40, help="True difference of the highest frequency; 0 gives the type-1 error."),
-    ] = 3.0,
+    effect_db: EffectOption = 3.0,
     threshold_n: Annotated[float, typer.Option(min=0.01, max=100, help="Median threshold at the others, in N.")] = 0.7,
     studies: Annotated[int, typer.Option(min=10, max=100_000, help="Simulated studies of each size.")] = 200,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
@@ -70,7 +77,7 @@ def power(
     crowd = _with_habits(_crowd(chosen, threshold_n, effect_db), people, curve, lapse, chosen.trial.repeats_per_run)
     crowd = replace(crowd, delivery=_delivery(delivered, crowd.frequencies_hz))
     sizes = sample_sizes(subjects)
-    plan = PowerPlan(crowd, chosen.staircase, sizes, studies, seed)
+    plan = PowerPlan(crowd, chosen.staircase, sizes, studies, seed, chosen.analysis.contrast_hz)
     title = f"{studies} studies of each of {len(sizes)} sizes"
     executor = worker_processes(workers) if scheduler is None else cluster_workers(scheduler)
     with executor as pool, bar(title, total=studies * len(sizes)) as advance:
@@ -78,11 +85,12 @@ def power(
     if as_json:
         typer.echo(json.dumps([asdict(point) for point in points], indent=2))
         return
-    typer.echo("\n".join((*power_lines(points), "", f"Figure: {out / 'figures' / 'power.png'}")))
+    typer.echo("\n".join((*power_lines(points), "", _judged_words(plan), f"Figure: {out / 'figures' / 'power.png'}")))
 
 
 def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":
-    """People whose median threshold is the same at all frequencies but the highest."""
+    """People whose median threshold is the same at all frequencies but the first of the pair that is compared."""
+    from analysis.psychophysics.power.power_curve import judged_pair
     from analysis.psychophysics.power.simulated_study import Crowd
 
     frequencies_hz = tuple(sorted(protocol.stimulus.frequencies_hz))
@@ -93,7 +101,16 @@ def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "
             "Choose a protocol with two or more in stimulus.frequencies_hz.",
         )
     raised_n = threshold_n * 10.0 ** (effect_db / 20.0)
-    return Crowd(frequencies_hz, (*[threshold_n] * (len(frequencies_hz) - 1), raised_n))
+    raised_hz, _ = judged_pair(frequencies_hz, protocol.analysis.contrast_hz)
+    return Crowd(frequencies_hz, tuple(raised_n if f == raised_hz else threshold_n for f in frequencies_hz))
+
+
+def _judged_words(plan: "PowerPlan") -> str:
+    first_hz, second_hz = plan.pair_hz
+    which = (
+        "the declared contrast" if plan.contrast_hz else "the highest frequency and the lowest; no contrast is declared"
+    )
+    return f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {which}."
 
 
 def _delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":

@@ -1,10 +1,11 @@
 """The primary analysis of a study, from its answers to medians, contrasts, spreads and the direction limit."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.psychophysics.group_contrasts import Contrast, contrasts
+from analysis.psychophysics.group_contrasts import Contrast, contrasts, pair_contrast
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit, fit_hierarchy
@@ -41,6 +42,7 @@ class PrimaryAnalysis:
     family: Family
     trials: int
     frequencies_hz: tuple[float, ...]
+    """Those with answers, in ascending order."""
     confidence: float
     medians: tuple[MedianThreshold, ...]
     overall: RepeatedMeasures
@@ -60,16 +62,25 @@ class PrimaryAnalysis:
     lapse: float
     goodness: GoodnessOfFit
     converged: bool
+    missing_hz: tuple[float, ...] = ()
+    """Of the protocol, without any answer: the model leaves them out."""
+    declared_contrast: Contrast | None = None
+    """Of the protocol's declared pair; None where none is declared, or where it cannot be judged."""
 
 
 def primary_analysis(
-    answers: Answers | None, cap_n: float, family: Family = Family.WEIBULL, confidence: float = CONFIDENCE
+    answers: Answers | None,
+    cap_n: float,
+    family: Family = Family.WEIBULL,
+    confidence: float = CONFIDENCE,
+    declared_hz: Sequence[float] = (),
 ) -> PrimaryAnalysis | None:
-    """None below two persons or two frequencies with answers: there is nothing to compare."""
+    """None below two persons or two frequencies with answers: there is nothing to compare. declared_hz: the two
+    frequencies of the declared contrast, first minus second, or none."""
     if answers is None or answers.persons < 2:
         return None
-    played = np.unique(answers.run % len(answers.frequencies_hz))
-    if len(played) < 2 or len(played) < len(answers.frequencies_hz):
+    asked_hz, answers = answers.frequencies_hz, _at_played_frequencies(answers)
+    if len(answers.frequencies_hz) < 2:
         return None
     fit = fit_hierarchy(answers, family)
     pseudo, cap_db, frequencies = pseudo_thresholds(fit), to_db(cap_n), answers.frequencies_hz
@@ -96,7 +107,17 @@ def primary_analysis(
         lapse=fit.lapse,
         goodness=goodness_of_fit(fit),
         converged=fit.converged,
+        missing_hz=tuple(frequency_hz for frequency_hz in asked_hz if frequency_hz not in frequencies),
+        declared_contrast=pair_contrast(frequencies, pseudo, declared_hz, confidence),
     )
+
+
+def _at_played_frequencies(answers: Answers) -> Answers:
+    """The same answers without the frequencies that have none: a mean without data would have no estimate."""
+    k = len(answers.frequencies_hz)
+    played, place = np.unique(answers.run % k, return_inverse=True)
+    frequencies_hz = tuple(answers.frequencies_hz[index] for index in played)
+    return replace(answers, frequencies_hz=frequencies_hz, run=answers.run // k * len(played) + place)
 
 
 def _persons(fit: HierarchicalFit, cap_db: float) -> tuple[PersonEstimate, ...]:

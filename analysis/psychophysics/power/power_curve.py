@@ -10,11 +10,10 @@ from scipy.stats import studentized_range
 
 from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.catch_trials import wilson_interval
-from analysis.psychophysics.group_contrasts import Contrast, contrasts
+from analysis.psychophysics.group_contrasts import pair_contrast
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.inference import pseudo_thresholds
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
-from equalizer.signals.signal import FloatArray
 from protocols.definition.staircase_rule import StaircaseRule
 
 CONFIDENCE = 0.95
@@ -22,7 +21,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class StudyVerdict:
-    """One simulated study: the highest frequency against the lowest, at the 5 % level."""
+    """One simulated study: one pair of frequencies, at the 5 % level."""
 
     people: int
     trials: int
@@ -62,15 +61,22 @@ class PowerPoint:
     means_bias_db: float
 
 
-def judge_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...]) -> StudyVerdict:
-    """Two people at least; thresholds of all people must be complete, so the rule must have no trial limit."""
+def judge_study(
+    crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...], contrast_hz: tuple[float, ...] = ()
+) -> StudyVerdict:
+    """Two people at least; thresholds of all people must be complete, so the rule must have no trial limit.
+    contrast_hz: as of `judged_pair`."""
     study = simulate_study(crowd, rule, people, seed)
-    true_db = true_difference_db(crowd)
+    pair_hz = judged_pair(crowd.frequencies_hz, contrast_hz)
+    first, second = (crowd.frequencies_hz.index(frequency_hz) for frequency_hz in pair_hz)
+    true_db = true_difference_db(crowd, contrast_hz)
     pseudo = pseudo_thresholds(fit_hierarchy(study.answers))
-    primary, means = (_highest_contrast(crowd.frequencies_hz, values) for values in (pseudo, study.threshold_db))
+    primary, means = (
+        pair_contrast(crowd.frequencies_hz, values, pair_hz, CONFIDENCE) for values in (pseudo, study.threshold_db)
+    )
     names = [f"{frequency:g} Hz" for frequency in crowd.frequencies_hz]
     anova = one_way_anova({name: list(column) for name, column in zip(names, study.threshold_n.T, strict=True)})
-    difference_n = abs(float(study.threshold_n[:, -1].mean() - study.threshold_n[:, 0].mean()))
+    difference_n = abs(float((study.threshold_n[:, first] - study.threshold_n[:, second]).mean()))
     margin_n = _critical_range(len(names), anova.df_within or 1) * math.sqrt(
         (anova.mean_square_within or math.inf) / people
     )
@@ -79,26 +85,24 @@ def judge_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int,
         trials=study.trials,
         primary_found=primary is not None and primary.p < 1.0 - CONFIDENCE,
         primary_covers=primary is not None and primary.lower_db <= true_db <= primary.upper_db,
-        primary_error_db=_mean_difference(pseudo) - true_db,
+        primary_error_db=float((pseudo[:, first] - pseudo[:, second]).mean()) - true_db,
         means_found=means is not None and means.p < 1.0 - CONFIDENCE,
-        means_error_db=_mean_difference(study.threshold_db) - true_db,
+        means_error_db=float((study.threshold_db[:, first] - study.threshold_db[:, second]).mean()) - true_db,
         published_found=difference_n > margin_n,
     )
 
 
-def true_difference_db(crowd: Crowd) -> float:
-    """Median threshold at the highest frequency over that at the lowest."""
-    return 20.0 * float(np.log10(crowd.medians_n[-1] / crowd.medians_n[0]))
+def judged_pair(frequencies_hz: tuple[float, ...], contrast_hz: tuple[float, ...]) -> tuple[float, float]:
+    """First minus second: the declared contrast, or without one the highest frequency minus the lowest.
+    frequencies_hz: in ascending order."""
+    return (contrast_hz[0], contrast_hz[1]) if contrast_hz else (frequencies_hz[-1], frequencies_hz[0])
 
 
-def _highest_contrast(frequencies_hz: Sequence[float], values_db: FloatArray) -> Contrast | None:
-    """The highest frequency against the lowest; None where it cannot be judged."""
-    found = contrasts(frequencies_hz, values_db, CONFIDENCE)
-    return next((contrast for contrast in found if contrast.frequency_hz == frequencies_hz[-1]), None)
-
-
-def _mean_difference(values_db: FloatArray) -> float:
-    return float((values_db[:, -1] - values_db[:, 0]).mean())
+def true_difference_db(crowd: Crowd, contrast_hz: tuple[float, ...] = ()) -> float:
+    """Median threshold at the first frequency of `judged_pair` over that at the second."""
+    medians_n = dict(zip(crowd.frequencies_hz, crowd.medians_n, strict=True))
+    first_hz, second_hz = judged_pair(crowd.frequencies_hz, contrast_hz)
+    return 20.0 * float(np.log10(medians_n[first_hz] / medians_n[second_hz]))
 
 
 @cache

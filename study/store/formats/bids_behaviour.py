@@ -23,6 +23,8 @@ TASK = (
     "Each trial plays a sinusoidal force at the hand, in one of two orthogonal directions; the participant answers "
     "which."
 )
+FACTS_NAME = "facts.json"
+"""As in the tidy form, here below `code`."""
 QUESTION = "In which of the two directions did the force act? Answer 1 or 2."
 README = """# {name}
 
@@ -30,23 +32,26 @@ README = """# {name}
 
 Trials of a study of force directions, exported by hapteq: per participant and session one table below
 `sub-*/ses-*/beh`, a row for each presentation. `task-*_beh.json` says what each column means and its unit;
-`code/protocol.toml` is the protocol with every number of the study, in the form that `hapteq study --protocol` takes.
+`code/protocol.toml` is the protocol with every number of the study, in the form that `hapteq study --protocol` takes;
+`code/{facts_name}` has its hash, the seed of each session, the devices and the versions of the programs.
 """
 
 
 def write_bids(
     folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
 ) -> tuple[Path, ...]:
-    """Write the dataset. folder: existing and empty. Raises CannotWriteError."""
-    task = _label(name)
+    """Write the dataset. folder: existing and empty. facts: JSON values on where the data come from. Raises
+    CannotWriteError."""
+    task, readme = _label(name), README.format(name=name, title=_title(protocol_text), facts_name=FACTS_NAME)
     written = [
         _json(folder / "dataset_description.json", {
             "Name": name, "BIDSVersion": VERSION, "DatasetType": "raw",
             "GeneratedBy": [{"Name": "hapteq", "Version": str(facts.get("versions", {}).get("hapteq", ""))}],
         }),
-        _text(folder / "README.md", README.format(name=name, title=_title(protocol_text))),
+        _text(folder / "README.md", readme),
         _text(folder / "CHANGES", "1.0.0\n  - As exported by hapteq.\n"),
         _text(folder / "code" / "protocol.toml", protocol_text),
+        _json(folder / "code" / FACTS_NAME, facts),
         _json(folder / f"task-{task}_beh.json", {
             "TaskName": task,
             "TaskDescription": " ".join(part for part in (TASK, _target(protocol_text), _title(protocol_text)) if part),

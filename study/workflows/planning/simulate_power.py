@@ -12,6 +12,7 @@ from analysis.psychophysics.power.power_curve import (
     Share,
     StudyVerdict,
     judge_study,
+    judged_pair,
     power_point,
     true_difference_db,
 )
@@ -41,6 +42,13 @@ class PowerPlan:
     studies: int
     """Of each size."""
     seed: int
+    contrast_hz: tuple[float, ...] = ()
+    """The declared contrast, first frequency minus second; empty: the highest frequency minus the lowest."""
+
+    @property
+    def pair_hz(self) -> tuple[float, float]:
+        """The two frequencies that are compared."""
+        return judged_pair(self.crowd.frequencies_hz, self.contrast_hz)
 
 
 Piece = tuple[int, int]
@@ -73,9 +81,10 @@ def simulate_power(
         on_finished(finished)
     # In the order of the plan, not of finishing: sums of the same numbers are then the same to the bit.
     points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
-    payload = {"plan": _plan_facts(plan), "points": [asdict(point) for point in points]}
+    payload = {"plan": _plan_facts(plan), "judged_hz": plan.pair_hz, "points": [asdict(point) for point in points]}
+    effect_db = true_difference_db(plan.crowd, plan.contrast_hz)
     write_json(out / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
-    write_pictures(out / "figures", (power_picture(points, true_difference_db(plan.crowd)),))
+    write_pictures(out / "figures", (power_picture(points, effect_db, plan.pair_hz),))
     return points
 
 
@@ -83,7 +92,10 @@ def judge_piece(plan: PowerPlan, piece: Piece) -> list[StudyVerdict]:
     """Runs in a worker process."""
     people, first = piece
     last = min(first + CHUNK, plan.studies)
-    return [judge_study(plan.crowd, plan.rule, people, (plan.seed, people, number)) for number in range(first, last)]
+    return [
+        judge_study(plan.crowd, plan.rule, people, (plan.seed, people, number), plan.contrast_hz)
+        for number in range(first, last)
+    ]
 
 
 def _plan_facts(plan: PowerPlan) -> dict[str, object]:
@@ -95,7 +107,10 @@ def _plan_facts(plan: PowerPlan) -> dict[str, object]:
     for habit in HABITS_SINCE:
         if not crowd[habit]:
             del crowd[habit]
-    return {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
+    facts = {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
+    # Left out where it is the usual pair, so that a folder that was begun before there was a choice goes on.
+    usual = plan.pair_hz == judged_pair(plan.crowd.frequencies_hz, ())
+    return facts if usual else {**facts, "contrast_hz": list(plan.pair_hz)}
 
 
 def _read_finished(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict]]:
@@ -116,7 +131,7 @@ def _read_finished(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict
     if not rows or rows[0].get("plan") != _plan_facts(plan):
         raise StudyError(
             "This folder holds another power simulation",
-            f"{path} was begun with other people, another rule, seed or number of studies.",
+            f"{path} was begun with other people, another rule, contrast, seed or number of studies.",
             "Choose another folder with --out, or the same options to go on.",
             saved="Nothing was changed.",
         )

@@ -10,6 +10,7 @@ from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
+from analysis.reports.declared_section import declared_words
 from analysis.reports.primary_tables import interval_words, limit_words
 from analysis.reports.study_report import render_study_report
 from equalizer.signals.recording import Recording
@@ -41,7 +42,7 @@ def analyze_data(
     """
     collected = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
-        analysis = analyse_study(collected.trials, collected.protocol)
+        analysis = analyse_study(collected.trials, collected.protocol, collected.left_out)
     except ValueError as problem:
         raise StudyError(
             "The data contradict their protocol", f"{problem}.", "Nothing was written; look at the sessions named."
@@ -69,7 +70,8 @@ def text_table(analysis: StudyAnalysis) -> list[str]:
     """Thresholds as lines: one per frequency, with mean and number of participants."""
     lines = ["No complete test run: there is no threshold yet."]
     if any(row.complete for row in analysis.thresholds):
-        lines = [*_lines(analysis.table, "threshold"), *_primary_lines(analysis)]
+        declared = declared_words(analysis.declared_result)
+        lines = [*_lines(analysis.table, "threshold"), *_primary_lines(analysis), *declared]
     if any(row.complete for row in analysis.detection):
         lines += _lines(analysis.detection_table, "felt from")
     return lines

@@ -13,7 +13,7 @@ def point(people: int) -> PowerPoint:
 
 
 def test_each_analysis_has_a_curve_with_the_interval_of_its_shares():
-    above, below = power_picture([point(10), point(30)], 3.0).figure.axes
+    above, below = power_picture([point(10), point(30)], 3.0, (45.0, 5.0)).figure.axes
     model, means, published = above.containers
     np.testing.assert_allclose(model.lines[0].get_ydata(), [20, 60])
     np.testing.assert_allclose(means.lines[0].get_ydata(), [30, 30])
@@ -25,10 +25,14 @@ def test_each_analysis_has_a_curve_with_the_interval_of_its_shares():
 
 @pytest.mark.parametrize(("effect_db", "level"), [(3.0, 80.0), (0.0, 5.0)])
 def test_the_line_is_the_power_asked_for_or_without_an_effect_the_level_of_the_test(effect_db, level):
-    above, _ = power_picture([point(10)], effect_db).figure.axes
+    above, _ = power_picture([point(10)], effect_db, (45.0, 5.0)).figure.axes
     assert any(np.allclose(line.get_ydata(), [level, level]) for line in above.lines)
 
 
 def test_the_caption_says_that_without_an_effect_each_find_is_an_error():
-    assert "type-1 error" in power_picture([point(10)], 0.0).caption
-    assert "finds the difference" in power_picture([point(10)], 3.0).caption
+    assert "type-1 error" in power_picture([point(10)], 0.0, (45.0, 5.0)).caption
+    assert "finds the difference" in power_picture([point(10)], 3.0, (45.0, 5.0)).caption
+
+
+def test_the_title_says_which_frequencies_are_compared():
+    assert "3 dB between 45 and 35 Hz" in power_picture([point(10)], 3.0, (45.0, 35.0)).title

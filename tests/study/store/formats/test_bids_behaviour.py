@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from protocols.document.hashing import protocol_hash
+from protocols.document.loading import load_protocol
+from study.cli.main import main
 from study.store.formats.bids_behaviour import write_bids
 
 PUBLISHED = (Path(__file__).parents[4] / "protocols" / "direction_threshold.toml").read_text("utf-8")
@@ -19,3 +22,20 @@ def test_the_target_of_the_staircase_is_that_of_its_rule(tmp_path, up, down, tar
     write_bids(tmp_path, "study", (), text, {})
     said = json.loads((tmp_path / "task-study_beh.json").read_text("utf-8"))["TaskDescription"]
     assert f"level at which {target} of the answers" in said if target else "%" not in said
+
+
+def test_seeds_hash_and_device_are_exported(tmp_path, small_text):
+    (tmp_path / "small.toml").write_text(small_text)
+    data, out = tmp_path / "data", tmp_path / "bids"
+    assert main(["study", "--protocol", str(tmp_path / "small.toml"), "--observer", "ideal", "--seed", "7",
+                 "--subject", "P01", "--data", str(data)]) == 0  # fmt: skip
+    assert main(["export", str(data), "--format", "bids", "--out", str(out)]) == 0
+    facts = json.loads((out / "code" / "facts.json").read_text("utf-8"))
+    exported = load_protocol((out / "code" / "protocol.toml").read_text("utf-8"), "protocol.toml")
+    assert facts["protocol_hash"] == protocol_hash(exported)
+    assert list(facts["seeds"].values()) == [7]
+    (session,) = facts["seeds"]
+    assert (data / session).is_dir()
+    opened = json.loads((data / session / "events.jsonl").read_text("utf-8").splitlines()[0])
+    assert facts["devices"] == [opened["device"]["name"]]
+    assert "`code/facts.json`" in (out / "README.md").read_text("utf-8")

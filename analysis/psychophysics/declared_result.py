@@ -1,0 +1,133 @@
+"""The result that the protocol declared before the data: its contrast by either analysis, its sample and exclusions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from analysis.psychophysics.comparisons import Comparisons
+from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
+from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
+from analysis.wording import conjoin
+from protocols.definition.declared_analysis import AnalysisSettings
+
+UNSETTLED = "The search ended before it had settled: do not use these numbers."
+TUKEY = "Reversal means in newtons, one-way; Tukey's interval and p, which hold for all pairs together."
+NO_MODEL = "The model needs answers of two participants, at two frequencies."
+NO_DIFFERENCE = "It needs two participants, with differences that are not all equal."
+NO_PAIR = "It needs thresholds at both frequencies, and a spread within frequencies."
+
+
+@dataclass(frozen=True, slots=True)
+class ContrastResult:
+    """The declared contrast by one of the analyses: threshold at the first frequency minus that at the second."""
+
+    analysis: Literal["hierarchical", "published"]
+    declared: bool
+    """Whether this is the declared primary analysis."""
+    unit: Literal["dB", "N"]
+    participants: tuple[int, int]
+    """At the first and at the second frequency."""
+    difference: float | None
+    """In `unit`, as the interval. None, as these and p, where the data do not tell it: `notes` says why."""
+    lower: float | None
+    upper: float | None
+    p: float | None
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DeclaredResult:
+    primary: Literal["undeclared", "hierarchical", "published"]
+    contrast_hz: tuple[float, ...]
+    """Of two frequencies; empty where none is declared."""
+    confidence: float
+    results: tuple[ContrastResult, ...]
+    """The declared analysis first, then the other; none without a declared contrast."""
+    participants_declared: int
+    """0: none declared."""
+    participants_analysed: int
+    """With a test run that entered."""
+    exclusions: tuple[str, ...]
+    """As declared."""
+    left_out: tuple[str, ...]
+    """What did not enter, and why, in sentences."""
+
+
+def declared_result(
+    declared: AnalysisSettings,
+    primary: PrimaryAnalysis | None,
+    comparisons: Comparisons,
+    table: ThresholdTable,
+    left_out: Sequence[str],
+) -> DeclaredResult:
+    """primary: with the contrast of `declared`. table: reversal means in newtons, from which `comparisons` come."""
+    results = []
+    if declared.contrast_hz:
+        pair_hz = (declared.contrast_hz[0], declared.contrast_hz[1])
+        results = [
+            _by_model(pair_hz, primary, declared.primary == "hierarchical"),
+            _as_published(pair_hz, comparisons, table, declared.primary == "published"),
+        ]
+        results.sort(key=lambda result: not result.declared)
+    return DeclaredResult(
+        primary=declared.primary,
+        contrast_hz=declared.contrast_hz,
+        confidence=comparisons.confidence,
+        results=tuple(results),
+        participants_declared=declared.participants,
+        participants_analysed=len(table.subjects),
+        exclusions=declared.exclusions,
+        left_out=tuple(left_out),
+    )
+
+
+def _by_model(pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, declared: bool) -> ContrastResult:
+    contrast = primary.declared_contrast if primary is not None else None
+    if primary is None or contrast is None:
+        people, reason = (0, NO_MODEL) if primary is None else (len(primary.persons), _no_contrast(pair_hz, primary))
+        return ContrastResult("hierarchical", declared, "dB", (people, people), None, None, None, None, (reason,))
+    return ContrastResult(
+        analysis="hierarchical",
+        declared=declared,
+        unit="dB",
+        participants=(contrast.participants, contrast.participants),
+        difference=contrast.difference_db,
+        lower=contrast.lower_db,
+        upper=contrast.upper_db,
+        p=contrast.p,
+        notes=(*_cap_notes(pair_hz, primary), *(() if primary.converged else (UNSETTLED,))),
+    )
+
+
+def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
+    missing = [f"{frequency_hz:g} Hz" for frequency_hz in pair_hz if frequency_hz in primary.missing_hz]
+    return f"There is no answer at {conjoin(missing)} yet." if missing else NO_DIFFERENCE
+
+
+def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[str, ...]:
+    """What a median above the cap leaves of the interval."""
+    above = [median.frequency_hz for median in primary.medians if median.above_cap and median.frequency_hz in pair_hz]
+    if len(above) == 2:
+        return ("Both medians are above the cap: the size of their difference is not known.",)
+    known = {pair_hz[0]: "lower", pair_hz[1]: "upper"}
+    return tuple(
+        f"The median at {frequency_hz:g} Hz is above the cap: the interval holds at its {known[frequency_hz]} end."
+        for frequency_hz in above
+    )
+
+
+def _as_published(
+    pair_hz: tuple[float, float], comparisons: Comparisons, table: ThresholdTable, declared: bool
+) -> ContrastResult:
+    first, second = (frequency_name(frequency_hz) for frequency_hz in pair_hz)
+    groups = table.groups()
+    sizes = [sum(value is not None for value in groups.get(name, ())) for name in (first, second)]
+    people = (sizes[0], sizes[1])
+    notes = (TUKEY, *filter(None, [table.coverage]))
+    pair = next((pair for pair in comparisons.pairs if {pair.first, pair.second} == {first, second}), None)
+    if pair is None:
+        return ContrastResult("published", declared, "N", people, None, None, None, None, (NO_PAIR,))
+    # A pair is stored as its second group minus its first.
+    ends = (pair.lower, pair.upper) if pair.second == first else (-pair.upper, -pair.lower)
+    difference = pair.difference if pair.second == first else -pair.difference
+    return ContrastResult("published", declared, "N", people, difference, *ends, pair.p, notes)

@@ -1,0 +1,88 @@
+"""The first section of a study report: the declared result, and what was declared beside what was analysed."""
+
+from analysis.psychophysics.declared_result import ContrastResult, DeclaredResult
+from analysis.reports.page import Section, Table
+from analysis.wording import NONE, p_text, p_value, signed_number
+from protocols.definition.declared_analysis import AnalysisSettings
+
+NAMES = {"hierarchical": "hierarchical model of all answers", "published": "published one-way analysis"}
+
+
+def declared_section(declaration: str, result: DeclaredResult) -> Section:
+    """declaration: what was declared and what was not, in words. Where nothing was, the section is this alone."""
+    heading = "The declared result"
+    if not _anything_declared(result):
+        return Section(heading, paragraphs=(declaration,))
+    tables = (_contrast_table(result),) if result.results else ()
+    words = [_sentence(row, result) for row in result.results if row.declared]
+    return Section(heading, paragraphs=(declaration, *words), tables=(*tables, _sample_table(result)))
+
+
+def declared_words(result: DeclaredResult) -> tuple[str, ...]:
+    """The declared contrast, in a sentence for each analysis, the declared one first; empty without a contrast."""
+    return tuple(_sentence(row, result) for row in result.results)
+
+
+def _anything_declared(result: DeclaredResult) -> bool:
+    declared = AnalysisSettings(result.primary, result.contrast_hz, result.participants_declared, result.exclusions)
+    return declared != AnalysisSettings()
+
+
+def _sentence(row: ContrastResult, result: DeclaredResult) -> str:
+    first, second = result.contrast_hz
+    role = ", the declared analysis" if row.declared else ""
+    opening = f"Declared contrast, {first:g} Hz minus {second:g} Hz, by the {NAMES[row.analysis]}{role}:"
+    if row.difference is None:
+        return f"{opening} not known. {' '.join(row.notes)}"
+    digits, percent = _digits(row), f"{100 * result.confidence:g} %"
+    return (
+        f"{opening} {signed_number(row.difference, digits)} {row.unit} "
+        f"({percent} interval {_interval(row)} {row.unit}, {p_text(row.p)}). {' '.join(row.notes)}"
+    ).strip()
+
+
+def _contrast_table(result: DeclaredResult) -> Table:
+    first, second = result.contrast_hz
+    rows = []
+    for row in result.results:
+        role = " (declared)" if row.declared else ""
+        n, m = row.participants
+        size = NONE if row.difference is None else f"{signed_number(row.difference, _digits(row))} {row.unit}"
+        interval = NONE if row.difference is None else f"{_interval(row)} {row.unit}"
+        people = str(n) if n == m else f"{n} and {m}"
+        rows.append((f"{NAMES[row.analysis]}{role}", people, size, interval, p_value(row.p)))
+    notes = tuple(f"{NAMES[row.analysis].capitalize()}: {note}" for row in result.results for note in row.notes)
+    return Table(
+        caption=f"Declared contrast: threshold at {first:g} Hz minus that at {second:g} Hz",
+        header=("Analysis", "Participants", "Difference", f"{100 * result.confidence:g} % interval", "p"),
+        rows=tuple(rows),
+        notes=notes if any(row.declared for row in result.results) else (*notes, "Which analysis decides: undeclared."),
+    )
+
+
+def _sample_table(result: DeclaredResult) -> Table:
+    return Table(
+        caption="Participants and exclusions",
+        header=("", "Declared", "In this analysis"),
+        rows=(
+            (
+                "Participants",
+                str(result.participants_declared) if result.participants_declared else "none declared",
+                str(result.participants_analysed),
+            ),
+            (
+                "Left out",
+                " ".join(result.exclusions) or "none declared",
+                " ".join(result.left_out) or "nothing was left out",
+            ),
+        ),
+    )
+
+
+def _interval(row: ContrastResult) -> str:
+    ends = [NONE if end is None else signed_number(end, _digits(row)) for end in (row.lower, row.upper)]
+    return " to ".join(ends)
+
+
+def _digits(row: ContrastResult) -> int:
+    return 1 if row.unit == "dB" else 2
