@@ -83,7 +83,7 @@ def doctor(
     if examination.exit_code:
         raise typer.Exit(examination.exit_code)
     if daily:
-        _check_today(device, as_json)
+        _check_today(device, examination, as_json)
 
 
 def _prepare(device: str, calibrate: bool, daily: bool) -> None:
@@ -103,11 +103,13 @@ def _accept(device: str, examination: "Examination", operator: str) -> None:
     typer.echo(said, err=True)
 
 
-def _check_today(device: str, as_json: bool) -> None:
+def _check_today(device: str, examination: "Examination", as_json: bool) -> None:
     """What changed since the acceptance, after the rest was found fine. With --json, only the file, on stderr."""
     from study.errors import ExitCode
     from study.workflows.checks.daily_check import check_today
+    from study.workflows.checks.examine_setup import require_sensor
 
+    require_sensor(examination)
     with _moving() as moving:
         checked = check_today(device, moving)
     if not as_json:

@@ -44,6 +44,11 @@ class Examination:
         return (*self.installation, *self.device.findings, *timing)
 
     @property
+    def sensed(self) -> bool:
+        """Whether nothing was found against the accelerometer."""
+        return all(finding.fine for finding in self.findings if finding.name in NOT_NEEDED)
+
+    @property
     def exit_code(self) -> ExitCode:
         """By the worst finding: DEVICE if device or timing is wrong, beside any other finding. Warnings are ignored."""
         timing = self.timing.findings if self.timing is not None else ()
@@ -68,12 +73,14 @@ def _examine_device(
     clock, settings = RealClock(), _settings(name, timing_s)
     driver = examine_device(name)
     report = DeviceReport(name, simulated=False, findings=driver)
-    if any(finding.wrong for finding in driver):
+    if any(finding.wrong and finding.name not in NOT_NEEDED for finding in driver):
         return report, None
+    sensed = all(finding.fine for finding in driver if finding.name in NOT_NEEDED)
+    settings = replace(settings, with_sensor=sensed)
     try:
         with contextlib.closing(open_device(name, settings, clock, seed=1)) as device:
             total_cap_n, safety = settings.limits.total_cap_n, read_study_protocol(PROTOCOL).protocol.safety
-            report = check_device(device, clock, settings.place_m, total_cap_n, safety)
+            report = check_device(device, clock, settings.place_m, total_cap_n, safety, sensed)
             report = replace(report, findings=(*driver, *report.findings))
             timing = _time(device, clock, timing_s, on_progress) if timing_s > 0 else None
             return report, timing
@@ -104,6 +111,17 @@ def _settings(name: str, timing_s: float) -> DeviceSettings:
     return replace(still, hand_on_handle=False) if needs_real_time(name) else still
 
 
+def require_sensor(examination: Examination) -> None:
+    """Raises DeviceError where a daily check would record no acceleration."""
+    if not examination.sensed:
+        raise DeviceError(
+            "The daily check did not begin",
+            "It compares accelerations, and the accelerometer is not fine (its line above).",
+            "Do what that line says, then check again.",
+            saved="Nothing moved.",
+        )
+
+
 def accept(name: str, examination: Examination, operator: str, moving: Moving) -> str:
     """Record the baseline of the daily checks and sign that the device may be held, after an examination with timing.
     Without an accelerometer there is no baseline. Raises DeviceError, WrongUseError."""
@@ -114,8 +132,9 @@ def accept(name: str, examination: Examination, operator: str, moving: Moving) -
     if timing is None or hinders:
         found = ", ".join(finding.name for finding in hinders) or "the timing was not measured"
         raise DeviceError("The device was not accepted", f"Not fine: {found}.", "Mend that first, as said above.")
-    sensed = all(finding.fine for finding in examination.findings if finding.name in NOT_NEEDED)
+    sensed = examination.sensed
     baseline = record_baseline(name, moving) if sensed else ("", "")
     moving.announce(proof_notice(name, proof_force_n()))
-    said = accept_device(name, _settings(name, 0.0), RealClock(), operator, baseline)
+    settings = replace(_settings(name, 0.0), with_sensor=sensed)
+    said = accept_device(name, settings, RealClock(), operator, baseline)
     return said if sensed else f"{said}. Without an accelerometer no daily check will be possible."
