@@ -251,7 +251,7 @@ def test_without_a_sensor_no_daily_check_begins(run, monkeypatch, tmp_path):
     setup = Examination((), DeviceReport("omega3", False, (lacks,)), None)
     monkeypatch.setattr(examine_setup, "examine_setup", lambda *_, on_progress: setup)
     monkeypatch.setattr(daily_check, "check_today", lambda *_: pytest.fail("it moved"))
-    assert run("--device", "omega3", "--data", tmp_path, "--daily")[0] == 3
+    assert run("--device", "omega3", "--data", tmp_path, "--daily", "--hands-off")[0] == 3
 
 
 @pytest.mark.parametrize(("fine", "code"), [(True, ExitCode.DONE), (False, ExitCode.DEVICE)])
@@ -261,4 +261,4 @@ def test_a_daily_check_that_told_nothing_is_no_success(run, monkeypatch, tmp_pat
     monkeypatch.setattr(daily_check, "check_today", lambda *_: checked)
     setup = Examination((), DeviceReport("omega3", False, ()), None)
     monkeypatch.setattr(examine_setup, "examine_setup", lambda *_, on_progress: setup)
-    assert run("--device", "omega3", "--data", tmp_path, "--daily")[0] == code
+    assert run("--device", "omega3", "--data", tmp_path, "--daily", "--hands-off")[0] == code
