@@ -90,16 +90,16 @@ def _examine_device(
 
 
 def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
-    load, simulated = judge_load(load_per_processor()), device.info.simulated
+    load, simulated = load_per_processor(), device.info.simulated
     with timed_beside(seconds, device.info.sample_rate_hz, before_others=not simulated) as run:
-        timing = check_timing(device, clock, seconds, on_progress)
+        timing = check_timing(device, clock, seconds, on_progress, load)
     # A simulated device's own loop is never late: there, the wake-ups of this program are compared.
     late, ticks = timing.health.late_ticks + timing.health.missed_ticks, timing.health.ticks
     if simulated:
         ticks = round(seconds * device.info.sample_rate_hz)
         late = round(timing.lateness.missing_a_tick * ticks)
     beside = judge_beside(late, ticks, run)
-    return replace(timing, findings=(*timing.findings, beside, load), bare=run.result)
+    return replace(timing, findings=(*timing.findings, beside, judge_load(load)), bare=run.result)
 
 
 def _settings(name: str, timing_s: float) -> DeviceSettings:
