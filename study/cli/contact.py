@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from study.cli.record import HandsOffOption, announce
 from study.cli.results import JsonOption
 from study.cli.seed import check_seed
 from study.cli.study import DeviceOption
@@ -23,17 +24,20 @@ def contact(
     weight: Annotated[float, typer.Option(min=0.0, help="Weight of |force|² against |error|², (m/s² per N)².")] = 1e-3,
     cap: Annotated[float, typer.Option(min=0.001, help="Highest force, in newtons.")] = 3.0,
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
+    hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Play a transient that begins when a contact is felt: nothing may act before it. No person may hold the handle.
+    """Play a transient that begins when a contact is felt: nothing may act before it. No person may hold the
+    handle; from a script, a real device moves with --hands-off only.
 
     Writes forces.csv, wanted.csv, measured.csv, contact.json and a picture beside the same as a force with one gain.
     """
+    from functools import partial
+
     from study.cli.progress import late_bar
-    from study.cli.record import announce
     from study.workflows.equalizer.play_contact import ContactPlan, contact_lines, contact_summary, play_contact
 
     plan = ContactPlan(model, transient, normal, out, device, scale, weight, cap, seed)
     with late_bar("Plays (%)", total=100) as show:
-        done = play_contact(plan, lambda share: show(round(100 * share)), announce)
+        done = play_contact(plan, lambda share: show(round(100 * share)), partial(announce, hands_off=hands_off))
     typer.echo(json.dumps(contact_summary(done), indent=2) if as_json else "\n".join((str(out), *contact_lines(done))))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from study.cli.record import HandsOffOption, announce, require_confirmation
 from study.cli.results import JsonOption
 from study.cli.study import DataOption, DeviceOption
 
@@ -58,10 +59,11 @@ def doctor(
     daily: DailyOption = False,
     calibrate_sensor: SensorOption = None,
     baud: BaudOption = 2_000_000,
+    hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Check the installation, the device with its sensor, and the 1 kHz timing. Nothing moves, unless --accept or
-    --daily asks for it: then it is said before and, in a terminal, confirmed."""
+    --daily asks for it: then it is said before, and confirmed in a terminal or by --hands-off."""
     from contextlib import nullcontext
 
     from study.cli.progress import bar
@@ -71,7 +73,7 @@ def doctor(
     if calibrate_sensor is not None:
         _calibrate_sensor(calibrate_sensor, baud)
         return
-    _prepare(device, calibrate, daily)
+    _prepare(device, calibrate, daily, daily or accept is not None, hands_off)
     with bar("Timing the loop (s)", total=timing) if timing else nullcontext(lambda done: None) as show:
         examination = examine_setup(device, data, timing, this_terminal(), on_progress=show)
     if as_json:
@@ -79,36 +81,43 @@ def doctor(
     else:
         _say(examination)
     if accept is not None:
-        _accept(device, examination, accept)
+        _accept(device, examination, accept, hands_off)
     if examination.exit_code:
         raise typer.Exit(examination.exit_code)
     if daily:
-        _check_today(device, as_json)
+        _check_today(device, examination, as_json, hands_off)
 
 
-def _prepare(device: str, calibrate: bool, daily: bool) -> None:
+def _prepare(device: str, calibrate: bool, daily: bool, moves: bool, hands_off: bool) -> None:
+    """moves: a real device will move; where that cannot be confirmed, it is refused before all the checks."""
+    from study.devices.opening import needs_real_time
+
     if daily:
         from study.workflows.checks.daily_check import require_real
 
         require_real(device)
+    if moves and needs_real_time(device):
+        require_confirmation(hands_off)
     if calibrate:
         _calibrate(device)
 
 
-def _accept(device: str, examination: "Examination", operator: str) -> None:
+def _accept(device: str, examination: "Examination", operator: str, hands_off: bool) -> None:
     from study.workflows.checks.examine_setup import accept
 
-    with _moving() as moving:
+    with _moving(hands_off) as moving:
         said = accept(device, examination, operator, moving)
     typer.echo(said, err=True)
 
 
-def _check_today(device: str, as_json: bool) -> None:
+def _check_today(device: str, examination: "Examination", as_json: bool, hands_off: bool) -> None:
     """What changed since the acceptance, after the rest was found fine. With --json, only the file, on stderr."""
     from study.errors import ExitCode
     from study.workflows.checks.daily_check import check_today
+    from study.workflows.checks.examine_setup import require_sensor
 
-    with _moving() as moving:
+    require_sensor(examination)
+    with _moving(hands_off) as moving:
         checked = check_today(device, moving)
     if not as_json:
         typer.echo("Daily check")
@@ -120,13 +129,14 @@ def _check_today(device: str, as_json: bool) -> None:
 
 
 @contextmanager
-def _moving() -> "Iterator[Moving]":
+def _moving(hands_off: bool) -> "Iterator[Moving]":
+    from functools import partial
+
     from study.cli.progress import late_bar
-    from study.cli.record import announce
     from study.workflows.checks.daily_check import Moving, seconds_of_play
 
     with late_bar("The device moves (s)", total=round(seconds_of_play())) as show:
-        yield Moving(announce, show)
+        yield Moving(partial(announce, hands_off=hands_off), show)
 
 
 def _calibrate(device: str) -> None:

@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from study.cli.record import HandsOffOption, announce
 from study.cli.results import JsonOption
 from study.cli.seed import check_seed
 
 if TYPE_CHECKING:
     from study.workflows.equalizer.equalize_trajectory import EqualizePlan
+    from study.workflows.equalizer.repeat_trajectory import RepeatOrder
 
 
 def equalize(
@@ -39,6 +41,7 @@ def equalize(
         Path | None, typer.Option("--from", help="Forces of an earlier run with --repeat, to go on from.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
+    hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Turn wanted accelerations (time_s,ax,ay,az) into forces (time_s,fx,fy,fz), row by row.
@@ -46,12 +49,15 @@ def equalize(
     Models of several places are interpolated at --at; a narrow and a wide one of one place play three bands.
     """
     from study.workflows.equalizer.equalize_trajectory import EqualizePlan
+    from study.workflows.equalizer.repeat_trajectory import RepeatOrder
 
     _require_whole(files, repeat, device, earlier)
     *models, trajectory = files
     plan = EqualizePlan(tuple(models), trajectory, out, at, weight, cap, constrain, physics)
     found, lines = (
-        _once(plan) if repeat is None or device is None else _play_repeatedly(plan, repeat, device, earlier, seed)
+        _once(plan)
+        if repeat is None or device is None
+        else _play_repeatedly(plan, RepeatOrder(repeat, device, earlier, seed), hands_off)
     )
     typer.echo(json.dumps(found, indent=2) if as_json else "\n".join((str(out), *lines)))
 
@@ -82,18 +88,18 @@ def _once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ...]]":
 
 
 def _play_repeatedly(
-    plan: "EqualizePlan", repeat: int, device: str, earlier: Path | None, seed: int
+    plan: "EqualizePlan", order: "RepeatOrder", hands_off: bool
 ) -> "tuple[dict[str, Any], tuple[str, ...]]":
+    from functools import partial
+
     from study.cli.progress import late_bar
-    from study.cli.record import announce
     from study.workflows.equalizer.repeat_trajectory import (
-        RepeatOrder,
         repeat_lines,
         repeat_summary,
         repeat_trajectory,
     )
 
-    order = RepeatOrder(repeat, device, earlier, seed)
-    with late_bar("Plays", total=repeat + 1) as show:
-        done = repeat_trajectory(plan, order, lambda number, share: show(number + share), announce)
+    ask = partial(announce, hands_off=hands_off)
+    with late_bar("Plays", total=order.repeats + 1) as show:
+        done = repeat_trajectory(plan, order, lambda number, share: show(number + share), ask)
     return repeat_summary(done), repeat_lines(done)

@@ -8,6 +8,15 @@ import typer
 
 from study.cli.seed import check_seed
 from study.cli.study import DeviceOption
+from study.errors import WrongUseError
+
+HandsOffOption = Annotated[
+    bool,
+    typer.Option(
+        "--hands-off",
+        help="For scripts, which cannot press Enter: no hand is on the handle of the real device, and none will be.",
+    ),
+]
 
 
 def record(
@@ -26,32 +35,64 @@ def record(
         0.0,
     ),
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
+    hands_off: HandsOffOption = False,
 ) -> None:
     """Record the device's answer to an excitation. Interrupted, what is whole so far is written.
 
     Where the accelerometer clips, a piece is played again with less force. A real device says first whether a hand
-    may be on the handle, and waits for Enter.
+    may be on the handle, and waits for Enter in a terminal; from a script it moves a free handle with --hands-off only.
     """
+    from functools import partial
+
     from study.cli.progress import late_bar
     from study.store.formats.protocol_files import read_recording_protocol
     from study.workflows.recording.record_device import RecordingPlan, check_free, record_device
 
     source = read_recording_protocol(protocol)
+    held = source.protocol.hand == "held"
+    if held and hands_off:
+        raise WrongUseError(
+            "Is a hand on the handle?",
+            f"{protocol!r} is played into a hand, and --hands-off says that there is none.",
+            "Leave --hands-off out, or choose a protocol for a free handle.",
+            saved="Nothing moved.",
+        )
     plan = RecordingPlan(source.protocol, device=device, place_m=place, seed=seed, out=out)
     check_free(out)
     with late_bar(f"{source.protocol.title} (s)", total=round(plan.total_s)) as show:
-        written = record_device(plan, on_progress=show, before_moving=announce)
+        written = record_device(plan, on_progress=show, before_moving=partial(announce, hands_off=hands_off, held=held))
     typer.echo(str(written.path))
     for warning in written.warnings:
         typer.echo(f"Note: {warning}", err=True)
 
 
-def announce(notice: str) -> None:
-    """Print the notice, and wait for Enter if there is a keyboard."""
+def announce(notice: str, hands_off: bool, held: bool = False) -> None:
+    """Print the notice, and wait for Enter.
+
+    Without a keyboard no person can confirm it: then hands_off, the caller's own word, is needed for a free handle,
+    and a held one is not moved at all. Raises WrongUseError, or KeyboardInterrupt for a terminal that is closed.
+    """
     from study.cli.screen import has_keys
 
     typer.echo(notice, err=True)
+    require_confirmation(hands_off, held)
     if has_keys():
         typer.echo("Press Enter to begin. ", err=True, nl=False)
         if not sys.stdin.readline():  # closed, as by Ctrl-D: that is no yes
             raise KeyboardInterrupt
+
+
+def require_confirmation(hands_off: bool, held: bool = False) -> None:
+    """Raises WrongUseError where no person can confirm what a real device will do. Arguments as of `announce`."""
+    from study.cli.screen import has_keys
+
+    if has_keys() or (hands_off and not held):
+        return
+    raise WrongUseError(
+        "The device was not moved: its notice was not confirmed",
+        "There is no terminal in which a person could press Enter.",
+        "Run it in a terminal: a hand must be on the handle before it moves."
+        if held
+        else "Run it in a terminal; or, where no hand is on the handle and the workspace is free, add --hands-off.",
+        saved="Nothing moved.",
+    )

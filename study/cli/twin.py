@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from study.cli.record import HandsOffOption, announce
 from study.cli.results import JsonOption
 from study.cli.seed import check_seed
 from study.cli.study import DeviceOption
@@ -19,20 +20,22 @@ def twin(
         str, typer.Option(help="Recording protocol with multisines along x, y and z, or a file.")
     ] = "multisine",
     band: Annotated[tuple[float, float], typer.Option(help="Band to fit, low and high in hertz.")] = (3.0, 60.0),
+    hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Excite the device well above its friction at two levels, fit masses, dampers, cables and modes from the command
     to the acceleration, take off the damping that is friction's, and write the rest with its tolerances. No person may
-    hold the handle."""
+    hold the handle; from a script, a real device moves with --hands-off only."""
+    from functools import partial
+
     from study.cli.progress import late_bar
-    from study.cli.record import announce
     from study.workflows.diagnosis.twin_summary import twin_lines, twin_summary
     from study.workflows.diagnosis.write_twin import TwinPlan, check_free, write_twin
 
     plan = TwinPlan(out, device, seed, protocol, band)
     check_free(plan)
     with late_bar("Twin (%)", total=100) as show:
-        written = write_twin(plan, lambda share: show(round(100 * share)), before_moving=announce)
+        written = write_twin(plan, lambda share: show(round(100 * share)), partial(announce, hands_off=hands_off))
     typer.echo(json.dumps(twin_summary(written), indent=2) if as_json else "\n".join((str(out), *twin_lines(written))))
     for note in written.notes:
         typer.echo(f"Note: {note}", err=True)

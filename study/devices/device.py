@@ -44,6 +44,9 @@ class DeviceSettings:
     beyond_hand_ceiling: bool = False
     """Without a hand on the handle: caps up to the device's own maximum, not only up to what a hand may feel. Never
     set by a protocol; refused with a hand."""
+    with_sensor: bool = True
+    """Whether a real device's accelerometer is read, where the lab's file names one. Without it there is no
+    acceleration."""
 
 
 class Fault(Enum):

@@ -32,7 +32,7 @@ def load_library() -> Library:
 
 def open_model(library: Library, model: DeviceModel) -> Handle:
     """The first device of this kind that is free, as it is: neither armed nor taking forces. Raises `DeviceError`."""
-    others: list[str] = []
+    others: list[tuple[str, str | None]] = []
     failures: list[LibraryError] = []
     for number in range(max(0, int(library.function("dhdGetDeviceCount")()))):
         try:
@@ -44,7 +44,7 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
             system_type = handle.system_type()
             if system_type in model.system_types:
                 return handle
-            others.append(name_of_type(system_type) or handle.system_name())
+            others.append((handle.system_name(), name_of_type(system_type)))
         except LibraryError as error:
             failures.append(error)
         except BaseException:
@@ -106,13 +106,15 @@ def _check_fit(handle: Handle, model: DeviceModel) -> None:
         raise DeviceError(f"The {model.name} is not calibrated", "It does not know where its handle is.", CALIBRATE)
 
 
-def _none_of_them(model: DeviceModel, others: list[str], failures: list[LibraryError]) -> DeviceError:
+def _none_of_them(
+    model: DeviceModel, others: list[tuple[str, str | None]], failures: list[LibraryError]
+) -> DeviceError:
+    """others: the vendor's name of each device that was found, and the one that `--device` takes, if there is one."""
     title = f"There is no {model.name}"
     if any(failure.code == DEVICE_IN_USE for failure in failures):
         return DeviceError(title, "A device is there, and another program has it.", "Close the other program.")
     if others:
-        known = [f"--device {name}" for name in others]
-        return DeviceError(title, f"Found instead: {', '.join(others)}.", f"Use {' or '.join(known)}, or plug it in.")
+        return _others_instead(model, others)
     if any(not device.may_open for device in find_usb_devices() or ()):
         return DeviceError(title, "A device is plugged in, and this account may not open it.", ADVICE)
     if failures:
@@ -120,3 +122,11 @@ def _none_of_them(model: DeviceModel, others: list[str], failures: list[LibraryE
             title, f"A device is there and cannot be opened: {failures[0]}.", "Switch it off and on, then try again."
         )
     return DeviceError(title, "No device of the vendor answers.", "Plug its USB cable in and switch its power on.")
+
+
+def _others_instead(model: DeviceModel, others: list[tuple[str, str | None]]) -> DeviceError:
+    known = [f"`--device {name}`" for _, name in others if name is not None]
+    found = ", ".join(name or f"{said!r}, which hapteq does not drive" for said, name in others)
+    plug_in = f"lug the {model.name} in and switch its power on."
+    do_now = f"Use {' or '.join(known)}, or p{plug_in}" if known else f"P{plug_in}"
+    return DeviceError(f"There is no {model.name}", f"Found instead: {found}.", do_now)

@@ -6,7 +6,7 @@ from study.devices.drive.real_time_class import real_time_finding
 from study.devices.force_dimension.connect import CALIBRATE, load_library, make_ready, open_model
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.lab import LabSettings, lab_file, read_lab
-from study.devices.force_dimension.library import LibraryError
+from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rigs import info_of
 from study.devices.force_dimension.usb import ADVICE, find_usb_devices
@@ -23,20 +23,30 @@ DRIFTING_MPS = 0.02
 """After `AT_REST_S` with gravity compensated and no hand: 7 % of g in excess of friction. Below, friction holds it."""
 
 POWER = "Switch its power supply on."
+SENSOR = "Accelerometer"
 
 
 def examine(name: str) -> tuple[DeviceFinding, ...]:
-    """Up to the first thing that hinders all others. Raises nothing; the device is left braked."""
-    model = MODELS[name]
-    findings: list[DeviceFinding] = []
+    """Up to the first thing that hinders all others; what needs no library is told in any case. A sensor that can be
+    read is no finding here. Raises nothing; the device is left braked."""
     try:
         lab = read_lab()
+    except DeviceError as error:
+        return (_wrong("Driver", error), *_usb(), real_time_finding())
+    try:
         library = load_library()
-        findings.append(DeviceFinding("Library", f"{library.path}, SDK {library.version_text}", fine=True))
-        findings += [*_usb(), real_time_finding()]
+    except DeviceError as error:
+        return (_wrong("Driver", error), *(_usb() or _unplugged()), real_time_finding(), *_sensor(lab))
+    found = DeviceFinding("Library", f"{library.path}, SDK {library.version_text}", fine=True)
+    return (found, *_usb(), real_time_finding(), *_sensor(lab), *_of_device(library, MODELS[name], lab))
+
+
+def _of_device(library: Library, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
+    findings: list[DeviceFinding] = []
+    try:
         handle = open_model(library, model)
     except DeviceError as error:
-        return (*findings, _wrong("Driver", error))
+        return [_wrong("Driver", error)]
     try:
         info = info_of(handle, library, model, lab.effective_mass_kg)
         findings.append(DeviceFinding("Connection", f"{info.name}, {info.details}", fine=True))
@@ -48,7 +58,7 @@ def examine(name: str) -> tuple[DeviceFinding, ...]:
         findings.append(DeviceFinding("Driver", f"the library says: {error}", fine=False, advice=advice))
     finally:
         handle.let_go()
-    return tuple(findings)
+    return findings
 
 
 def calibrate(name: str, patience_s: float) -> None:
@@ -72,6 +82,30 @@ def _usb() -> list[DeviceFinding]:
         else DeviceFinding("USB", f"{device.product}: this account may not open it", fine=False, advice=ADVICE)
         for device in find_usb_devices() or ()
     ]
+
+
+def _unplugged() -> list[DeviceFinding]:
+    """Where the library is missing, which would tell it; nothing where this system does not tell (no Linux)."""
+    if find_usb_devices() is None:
+        return []
+    value, advice = "no device of the vendor is plugged in", "Plug its USB cable in and switch its power on."
+    return [DeviceFinding("USB", value, fine=False, advice=advice, warning=True)]
+
+
+def _sensor(lab: LabSettings) -> list[DeviceFinding]:
+    """Opened, read, and closed again for the loop's process, which opens it anew."""
+    if lab.accelerometer is None:
+        advice = (
+            "Without one no acceleration is measured. To add one: calibrate it with `hapteq doctor --calibrate-sensor "
+            "PORT` and put the [accelerometer] table that this prints into that file (docs/hardware.md, The "
+            "accelerometer)."
+        )
+        return [DeviceFinding(SENSOR, f"none is configured in {lab_file()}", fine=False, advice=advice, warning=True)]
+    try:
+        lab.accelerometer.open_sensor().close()
+    except DeviceError as error:
+        return [_wrong(SENSOR, error)]
+    return []
 
 
 def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:

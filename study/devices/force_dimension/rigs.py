@@ -21,7 +21,7 @@ def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRi
     """Raises `DeviceError` that says what is missing. What was opened until then is stopped and closed again."""
     model, lab = MODELS[name], read_lab()
     library = load_library()
-    sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None else None
+    sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None and settings.with_sensor else None
     try:
         return _rig(library, model, lab, sensor, settings)
     except BaseException:

@@ -37,17 +37,21 @@ def check_device(
     place_m: tuple[float, float, float] = CENTRE_M,
     total_cap_n: float | None = None,
     safety: SafetySettings | None = None,
+    with_sensor: bool = True,
 ) -> DeviceReport:
     """Findings of an idle device; takes `LOOKS` times `EVERY_S`. Commands no force and raises nothing.
 
     place_m: where trials start. total_cap_n: the largest force that will be requested, if known; safety: its parts.
+    with_sensor: False where the device was opened without its accelerometer, of which nothing is said then.
     """
     looks = []
     for _ in range(LOOKS):
         looks.append(device.look())
         clock.sleep(EVERY_S)
     answered = [look for look in looks if look.position_m is not None or look.acceleration_mps2 is not None]
-    sensors = (_handle(answered, place_m), _accelerometer(answered)) if answered else ()
+    sensors = (_handle(answered, place_m),) if answered else ()
+    if answered and with_sensor:
+        sensors = (*sensors, _accelerometer(answered))
     info = device.info
     largest = _largest_force(info, total_cap_n)
     made_of = (DeviceFinding("Force on a hand", forces_in_words(safety), fine=True),) if safety is not None else ()

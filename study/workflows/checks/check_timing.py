@@ -45,8 +45,15 @@ class Timing:
     """A bare C loop at the same time; None where none was compared with."""
 
 
-def check_timing(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
+def check_timing(
+    device: Device,
+    clock: Clock,
+    seconds: float,
+    on_progress: Callable[[float], None],
+    load_per_processor: float | None = None,
+) -> Timing:
     """Hold zero force for this long, which the device's settings must allow. `on_progress(seconds)` now and then.
+    load_per_processor: measured before; None if unknown.
 
     The force is zero only if the device was opened without a centring spring. Raises DeviceError for a lost device.
     """
@@ -58,7 +65,8 @@ def check_timing(device: Device, clock: Clock, seconds: float, on_progress: Call
     finally:
         health = device.release().health
     lateness = lateness_of(np.array(late_s), rate_hz)
-    return Timing(seconds, health, lateness, _findings(device, seconds, health, lateness))
+    late = judge_late(health.late_ticks + health.missed_ticks, 1000 * health.latest_s, health.ticks, load_per_processor)
+    return Timing(seconds, health, lateness, _findings(device, seconds, health, lateness, late))
 
 
 def check_computer(
@@ -119,9 +127,10 @@ def _attend(device: Device, on_progress: Callable[[float], None], done_s: float)
     return device.fault() is Fault.NONE
 
 
-def _findings(device: Device, seconds: float, health: Health, lateness: Lateness) -> tuple[DeviceFinding, ...]:
+def _findings(
+    device: Device, seconds: float, health: Health, lateness: Lateness, late: DeviceFinding
+) -> tuple[DeviceFinding, ...]:
     simulated = device.info.simulated
-    late = judge_late(health.late_ticks + health.missed_ticks, 1000 * health.latest_s, health.ticks)
     return (
         _loop(seconds, health),
         judge_missed(health.missed_ticks, health.ticks, simulated),

@@ -44,6 +44,11 @@ class Examination:
         return (*self.installation, *self.device.findings, *timing)
 
     @property
+    def sensed(self) -> bool:
+        """Whether nothing was found against the accelerometer."""
+        return all(finding.fine for finding in self.findings if finding.name in NOT_NEEDED)
+
+    @property
     def exit_code(self) -> ExitCode:
         """By the worst finding: DEVICE if device or timing is wrong, beside any other finding. Warnings are ignored."""
         timing = self.timing.findings if self.timing is not None else ()
@@ -68,12 +73,14 @@ def _examine_device(
     clock, settings = RealClock(), _settings(name, timing_s)
     driver = examine_device(name)
     report = DeviceReport(name, simulated=False, findings=driver)
-    if any(finding.wrong for finding in driver):
+    if any(finding.wrong and finding.name not in NOT_NEEDED for finding in driver):
         return report, None
+    sensed = all(finding.fine for finding in driver if finding.name in NOT_NEEDED)
+    settings = replace(settings, with_sensor=sensed)
     try:
         with contextlib.closing(open_device(name, settings, clock, seed=1)) as device:
             total_cap_n, safety = settings.limits.total_cap_n, read_study_protocol(PROTOCOL).protocol.safety
-            report = check_device(device, clock, settings.place_m, total_cap_n, safety)
+            report = check_device(device, clock, settings.place_m, total_cap_n, safety, sensed)
             report = replace(report, findings=(*driver, *report.findings))
             timing = _time(device, clock, timing_s, on_progress) if timing_s > 0 else None
             return report, timing
@@ -83,16 +90,16 @@ def _examine_device(
 
 
 def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
-    load, simulated = judge_load(load_per_processor()), device.info.simulated
+    load, simulated = load_per_processor(), device.info.simulated
     with timed_beside(seconds, device.info.sample_rate_hz, before_others=not simulated) as run:
-        timing = check_timing(device, clock, seconds, on_progress)
+        timing = check_timing(device, clock, seconds, on_progress, load)
     # A simulated device's own loop is never late: there, the wake-ups of this program are compared.
     late, ticks = timing.health.late_ticks + timing.health.missed_ticks, timing.health.ticks
     if simulated:
         ticks = round(seconds * device.info.sample_rate_hz)
         late = round(timing.lateness.missing_a_tick * ticks)
     beside = judge_beside(late, ticks, run)
-    return replace(timing, findings=(*timing.findings, beside, load), bare=run.result)
+    return replace(timing, findings=(*timing.findings, beside, judge_load(load)), bare=run.result)
 
 
 def _settings(name: str, timing_s: float) -> DeviceSettings:
@@ -102,6 +109,17 @@ def _settings(name: str, timing_s: float) -> DeviceSettings:
     limits = replace(settings.limits, longest_hold_s=longest_s)
     still = replace(settings, limits=limits, spring_frequency_hz=0.0, spring_damping_n_s_per_m=0.0)
     return replace(still, hand_on_handle=False) if needs_real_time(name) else still
+
+
+def require_sensor(examination: Examination) -> None:
+    """Raises DeviceError where a daily check would record no acceleration."""
+    if not examination.sensed:
+        raise DeviceError(
+            "The daily check did not begin",
+            "It compares accelerations, and the accelerometer is not fine (its line above).",
+            "Do what that line says, then check again.",
+            saved="Nothing moved.",
+        )
 
 
 def accept(name: str, examination: Examination, operator: str, moving: Moving) -> str:
@@ -114,8 +132,9 @@ def accept(name: str, examination: Examination, operator: str, moving: Moving) -
     if timing is None or hinders:
         found = ", ".join(finding.name for finding in hinders) or "the timing was not measured"
         raise DeviceError("The device was not accepted", f"Not fine: {found}.", "Mend that first, as said above.")
-    sensed = all(finding.fine for finding in examination.findings if finding.name in NOT_NEEDED)
+    sensed = examination.sensed
     baseline = record_baseline(name, moving) if sensed else ("", "")
     moving.announce(proof_notice(name, proof_force_n()))
-    said = accept_device(name, _settings(name, 0.0), RealClock(), operator, baseline)
+    settings = replace(_settings(name, 0.0), with_sensor=sensed)
+    said = accept_device(name, settings, RealClock(), operator, baseline)
     return said if sensed else f"{said}. Without an accelerometer no daily check will be possible."

@@ -2,6 +2,7 @@
 
 import json
 from importlib.metadata import packages_distributions
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ import pytest
 from study.cli import doctor
 from study.cli.main import main
 from study.devices.device import Fault, Health
+from study.devices.force_dimension import findings
+from study.devices.force_dimension.usb import UsbDevice
 from study.errors import ExitCode
 from study.session.stimulus.timing_verdict import judge_lateness, judge_load, lateness_of
 from study.session.views.views import DeviceFinding, DeviceReport
@@ -49,9 +52,9 @@ def test_nothing_is_wrong_with_the_simulated_device_however_busy_this_computer_i
 def test_a_program_gets_one_document(run, tmp_path):
     code, out = run("--timing", 0.3, "--data", tmp_path, "--json")
     document = json.loads(out)
-    findings = (*document["installation"], *document["device"]["findings"], *document["timing"]["findings"])
+    told = (*document["installation"], *document["device"]["findings"], *document["timing"]["findings"])
     assert code == 0
-    assert document["fine"] is all(finding["fine"] for finding in findings)
+    assert document["fine"] is all(finding["fine"] for finding in told)
     assert document["device"]["simulated"]
     assert {"name", "value", "fine", "advice", "warning"} == set(document["installation"][0])
     timing = document["timing"]
@@ -85,8 +88,51 @@ def test_a_missing_library_is_a_finding_that_says_what_to_install(run, tmp_path,
     monkeypatch.setenv("FDSDK", str(tmp_path))
     monkeypatch.setenv("HOME", str(tmp_path))
     code, out = run("--device", "omega3", "--data", tmp_path)
-    assert (code, verdicts(out)) == (3, {"Driver": "WRONG"})
+    assert (code, verdicts(out)["Driver"]) == (3, "WRONG")
     assert "Install the Force Dimension SDK" in out
+
+
+@pytest.mark.parametrize(
+    ("plugged_in", "usb"),
+    [((), "WARN"), ((UsbDevice("omega.3", True),), "fine"), ((UsbDevice("omega.3", False),), "WRONG"), (None, None)],
+)
+def test_what_needs_no_library_is_told_without_one(run, stub, tmp_path, monkeypatch, plugged_in, usb):
+    monkeypatch.setenv("FDSDK", str(tmp_path / "nowhere"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr(findings, "find_usb_devices", lambda: plugged_in)
+    _, out = run("--device", "omega3", "--data", tmp_path)
+    found = verdicts(out)
+    assert (found["Driver"], found["Accelerometer"], found.get("USB")) == ("WRONG", "WARN", usb)
+    assert "Priority" in found
+    (tmp_path / "none.toml").write_text("[accelerometer")
+    assert {"Driver", "Priority"} <= set(verdicts(run("--device", "omega3", "--data", tmp_path)[1]))
+
+
+def test_where_no_accelerometer_is_configured_it_is_said_how_to_add_one(run, stub, tmp_path):
+    code, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0)
+    assert verdicts(out)["Accelerometer"] == "WARN" and code != 3
+    assert f"Accelerometer      none is configured in {tmp_path / 'none.toml'}" in out
+    assert "--calibrate-sensor PORT" in out and "docs/hardware.md, The accelerometer" in out
+    assert "## The accelerometer" in (Path(__file__).parents[3] / "docs" / "hardware.md").read_text("utf-8")
+
+
+SENSOR_TABLE = """[accelerometer]
+port = "/nowhere/ttyACM7"
+bias = [32100.0, 32350.0, 32800.0]
+sensitivity = [[607.0, 3.0, -5.0], [-4.0, 611.0, 2.0], [6.0, 1.0, 598.0]]
+raw_range = [13800, 51200]
+"""
+
+
+def test_a_sensor_that_is_not_plugged_in_is_a_line_of_its_own_and_all_else_is_checked(run, stub, tmp_path):
+    (tmp_path / "none.toml").write_text(SENSOR_TABLE)
+    code, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0.2)
+    found = verdicts(out)
+    assert (code, found["Accelerometer"], found["Device"]) == (3, "WRONG", "fine")
+    assert "The accelerometer cannot be opened. /nowhere/ttyACM7" in out and out.count("cannot be opened") == 1
+    assert {"Answers", "Handle", "Rate", "Late ticks"} <= set(found)
+    assert "\nTiming\n" in out
+    assert stub.safe
 
 
 def test_a_real_device_is_found_with_library_firmware_calibration_and_watchdog(run, stub, tmp_path):
@@ -97,7 +143,7 @@ def test_a_real_device_is_found_with_library_firmware_calibration_and_watchdog(r
     assert "omega.3, serial 4242, firmware 2.41, SDK 3.17.5.0" in out
     assert "set to 30.0 ms; without forces the device let go within" in out
     assert "0.28 kg, assumed" in out
-    assert (found["Accelerometer"], code) == ("WRONG", 3)  # none is connected
+    assert code != 3
     assert stub.safe
     assert (stub.get("opened"), stub.get("peak_n")) == (0, 0)
 
@@ -200,6 +246,14 @@ def test_verdict_figures_summary_and_exit_code_agree(capsys, late_ms, load, simu
     assert doctor._document(looked)["fine"] is (summary[:3] == "All")
 
 
+def test_without_a_sensor_no_daily_check_begins(run, monkeypatch, tmp_path):
+    lacks = DeviceFinding("Accelerometer", "none is configured", fine=False, warning=True)
+    setup = Examination((), DeviceReport("omega3", False, (lacks,)), None)
+    monkeypatch.setattr(examine_setup, "examine_setup", lambda *_, on_progress: setup)
+    monkeypatch.setattr(daily_check, "check_today", lambda *_: pytest.fail("it moved"))
+    assert run("--device", "omega3", "--data", tmp_path, "--daily", "--hands-off")[0] == 3
+
+
 @pytest.mark.parametrize(("fine", "code"), [(True, ExitCode.DONE), (False, ExitCode.DEVICE)])
 def test_a_daily_check_that_told_nothing_is_no_success(run, monkeypatch, tmp_path, fine, code):
     told = DeviceFinding("Noise", "", fine=fine, warning=not fine)
@@ -207,4 +261,4 @@ def test_a_daily_check_that_told_nothing_is_no_success(run, monkeypatch, tmp_pat
     monkeypatch.setattr(daily_check, "check_today", lambda *_: checked)
     setup = Examination((), DeviceReport("omega3", False, ()), None)
     monkeypatch.setattr(examine_setup, "examine_setup", lambda *_, on_progress: setup)
-    assert run("--device", "omega3", "--data", tmp_path, "--daily")[0] == code
+    assert run("--device", "omega3", "--data", tmp_path, "--daily", "--hands-off")[0] == code

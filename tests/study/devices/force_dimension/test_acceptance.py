@@ -120,7 +120,10 @@ def test_without_timing_or_after_a_failed_check_no_acceptance_is_written(locked,
         locked.set("powered", 0)
     called: list[str] = []
     monkeypatch.setattr(examine_setup, "accept_device", lambda *_: called.append("signed"))
-    assert main(["doctor", "--device", "omega3", "--data", str(tmp_path), "--accept", "Ada", *arguments]) == 3
+    assert (
+        main(["doctor", "--device", "omega3", "--data", str(tmp_path), "--accept", "Ada", "--hands-off", *arguments])
+        == 3
+    )
     assert not called and not acceptance_file().exists()
     assert locked.safe
 

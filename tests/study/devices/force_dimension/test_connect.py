@@ -98,8 +98,11 @@ def test_a_library_without_a_function_is_too_old(another, vendor, opened, tmp_pa
     [
         ({"devices": 0}, "No device of the vendor answers. Plug its USB cable in"),
         ({"unplugged": 1}, "No device of the vendor answers"),
-        ({"type": 63}, "Found instead: delta3. Use --device delta3"),
-        ({"type": 999}, "Found instead: another device"),
+        ({"type": 63}, "Found instead: delta3. Use `--device delta3`, or plug the omega.3 in"),
+        (
+            {"type": 999},
+            "Found instead: 'another device', which hapteq does not drive. Plug the omega.3 in and switch",
+        ),
         ({"in_use": 1}, "another program has it. Close the other program"),
         ({"open_fails": 2}, "cannot be opened: dhdOpenID: communication error (error 2)"),
         ({"powered": 0}, "has no power"),

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
+from study.cli.main import main
 from study.devices.accelerometer.parser import LAYOUT, SIZE
-from study.devices.force_dimension.lab import LabSettings
+from study.devices.force_dimension.lab import LabSettings, SensorSettings
 from study.devices.force_dimension.models import MODELS
 from study.devices.force_dimension.usb import RULE, RULE_FILE
 
@@ -31,6 +32,27 @@ def test_the_examples_of_a_lab_s_file_are_one():
     assert lab.pulse is not None
     assert lab.effective_mass_kg == MODELS["omega3"].effective_mass_kg
     assert lab.accelerometer is not None
+
+
+def test_wiring_and_speed_are_those_of_the_firmware():
+    sketch = (ROOT / "docs" / "firmware" / "accelerometer.ino").read_text("utf-8")
+    (pins,) = re.findall(r"PINS\[3\] = {(.*)}", sketch)
+    assert (
+        re.findall(r"^\| [XYZ] \| (A\d) \(pin \d+\) \|", PAGE, re.MULTILINE) == pins.split(", ") == ["A0", "A1", "A2"]
+    )
+    (baud,) = re.findall(r"Serial\.begin\((\d+)\)", sketch)
+    assert int(baud) == SensorSettings.__dataclass_fields__["baud"].default.default
+
+
+def test_the_commands_of_the_hardware_page_have_the_options_that_it_gives_them(capsys):
+    lines = re.findall(r"^(?:```\n)?(hapteq .*?)(?: +#.*)?$", PAGE, re.MULTILINE)
+    lines += re.findall(r"`(hapteq [^`]+)`", PAGE)
+    assert sum("--protocol" in line for line in lines) == 1
+    for line in lines:
+        _, command, *words = line.split()
+        assert main([command, "--help"]) == 0, line
+        helped = capsys.readouterr().out
+        assert [word for word in words if word.startswith("--") and f"{word} " not in helped] == [], line
 
 
 def test_rule_devices_and_packet_are_those_of_the_code():

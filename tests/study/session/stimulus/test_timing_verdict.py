@@ -62,9 +62,17 @@ def test_missed_ticks_of_a_real_loop():
     assert judge_missed(2, 1000, simulated=False).wrong
 
 
+@pytest.mark.parametrize("load", [None, 0.0, 0.99, float("nan")])
 @pytest.mark.parametrize(("late", "fine"), [(0, True), (20, True), (21, False), (10_000, False)])
-def test_late_ticks_of_a_real_loop_are_judged_by_their_share(late, fine):
-    finding = judge_late(late, 3.21, 10_000)
+def test_late_ticks_of_a_real_loop_are_judged_by_their_share(late, fine, load):
+    finding = judge_late(late, 3.21, 10_000, load)
     assert (finding.fine, finding.warning) == (fine, False)
     assert f"{late} of 10000" in finding.value and "the latest 3.2 ms after its time" in finding.value
     assert finding.value.endswith("at most 0.2% are fine") != fine
+
+
+@pytest.mark.parametrize(("late", "fine", "told"), [(20, True, False), (100, True, True), (101, False, True)])
+def test_with_all_cores_busy_more_late_ticks_are_fine_and_it_is_said(late, fine, told):
+    finding = judge_late(late, 3.21, 10_000, 1.0)
+    assert (finding.fine, finding.warning) == (fine, False)
+    assert finding.value.endswith("at most 1.0% are fine with all cores busy (0.2% else)") == told

@@ -13,6 +13,7 @@ from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
+from study.workflows.checks import examine_setup
 from study.workflows.checks.check_timing import check_computer, check_timing
 
 
@@ -155,6 +156,37 @@ def test_wake_ups_are_measured_as_the_loop_of_that_device_has_them(rigs, setting
     # What is asked of the device meanwhile must not make the wake-ups late.
     assert set(attended) == {threading.current_thread()}
     assert ("Late ticks" in found) == real
+
+
+@pytest.mark.parametrize(("load", "fine"), [(1.3, True), (0.3, False), (None, False)])
+def test_more_late_ticks_are_fine_on_a_computer_that_was_measured_to_be_busy(rigs, settings, monkeypatch, load, fine):
+    clock = VirtualClock()
+    with contextlib.closing(SafeDevice(rigs.ScriptedRig(), settings, clock)) as device:
+        release = device.release
+
+        def late():
+            played = release()
+            return replace(played, health=replace(played.health, late_ticks=played.health.ticks // 200, missed_ticks=0))
+
+        monkeypatch.setattr(device, "release", late)
+        timing = check_timing(device, clock, 1.0, lambda done: None, load)
+    (found,) = (finding for finding in timing.findings if finding.name == "Late ticks")
+    assert found.fine is fine
+
+
+def test_doctor_judges_late_ticks_by_the_load_that_it_shows(rigs, settings, monkeypatch):
+    asked = []
+
+    def timing(device, clock, seconds, on_progress, load):
+        asked.append(load)
+        raise DeviceError("Enough", "It was asked.", "Go on.")
+
+    monkeypatch.setattr(examine_setup, "load_per_processor", lambda: 1.3)
+    monkeypatch.setattr(examine_setup, "check_timing", timing)
+    clock = VirtualClock()
+    with contextlib.closing(SafeDevice(rigs.ScriptedRig(), settings, clock)) as device, pytest.raises(DeviceError):
+        examine_setup._time(device, clock, 0.1, lambda done: None)
+    assert asked == [1.3]
 
 
 @pytest.mark.real_time

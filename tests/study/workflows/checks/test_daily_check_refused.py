@@ -44,6 +44,18 @@ def test_the_proof_of_the_acceptance_is_announced_and_a_no_keeps_the_device_stil
     assert "No person may hold the handle" in notices[0] and "0.5 N" in notices[0]
 
 
+@pytest.mark.parametrize("sensor", [True, False])
+def test_a_sensor_that_is_not_fine_does_not_hinder_the_acceptance(monkeypatch, sensor):
+    asked = []
+    found = (DeviceFinding("Accelerometer", "", fine=sensor),)
+    looked = Examination((), DeviceReport("omega3", simulated=False, findings=found), SimpleNamespace(findings=()))
+    monkeypatch.setattr(examine_setup, "record_baseline", lambda *_: ("baselines/a.h5", "0"))
+    monkeypatch.setattr(examine_setup, "accept_device", lambda _, settings, *rest: asked.append(settings) or "signed")
+    said = accept("omega3", looked, "Ada", QUIET)
+    assert [settings.with_sensor for settings in asked] == [sensor]
+    assert ("no daily check" in said) is not sensor
+
+
 def test_a_handle_that_stuck_is_written_as_a_change(two_days, monkeypatch):
     _, check = two_days
     read = daily_check.read_recording
