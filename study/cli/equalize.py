@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from study.workflows.equalizer.equalize_trajectory import EqualizePlan
     from study.workflows.equalizer.repeat_trajectory import RepeatOrder
 
+EarlierOption = Annotated[
+    Path | None, typer.Option("--from", help="Forces of an earlier run with --repeat, to go on from.")
+]
+
 
 def equalize(
     files: Annotated[
@@ -36,10 +40,8 @@ def equalize(
         int | None,
         typer.Option(min=1, help="Play on the device, measure, correct, up to so many times. No person may hold it."),
     ] = None,
-    device: Annotated[str | None, typer.Option(help="Device to repeat on: simulated.")] = None,
-    earlier: Annotated[
-        Path | None, typer.Option("--from", help="Forces of an earlier run with --repeat, to go on from.")
-    ] = None,
+    device: Annotated[str | None, typer.Option(help="Device to repeat on: simulated, or a real one.")] = None,
+    earlier: EarlierOption = None,
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
     hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
