@@ -9,6 +9,7 @@ from pathlib import Path
 import typer
 
 from study.cli.progress import answer_count
+from study.cli.record import announce
 from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.opening import needs_real_time
@@ -35,6 +36,8 @@ class Sitter:
     """Name of the simulated participant; None for a person."""
     subject: str | None
     keys: AnswerKeys = DIGITS
+    hands_off: bool = False
+    """The caller's word, where no terminal can confirm it, that a real device's handle is free."""
 
 
 def begin(
@@ -47,6 +50,7 @@ def begin(
     model: Path | None = None,
 ) -> None:
     """Run a new session in line mode or simulated, and print its results. Raises StudyError."""
+    confirm_free_handle(sitter, device)
     plan = plan_sitting(protocol_name, sitter.subject or _ask_subject(sitter), sitter.observer, seed, data, model)
     for note in plan.notes:
         typer.echo(f"Note: {note}", err=True)
@@ -58,7 +62,20 @@ def begin(
     show(end_sitting(end, RealClock().utc()), as_json)
 
 
-def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS) -> None:
+def confirm_free_handle(sitter: Sitter, device: str) -> None:
+    """Announce that a real device moves by itself for a simulated participant. Raises WrongUseError where that cannot
+    be confirmed."""
+    if sitter.observer is not None and needs_real_time(device):
+        announce(
+            f"A simulated participant ('{sitter.observer}') takes this session: the {device} moves by itself, for as "
+            "long as a session lasts. No person may hold the handle, and its workspace must be free.",
+            sitter.hands_off,
+        )
+
+
+def go_on(
+    session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS, hands_off: bool = False
+) -> None:
     """Resume a session in line mode or simulated, and print its results. Raises StudyError."""
     folder = find_session(session, data)
     if still_open := data_folder_warning(folder.path.parent):
@@ -68,6 +85,7 @@ def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys
     if state.closed:
         show(finish_closed(folder, folded), as_json)
         return
+    confirm_free_handle(Sitter(opened.observer, opened.subject, keys, hands_off), device)
     in_real_time = opened.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock.not_before(state.sitting.last.utc)
     _say_wait(opened.observer)

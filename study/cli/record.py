@@ -7,16 +7,8 @@ from typing import Annotated
 import typer
 
 from study.cli.seed import check_seed
-from study.cli.study import DeviceOption
+from study.cli.study import DeviceOption, HandsOffOption
 from study.errors import WrongUseError
-
-HandsOffOption = Annotated[
-    bool,
-    typer.Option(
-        "--hands-off",
-        help="For scripts, which cannot press Enter: no hand is on the handle of the real device, and none will be.",
-    ),
-]
 
 
 def record(

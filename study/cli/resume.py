@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.study import DataOption, DeviceOption, KeysOption, PlainOption
+from study.cli.study import DataOption, DeviceOption, HandsOffOption, KeysOption, PlainOption
 from study.tui.keys.answer_keys import parse_keys
 
 LOG_NAME = "events.jsonl"
@@ -20,6 +20,7 @@ def resume(
     plain: PlainOption = False,
     data: DataOption = Path("data"),
     keys: KeysOption = "1,2",
+    hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Go on with a session where it stopped. No answer is lost; a trial without an answer comes again."""
@@ -34,7 +35,7 @@ def resume(
         return
     from study.cli.conduct import go_on
 
-    go_on(session, device=device, data=data, as_json=as_json, keys=answer_keys)
+    go_on(session, device=device, data=data, as_json=as_json, keys=answer_keys, hands_off=hands_off)
 
 
 def _is_simulated(session: str, data: Path) -> bool:

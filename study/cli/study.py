@@ -13,6 +13,13 @@ DataOption = Annotated[Path, typer.Option("--data", help="Folder of all sessions
 DeviceOption = Annotated[
     str, typer.Option("--device", help="simulated, omega3, omega6, omega7, delta3, sigma7, or replay:FILE.h5.")
 ]
+HandsOffOption = Annotated[
+    bool,
+    typer.Option(
+        "--hands-off",
+        help="For scripts, which cannot press Enter: no hand is on the handle of the real device, and none will be.",
+    ),
+]
 KeysOption = Annotated[
     str, typer.Option(metavar="A,B", help="Keys that answer 1 and 2 beside the digits, such as f,j.")
 ]
@@ -49,6 +56,7 @@ def study(
         int | None, typer.Option(min=0, callback=check_seed, help="Seed of all draws; drawn and logged if not given.")
     ] = None,
     keys: KeysOption = "1,2",
+    hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Take the study: instructions, training, one staircase per frequency, thresholds and a report."""
@@ -69,7 +77,7 @@ def study(
     if observer is None and not plain and not has_keys():
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
-    sitter = Sitter(observer=observer, subject=subject, keys=answer_keys)
+    sitter = Sitter(observer=observer, subject=subject, keys=answer_keys, hands_off=hands_off)
     begin(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json, model=model)
 
 

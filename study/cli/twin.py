@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from study.cli.record import HandsOffOption, announce
+from study.cli.record import announce
 from study.cli.results import JsonOption
 from study.cli.seed import check_seed
-from study.cli.study import DeviceOption
+from study.cli.study import DeviceOption, HandsOffOption
 
 
 def twin(

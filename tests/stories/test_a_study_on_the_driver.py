@@ -36,7 +36,7 @@ def short_file(tmp_path, small_text):
 def test_a_simulated_participant_takes_a_study_on_the_driver(stub, short_file, tmp_path, capsys):
     stub.set("stiffness", 150)  # a hand that holds the handle
     stub.set("stretch_in_use", 20)  # the computer of the tests is busier than that of a lab
-    data = ("--data", str(tmp_path / "data"), "--device", "omega3", "--json")
+    data = ("--data", str(tmp_path / "data"), "--device", "omega3", "--hands-off", "--json")
     code = main(["study", "--protocol", str(short_file), "--observer", "ideal", "--seed", "5", *data])
     resumed = 0
     while code != 0 and resumed < RESUMED:  # a loop that stood still for 100 ms is a lost device: nothing is lost by it
@@ -96,7 +96,7 @@ def watch_it_let_go(stub) -> None:
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 22))])
 def test_a_program_that_is_killed_leaves_no_force_and_loses_no_answer(stub, short_file, tmp_path, seed):
     random = np.random.default_rng(seed)
-    data = ["--data", str(tmp_path / "data"), "--device", "omega3"]
+    data = ["--data", str(tmp_path / "data"), "--device", "omega3", "--hands-off"]
     arguments = ["study", "--protocol", str(short_file), "--observer", "ideal", "--seed", str(seed), *data]
     log, before, killed = tmp_path / "data" / "ideal1_001" / "events.jsonl", b"", 0
     for _ in range(2):
@@ -118,7 +118,7 @@ def test_a_program_that_is_killed_leaves_no_force_and_loses_no_answer(stub, shor
 def test_a_program_that_is_stopped_leaves_no_force_and_none_comes_back(stub, short_file, tmp_path):
     """Its loop hears no sign of life any more, and fades."""
     stub.set("stretch_in_use", 1000)  # the loop lets go, not the firmware
-    data = ["--data", str(tmp_path / "data"), "--device", "omega3"]
+    data = ["--data", str(tmp_path / "data"), "--device", "omega3", "--hands-off"]
     taking = Taking(["study", "--protocol", str(short_file), "--observer", "ideal", "--seed", "3", *data], stub)
     assert taking.await_force(), taking.end()
     taking.program.send_signal(signal.SIGSTOP)
@@ -152,7 +152,7 @@ def stays_zero(stub) -> bool:
 
 @pytest.mark.parametrize("how", [signal.SIGSTOP, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
 def test_a_loop_that_ends_leaves_no_force_and_the_study_ends_with_words_and_goes_on(stub, short_file, tmp_path, how):
-    data = ["--data", str(tmp_path / "data"), "--device", "omega3"]
+    data = ["--data", str(tmp_path / "data"), "--device", "omega3", "--hands-off"]
     arguments = ["study", "--protocol", str(short_file), "--observer", "ideal", "--seed", "3", *data]
     for _ in range(3):
         taking = Taking(arguments, stub)
@@ -218,7 +218,7 @@ class Trouble:
 def test_faults_that_come_and_go_void_trials_and_lose_no_answer(stub, short_file, tmp_path, switches, healthy, capsys):
     stub.set("stiffness", 150)  # a hand that holds the handle
     stub.set("stretch_in_use", 20)  # the computer of the tests is busier than that of a lab
-    data = ("--data", str(tmp_path / "data"), "--device", "omega3", "--json")
+    data = ("--data", str(tmp_path / "data"), "--device", "omega3", "--hands-off", "--json")
     trouble, answers, code = Trouble(stub, switches, healthy), 0, -1
     log = tmp_path / "data" / "ideal1_001" / "events.jsonl"
     try:

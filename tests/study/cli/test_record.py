@@ -87,6 +87,20 @@ def test_a_real_device_stays_still_from_a_script(stub, monkeypatch, tmp_path, ca
     assert (stub.safe, stub.get("peak_n")) == (True, 0)
 
 
+def test_no_simulated_participant_moves_a_real_device_from_a_script_without_that_word(
+    stub, monkeypatch, tmp_path, capsys
+):
+    from study.cli.main import main
+
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    data = ["--device", "omega3", "--data", str(tmp_path / "data")]
+    for observer in ([], ["--observer", "ideal"]):
+        assert main(["study", *observer, *data]) == 2
+        assert "A simulated participant ('ideal') takes this session" in capsys.readouterr().err
+    assert not (tmp_path / "data").exists()
+    assert (stub.safe, stub.get("peak_n")) == (True, 0)
+
+
 def test_a_recording_into_a_hand_is_not_one_with_hands_off(tmp_path):
     from study.cli.main import main
 
