@@ -12,7 +12,7 @@ from study.cli.progress import answer_count
 from study.cli.record import announce
 from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
-from study.devices.opening import needs_real_time
+from study.devices.opening import REAL, needs_real_time
 from study.errors import WrongUseError
 from study.store.disk.privacy import data_folder_warning
 from study.store.sessions.archive import check_subject, find_session
@@ -65,7 +65,7 @@ def begin(
 def confirm_free_handle(sitter: Sitter, device: str) -> None:
     """Announce that a real device moves by itself for a simulated participant. Raises WrongUseError where that cannot
     be confirmed."""
-    if sitter.observer is not None and needs_real_time(device):
+    if sitter.observer is not None and device in REAL:
         announce(
             f"A simulated participant ('{sitter.observer}') takes this session: the {device} moves by itself, for as "
             "long as a session lasts. No person may hold the handle, and its workspace must be free.",

@@ -34,6 +34,14 @@ ModelOption = Annotated[
     Path | None, typer.Option(help="Identified model MODEL.h5: stimuli are accelerations, equalized through it.")
 ]
 
+ObserverOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Let a simulated participant take it: ideal, lapsing, biased, guesser, alternator, always_1, "
+        "always_2, vibration_only, intensity_cue, delivered, repeating, "
+        "criterion_drift, drifting, scripted, or person (one of a simulated population)."
+    ),
+]
 PlainOption = Annotated[bool, typer.Option("--plain", help="Line mode; answers may also come from a pipe.")]
 
 
@@ -41,14 +49,7 @@ def study(
     protocol: ProtocolOption = None,
     device: DeviceOption = "simulated",
     subject: Annotated[str | None, typer.Option(help="Participant code, letters and digits.")] = None,
-    observer: Annotated[
-        str | None,
-        typer.Option(
-            help="Let a simulated participant take it: ideal, lapsing, biased, guesser, alternator, always_1, "
-            "always_2, vibration_only, intensity_cue, delivered, repeating, "
-            "criterion_drift, drifting, scripted, or person (one of a simulated population)."
-        ),
-    ] = None,
+    observer: ObserverOption = None,
     model: ModelOption = None,
     plain: PlainOption = False,
     data: DataOption = Path("data"),
