@@ -44,9 +44,10 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
         return result
     checked = keep_identifiable(context, found.found, time_left)
     is_open = len(checked.steps) < len(found.found.steps)
-    if is_open and checked.steps and _improves_held_out(checked):
+    fewer = _keep_rounds_of(found, checked) if is_open and _improves_held_out(checked) else None
+    if fewer is not None:
         # A law too weak for these recordings to fix its numbers takes no other law's name away.
-        found, is_open = _keep_rounds_of(found, checked), False
+        found, is_open = fewer, False
     rivals = _rivals(context, known)
     reasons = reasons_against(context, found, rivals)
     if not all(beats(found.found.after, rival) for rival in rivals):
@@ -107,8 +108,11 @@ def _candidates(context: SearchContext, found: Discovery, reasons: tuple[str, ..
             yield Unconfirmed(hypothesis, 0.0 if gain is None else max(gain.gain, 0.0), "; ".join(reasons), number)
 
 
-def _keep_rounds_of(of: Discovery, fewer: Explanation) -> Discovery:
-    """With an explanation that holds some of the laws, in their order, and the first rounds that found such."""
+def _keep_rounds_of(of: Discovery, fewer: Explanation) -> Discovery | None:
+    """With an explanation that holds some of the laws, in their order, and the first rounds that found such. None where
+    it holds no law, or one whose round is not known: the checks of a law are those of its round."""
+    if not fewer.steps:
+        return None
     kept = [_structure(law) for law in laws_of(fewer.after.fitted.hypothesis)[-len(fewer.steps) :]]
     claims = [_structure(law) for law in laws_of(of.found.after.fitted.hypothesis)[-len(of.found.steps) :]]
     rounds: list[Round] = []
@@ -118,7 +122,7 @@ def _keep_rounds_of(of: Discovery, fewer: Explanation) -> Discovery:
             rounds.append(each)
             kept = kept[size:]
         claims = claims[size:]
-    return replace(of, found=fewer, rounds=tuple(rounds))
+    return None if kept else replace(of, found=fewer, rounds=tuple(rounds))
 
 
 def _structure(law: Law | None) -> tuple[str, str, str] | None:

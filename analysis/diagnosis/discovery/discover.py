@@ -138,6 +138,8 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) 
 
 def _fit_sums(context: SearchContext, base: Fitted, sums: Sequence[Sum]) -> tuple[tuple[FittedCandidate, Sum], ...]:
     """The sums fitted by output error: the best one, and plainer ones that are as good, until they converge."""
+    if not sums:
+        return ()
     known = sensitivity_at(context, base.deviations, base.hypothesis)
     fits = [
         (fit(context.measure, context.tuning, start, known, FIRST_ROUNDS), each)

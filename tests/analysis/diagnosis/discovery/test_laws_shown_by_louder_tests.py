@@ -97,6 +97,26 @@ def test_a_law_too_weak_to_be_known_takes_no_other_laws_name_away(searched):
     assert [each.variables for each in laws_of(named.found.after.fitted.hypothesis)] == [("x",)]
 
 
+def test_a_law_whose_round_is_not_known_is_named_by_no_check(searched):
+    """A weak law was found after it, and its exponent was rounded since: its checks are those of no round by name."""
+    context, known, found = searched
+    weak = replace(law("p0*x*vx*abs(vx)", 1e-3), units=())
+    effect = law_effect(weak, law_channels(context.measure.records[0].recording))
+    alone = hypothesis_of_claim(Claim(effect, "one", (0,)), [law_values(weak)])
+    first, rounded = found.rounds[0].fitted_candidates[0], found.found.after.fitted
+    expressions = [laws_of(each.hypothesis)[0].expression for each in (first.fitted, rounded)]
+    assert expressions[0] != expressions[1]
+    start = evaluate_fit(context.measure, context.tuning, rounded.deviations, combine(rounded.hypothesis, alone))
+    both = context.with_test_score(context.candidate(refine(context, start)))
+    rounds = (found.rounds[0], Round((both,), (replace(found.rounds[0].sums[0], spread=1.0),), 0.5))
+    whole = replace(
+        found.found, after=both, steps=(first, both), rounds=tuple(each.fitted_candidates for each in rounds)
+    )
+    answer = weigh_laws(SearchResult(context, known, judge(known)), Discovery(whole, rounds), always)
+    assert not answer.judgement.named
+    assert answer.unconfirmed
+
+
 def test_shares_are_of_what_is_no_noise():
     first = Sum(0, (), (), cross_validated=1.01, without=1.13, spread=0.2, model_shift=())
     taken, by_chance = Round((), (first,), placebo=0.0076).shares_above_noise
