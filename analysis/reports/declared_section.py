@@ -3,7 +3,6 @@
 from analysis.psychophysics.declared_result import ContrastResult, DeclaredResult
 from analysis.reports.page import Section, Table
 from analysis.wording import NONE, p_text, p_value, signed_number
-from protocols.definition.declared_analysis import AnalysisSettings
 
 NAMES = {"hierarchical": "hierarchical model of all answers", "published": "published one-way analysis"}
 
@@ -24,8 +23,9 @@ def declared_words(result: DeclaredResult) -> tuple[str, ...]:
 
 
 def _anything_declared(result: DeclaredResult) -> bool:
-    declared = AnalysisSettings(result.primary, result.contrast_hz, result.participants_declared, result.exclusions)
-    return declared != AnalysisSettings()
+    return result.primary != "undeclared" or bool(
+        result.contrast_hz or result.participants_declared or result.exclusions
+    )
 
 
 def _sentence(row: ContrastResult, result: DeclaredResult) -> str:

@@ -50,10 +50,10 @@ def begin(
     model: Path | None = None,
 ) -> None:
     """Run a new session in line mode or simulated, and print its results. Raises StudyError."""
-    confirm_free_handle(sitter, device)
     plan = plan_sitting(protocol_name, sitter.subject or _ask_subject(sitter), sitter.observer, seed, data, model)
     for note in plan.notes:
         typer.echo(f"Note: {note}", err=True)
+    _confirm_free_handle(sitter.observer, device, sitter.hands_off)
     _say_wait(sitter.observer)
     in_real_time = sitter.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock()
@@ -62,14 +62,14 @@ def begin(
     show(end_sitting(end, RealClock().utc()), as_json)
 
 
-def confirm_free_handle(sitter: Sitter, device: str) -> None:
+def _confirm_free_handle(observer: str | None, device: str, hands_off: bool) -> None:
     """Announce that a real device moves by itself for a simulated participant. Raises WrongUseError where that cannot
     be confirmed."""
-    if sitter.observer is not None and device in REAL:
+    if observer is not None and device in REAL:
         announce(
-            f"A simulated participant ('{sitter.observer}') takes this session: the {device} moves by itself, for as "
-            "long as a session lasts. No person may hold the handle, and its workspace must be free.",
-            sitter.hands_off,
+            f"A simulated participant ('{observer}') takes this session: the {device} moves by itself, for as long as "
+            "a session lasts. No person may hold the handle, and its workspace must be free.",
+            hands_off,
         )
 
 
@@ -85,7 +85,7 @@ def go_on(
     if state.closed:
         show(finish_closed(folder, folded), as_json)
         return
-    confirm_free_handle(Sitter(opened.observer, opened.subject, keys, hands_off), device)
+    _confirm_free_handle(opened.observer, device, hands_off)
     in_real_time = opened.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock.not_before(state.sitting.last.utc)
     _say_wait(opened.observer)
