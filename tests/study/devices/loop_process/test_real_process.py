@@ -24,6 +24,9 @@ pytestmark = pytest.mark.real_time
 PATIENT = {"stretch_in_use": 1000}
 """The device's own watchdog waits: what lets go is the program."""
 
+CAME_TOO_LATE = "the program came too late for the device's watchdog"
+"""Of a force that is played, which ends with an error where one that is held has a fault."""
+
 PROGRAM_CLOSED, WATCHDOG = 4, 3
 """Why the force is off, as the device says."""
 
@@ -90,7 +93,7 @@ def holding(stub, rigs):
             if begun.holds(stub):
                 return begun
             said = begun.end()
-            assert said == "STALLED\n"
+            assert said == "STALLED\n" or CAME_TOO_LATE in said
         pytest.fail(f"none of {STARTS} programs held a force: {said}")
 
     yield start
