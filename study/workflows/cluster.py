@@ -54,12 +54,21 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
             with client.get_executor(pure=False) as executor:
                 yield executor
         except (KilledWorker, CommClosedError, CancelledError) as problem:
-            raise StudyError(
-                "The cluster did not do this",
-                f"{type(problem).__name__}: {problem}.",
-                "Look at the scheduler and its workers, then run the same command again: it goes on where it stopped.",
-                saved="What was finished is kept.",
-            ) from problem
+            raise _undone_error(problem) from problem
+        except (TypeError, ValueError) as problem:
+            # A future that is lost with its scheduler has no result, which distributed's executor tries to unpack.
+            if client.status == "running":
+                raise
+            raise _undone_error(problem) from problem
+
+
+def _undone_error(problem: BaseException) -> StudyError:
+    return StudyError(
+        "The cluster did not do this",
+        f"{type(problem).__name__}: {problem}.",
+        "Look at the scheduler and its workers, then run the same command again: it goes on where it stopped.",
+        saved="What was finished is kept.",
+    )
 
 
 def own_version() -> str:

@@ -79,6 +79,17 @@ def test_a_scheduler_that_is_lost_is_reported(plan, tmp_path):
     assert 1 < len(kept) < 7  # the plan, and some of six pieces
 
 
+@pytest.mark.timeout(120)
+def test_an_error_of_the_executor_is_a_lost_scheduler_only_where_one_is_lost():
+    here = distributed.LocalCluster(n_workers=1, host="127.0.0.1", dashboard_address="127.0.0.1:0")
+    with pytest.raises(ValueError, match="of the work itself"), cluster_workers(here.scheduler_address):
+        raise ValueError("of the work itself")
+    with here, pytest.raises(StudyError, match="did not do this"), cluster_workers(here.scheduler_address) as pool:
+        here.close()
+        pool.submit(len, ()).exception(timeout=60)
+        raise ValueError("too many values to unpack")
+
+
 def test_no_scheduler_is_reported_and_nothing_is_begun(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(cluster, "PATIENCE_S", 1.0)
     code = main(["power", "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "power"), "--subjects", "5"])
