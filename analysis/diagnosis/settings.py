@@ -95,6 +95,7 @@ CLOCK_LEAST_SHARE = 1e-3  # of the misfit that a trial of clock drift must take
 
 # What of a periodic recording laws are compared on first (`short_recordings`).
 RUN_IN_CONSTANTS = 7.0  # time constants of the model's run-in; principle: exp(-7) is below a thousandth
+RUN_IN_ERROR = 0.1  # error power that a run-in may add, of what is left to explain; by hand
 SHORT_SHARE = 0.7  # of the samples, above which the whole is simulated at once; by hand
 
 # Whether a further effect is looked for, and added (`explain`). By hand.

@@ -99,7 +99,7 @@ def refine_with_sensitivity(
     """The refined fit and its sensitivity. Where a drive repeats, it is first fitted to one period of each segment,
     whose sensitivity then stands for all periods. known: the sensitivity of a law that moves the device nearly
     alike."""
-    short_form = short_recordings_of(context, fitted.hypothesis)
+    short_form = short_recordings_of(context, fitted)
     if short_form is None:
         return _refine_from_both_starts(context, fitted, known)
     short = short_form.context

@@ -50,7 +50,7 @@ def fits_on_short_recordings(
     sampling times, which short recordings cannot judge."""
     short, guard = replace(short_form.context, measure=coarsen(short_form.context.measure)), context.guard
     there = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
-    known = sensitivity_at(short, base.deviations, base.hypothesis)
+    known = sensitivity_at(short, base.deviations, base.hypothesis, with_forces=True)
     screened = screen(short.measure, short.tuning, there, known, timeless, guard.over(short.map_, SCREENING))
 
     def whole(fitted: Fitted) -> Fitted:
@@ -202,10 +202,10 @@ def _find_next_effect(
     step.at(0.0)
     evidence = gather_evidence(context.measure, context.tuning, base)[0]
     told = [effect for effect in catalogue if context.measure.can_observe(effect)]
-    short_form = short_recordings_of(context, base.hypothesis)
+    short_form = short_recordings_of(context, base)
     if short_form is None:
         suggested = _suggest_hypotheses(context, base.hypothesis, told, evidence)
-        known = sensitivity_at(context, base.deviations, base.hypothesis)
+        known = sensitivity_at(context, base.deviations, base.hypothesis, with_forces=True)
         step.at(0.2)
         each = context.guard.over(context.map_, SCREENING)
         screened = screen(context.measure, context.tuning, base, known, suggested, each)

@@ -43,7 +43,7 @@ def final_errors(context: SearchContext, found: Explanation) -> FloatArray:
         return found.errors[1]
     fitted = evaluate_fit(context.measure, context.tuning, last.fitted.deviations, last.fitted.hypothesis)
     single = context.tuning.model.coordinates == 1
-    short_form = short_recordings_of(context, fitted.hypothesis)
+    short_form = short_recordings_of(context, fitted)
     near = context if short_form is None else short_form.context
     known = sensitivity_at(near, fitted.deviations, fitted.hypothesis, with_forces=single)
     known = known if short_form is None else short_form.repeat_sensitivity(known)

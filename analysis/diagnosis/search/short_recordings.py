@@ -15,15 +15,15 @@ from analysis.diagnosis.data.growth import growth_rate
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.output_error import Sensitivity
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, residuals_to_fit
 from analysis.diagnosis.forces.inverse_lines import zeros_of
 from analysis.diagnosis.forces.needed_force import band_motion
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.periods import settled_periods
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.settings import RUN_IN_CONSTANTS, SHORT_SHARE
+from analysis.diagnosis.settings import RUN_IN_CONSTANTS, RUN_IN_ERROR, SHORT_SHARE
 from analysis.diagnosis.types import Mask
+from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -59,6 +59,19 @@ class ShortRecordings:
     """Per record of the long measure that has any, the samples that are kept."""
     stands_in: Places
     """(samples to fit of the long measure,): which of the kept samples to fit stands for each."""
+    same: Places
+    """(kept samples to fit,): their places among the samples to fit of the long measure."""
+    whole: ErrorMeasure
+    """The long measure."""
+
+    def agrees(self, held: Fitted) -> bool:
+        """Whether the kept samples have nearly the errors that they have on the whole. held: fitted on the whole."""
+        short, tuning = self.context.measure, self.context.tuning
+        here = evaluate_fit(short, tuning, held.deviations, held.hypothesis)
+        there = residuals_to_fit(self.whole, held.residuals).reshape(len(self.stands_in), -1)[self.same]
+        with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that ran away
+            apart = residuals_to_fit(short, here.residuals) - there.ravel()
+            return float(np.mean(apart**2)) <= RUN_IN_ERROR * held.cost
 
     def repeat_sensitivity(self, known: Sensitivity) -> Sensitivity:
         """The sensitivity on the long measure, from that on one period of each segment."""
@@ -88,24 +101,41 @@ class ShortRecordings:
         )
 
 
-def short_recordings_of(context: SearchContext, held: Hypothesis) -> ShortRecordings | None:
+def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings | None:
     """The shortened recordings; None where little would be saved, where held effects depend on sampling times, and
-    where the first record, of which evidence is taken, has nothing to fit."""
+    where the first record, of which evidence is taken, has nothing to fit. held: fitted on the whole.
+
+    A force with a memory (dry friction, play) may remember what was cut out for longer than the linear model rings: the
+    run-in is doubled until the shortened recordings show the errors of the whole.
+    """
     measure = context.measure
     if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
         return None
-    if any(placed.effect.of_time for placed in (*measure.known, *held.placed_effects())):
+    placed = held.hypothesis.placed_effects()
+    if any(each.effect.of_time for each in (*measure.known, *placed)):
         return None
-    around = _run_in_s(measure, context.tuning.model)
-    cut = [_cut(record, around) for record in measure.records]
+    before_s, behind_s = _run_in_s(measure, context.tuning.model)
+    while (short := _shorten(context, measure, (before_s, behind_s))) is not None:
+        if not any(isinstance(each.effect.acts, (AxisForce, JointForce)) for each in placed) or short.agrees(held):
+            return short
+        before_s, behind_s = 2 * before_s, 2 * behind_s
+    return None
+
+
+def _shorten(
+    context: SearchContext, measure: FreeSimulation | PredictedForce, around_s: tuple[float, float]
+) -> ShortRecordings | None:
+    cut = [_cut(record, around_s) for record in measure.records]
     before = sum(len(record.command) for record in measure.records)
     if not len(cut[0].kept) or sum(len(each.kept) for each in cut) > SHORT_SHARE * before:
         return None
     short = _cut_in_pieces(measure, cut) if isinstance(measure, PredictedForce) else _splice(measure, cut)
     if short is None:
         return None
+    fitted = np.concatenate([each.fit[record.fit] for record, each in zip(measure.records, cut, strict=True)])
+    kept = tuple(each.kept for each in cut if len(each.kept))
     return ShortRecordings(
-        replace(context, measure=short), tuple(each.kept for each in cut if len(each.kept)), _replacements(measure, cut)
+        replace(context, measure=short), kept, _replacements(measure, cut), np.flatnonzero(fitted), measure
     )
 
 
