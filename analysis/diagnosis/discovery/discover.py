@@ -125,7 +125,8 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) 
         key=lambda item: _explained_squares(views, item),
         reverse=True,
     )
-    pairs = _fit_sums(context, base, _choose_sums_to_fit(_keep_close_to_best(_best_of_each_structure(every))))
+    chosen = _choose_sums_to_fit(_keep_close_to_best(_best_of_each_structure(every)))
+    pairs = _fit_sums(context, base, chosen, time_left)
     if not pairs:
         return None
     ranked = _put_plainest_first(context, pairs)
@@ -136,14 +137,16 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) 
     return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo)
 
 
-def _fit_sums(context: SearchContext, base: Fitted, sums: Sequence[Sum]) -> tuple[tuple[FittedCandidate, Sum], ...]:
-    """The sums fitted by output error: the best one, and plainer ones that are as good, until they converge."""
-    if not sums:
-        return ()
+def _fit_sums(
+    context: SearchContext, base: Fitted, sums: Sequence[Sum], time_left: TimeBudget
+) -> tuple[tuple[FittedCandidate, Sum], ...]:
+    """The sums fitted by output error: the best one, and plainer ones that are as good, until they converge. Without
+    time, the best of those that were begun."""
     known = sensitivity_at(context, base.deviations, base.hypothesis)
     fits = [
         (fit(context.measure, context.tuning, start, known, FIRST_ROUNDS), each)
         for each in sums
+        if time_left()
         for start in _starting_fits(context, base, each)
     ]
     fits.sort(key=lambda pair: pair[0].cost)

@@ -11,9 +11,16 @@ from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.search.explain import Explanation, explain, is_worthwhile
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
-from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
-from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge, shares_taken, worth_naming
+from analysis.diagnosis.search.verdict import (
+    Judgement,
+    as_good_as_noise,
+    is_confirmed,
+    judge,
+    shares_taken,
+    worth_naming,
+)
 from analysis.diagnosis.search.without_effect import without_effect
 from analysis.diagnosis.settings import LAST_EFFECT_SHARE, SEALED_ALONE_ERROR, SEALED_ALONE_TIMES
 from analysis.diagnosis.types import Progress, TimeBudget
@@ -101,16 +108,40 @@ def search_effects(
     samples are used."""
     found = _prune_guarded(context, explain(context, catalogue, progress, time_left), time_left)
     judged = _judge_with_prediction(context, found)
-    tried = beyond(SearchResult(context, found, judged, _remarks(found)))
-    if found.ended_early or found.barred or tried.judgement.named or not _shows_in_test_alone(found):
+    first = SearchResult(context, found, judged, _remarks(found))
+    opens = not (found.ended_early or found.barred) and _shows_in_test_alone(
+        found.after if judged.named else found.retuned
+    )
+    if opens and judged.named and (more := _find_with_half(first, catalogue, progress, time_left)) is not None:
+        return more
+    tried = beyond(first)
+    if not opens or judged.named or tried.judgement.named:
         return tried
-    half = context.open_half()
-    again = _prune_guarded(half, explain(half, catalogue, progress, time_left), time_left)
-    second = _judge_with_prediction(half, again)
-    if second.named:
-        return SearchResult(half, again, second, (TEST_HALF_USED, *_remarks(again)), unconfirmed=tried.unconfirmed)
+    second = _find_with_half(tried, catalogue, progress, time_left)
+    if second is not None:
+        return replace(second, unconfirmed=tried.unconfirmed)
     judged = replace(judged, verdict="unexplained")
     return replace(tried, judgement=judged, remarks=(NOT_SHOWN, *tried.remarks))
+
+
+def _find_with_half(
+    first: SearchResult, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> SearchResult | None:
+    """The search repeated with half of the held-out samples to fit and to choose by; None unless it names all that
+    the first did, and more, which the other half confirms."""
+    half = first.context.open_half()
+    found = _prune_guarded(half, explain(half, catalogue, progress, time_left), time_left)
+    judged = _judge_with_prediction(half, found)
+    before = first.found.after if first.judgement.named else first.found.retuned
+    if not judged.named or not _names(before) < _names(found.after):
+        return None
+    if not is_confirmed(half.with_test_score(before), found.after):
+        return None
+    return SearchResult(half, found, judged, (TEST_HALF_USED, *_remarks(found)))
+
+
+def _names(candidate: FittedCandidate) -> set[str]:
+    return {claim.effect.name for claim in candidate.fitted.hypothesis.claims}
 
 
 def _prune_guarded(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
@@ -140,9 +171,10 @@ def _judge_with_prediction(context: SearchContext, found: Explanation) -> Judgem
     return judged
 
 
-def _shows_in_test_alone(found: Explanation) -> bool:
-    shown = float(np.nanmax(found.retuned.score.test, initial=0.0))
-    return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * found.retuned.score.worst_channel
+def _shows_in_test_alone(candidate: FittedCandidate) -> bool:
+    """Whether held-out samples show a mismatch that the others do not."""
+    shown = float(np.nanmax(candidate.score.test, initial=0.0))
+    return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * candidate.score.worst_channel
 
 
 def hums_low(found: Explanation) -> bool:

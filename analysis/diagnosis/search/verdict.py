@@ -34,7 +34,7 @@ class Judgement:
 
 def judge(found: Explanation) -> Judgement:
     """The verdict by the samples to fit and to choose by; held-out ones can only withdraw a name, or `explained`."""
-    if not found.after.fitted.hypothesis.claims or not _is_confirmed(found):
+    if not found.after.fitted.hypothesis.claims or not is_confirmed(found.retuned, found.after):
         if found.before.score.worst_channel <= NOISE_ALONE:
             return Judgement("no_mismatch", False)
         return Judgement("parameters" if found.retuned.score.worst_channel <= NOISE_ALONE else "unexplained", False)
@@ -62,10 +62,9 @@ def worth_naming(found: Explanation) -> bool:
     return found.after.score.worst_channel <= NAMED_ERROR or share >= NAMED_SHARE or taken >= NAMED_GAIN
 
 
-def _is_confirmed(found: Explanation) -> bool:
-    """Whether the held-out samples confirm the explanation; yes where nothing was held out."""
-    without, with_it = (np.log(candidate.score.test) for candidate in (found.retuned, found.after))
-    whole, left = float(np.mean(without)), float(np.mean(with_it))
+def is_confirmed(without: FittedCandidate, with_it: FittedCandidate) -> bool:
+    """Whether the held-out samples confirm what `with_it` adds; yes where nothing was held out."""
+    whole, left = (float(np.mean(np.log(candidate.score.test))) for candidate in (without, with_it))
     if not np.isfinite(whole):
         return True
     return whole <= SEALED_TOO_SMALL or whole - left >= CONFIRMED_SHARE * whole

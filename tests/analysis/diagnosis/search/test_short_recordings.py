@@ -29,12 +29,16 @@ def lagging(arena_of):
     return arena_of((PlacedEffect(EFFECTS["amplifier_lag"], (0,), LAG),))
 
 
+def held(context, hypothesis=NOTHING):
+    return evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), hypothesis)
+
+
 def error(context, hypothesis):
-    return evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), hypothesis).cost
+    return held(context, hypothesis).cost
 
 
 def test_it_holds_one_period_of_each_segment_and_a_run_in(lagging):
-    short = short_recordings_of(lagging, NOTHING)
+    short = short_recordings_of(lagging, held(lagging))
     (record,), (long,) = short.context.measure.records, lagging.measure.records
     assert record.fit.sum() == 2 * 1000  # of three levels one is kept to choose by
     assert len(record.command) < 0.7 * len(long.command)
@@ -42,7 +46,7 @@ def test_it_holds_one_period_of_each_segment_and_a_run_in(lagging):
 
 
 def test_the_true_law_leaves_noise_alone_on_it_and_no_law_leaves_what_it_leaves_on_the_whole(lagging):
-    short = short_recordings_of(lagging, NOTHING).context
+    short = short_recordings_of(lagging, held(lagging)).context
     assert error(short, claim("amplifier_lag", **LAG)) == pytest.approx(
         error(lagging, claim("amplifier_lag", **LAG)), rel=0.05
     )
@@ -51,12 +55,12 @@ def test_the_true_law_leaves_noise_alone_on_it_and_no_law_leaves_what_it_leaves_
 
 def test_without_a_run_in_the_true_law_would_leave_more_than_noise(lagging, monkeypatch):
     monkeypatch.setattr(short_recordings, "RUN_IN_CONSTANTS", 0.0)
-    short = short_recordings_of(lagging, NOTHING).context
+    short = short_recordings_of(lagging, held(lagging)).context
     assert error(short, claim("amplifier_lag", **LAG)) > 1.5 * error(lagging, claim("amplifier_lag", **LAG))
 
 
 def test_evidence_is_cut_like_the_samples(lagging):
-    short = short_recordings_of(lagging, NOTHING)
+    short = short_recordings_of(lagging, held(lagging))
     base = evaluate_fit(lagging.measure, lagging.tuning, np.zeros(len(lagging.tuning.names)), NOTHING)
     (whole,) = lagging.measure.evidence(lagging.tuning.model, (), base.residuals)
     cut = short.of(whole)
@@ -66,11 +70,26 @@ def test_evidence_is_cut_like_the_samples(lagging):
 
 
 def test_there_is_none_where_what_is_held_hangs_on_the_time(lagging):
-    assert short_recordings_of(lagging, claim("sensor_drift", total=1.0, bend=0.0, start=0.0)) is None
+    drifting = claim("sensor_drift", total=1.0, bend=0.0, start=0.0)
+    assert short_recordings_of(lagging, held(lagging, drifting)) is None
+
+
+STUCK = {"level": 0.2, "stiffness": 400.0}
+
+
+@pytest.mark.parametrize("patient", [True, False])
+def test_friction_that_remembers_what_was_cut_out_gets_a_longer_run_in(arena_of, monkeypatch, patient):
+    if not patient:
+        monkeypatch.setattr(short_recordings, "RUN_IN_ERROR", np.inf)
+    rubbing = arena_of((PlacedEffect(EFFECTS["presliding_hysteresis"], (0,), STUCK),))
+    true = held(rubbing, claim("presliding_hysteresis", **STUCK))
+    short = short_recordings_of(rubbing, true)
+    assert (error(short.context, true.hypothesis) < 1.1 * true.cost) == patient
+    assert len(short.kept[0]) < 0.7 * len(rubbing.measure.records[0].command)
 
 
 def test_the_sensitivities_of_one_period_stand_for_those_of_all(lagging):
-    short, at = short_recordings_of(lagging, NOTHING), np.zeros(len(lagging.tuning.names))
+    short, at = short_recordings_of(lagging, held(lagging)), np.zeros(len(lagging.tuning.names))
     (record,) = lagging.measure.records
     whole = sensitivity(lagging.measure, lagging.tuning, at, NOTHING)
     found = short.repeat_sensitivity(sensitivity(short.context.measure, short.context.tuning, at, NOTHING))
@@ -99,7 +118,7 @@ def by_force(lagging):
 
 def apart_by_force(context):
     """(samples,): force that is missing in pieces, less that in the whole, over the latter's rms."""
-    short, measure = short_recordings_of(context, NOTHING), context.measure
+    short, measure = short_recordings_of(context, held(context)), context.measure
     pieces = short.context.measure.residuals(context.tuning.model, ())
     (whole,), places = measure.residuals(context.tuning.model, ()), np.split(short.kept[0], np.cumsum(lengths(short)))
     fits = [record.fit for record in short.context.measure.records]
@@ -112,7 +131,7 @@ def lengths(short):
 
 
 def test_forces_are_compared_stretch_by_stretch(by_force):
-    short = short_recordings_of(by_force, NOTHING)
+    short = short_recordings_of(by_force, held(by_force))
     assert len(short.context.measure.records) == 2
     assert len(short.kept[0]) < 0.7 * len(by_force.measure.records[0].command)
     assert np.abs(apart_by_force(by_force)).max() < 0.01
@@ -128,7 +147,7 @@ def test_a_period_cut_off_by_the_end_of_the_record_represents_no_other(lagging):
     ends = record.recording.segments[0].stop - 300
     cut = [getattr(record, name)[:ends] for name in ("command", "measured", "fit", "choose", "test")]
     context = replace(lagging, measure=lagging.measure.with_records((Observed(record.recording, *cut),)))
-    short = short_recordings_of(context, NOTHING)
+    short = short_recordings_of(context, held(context))
     assert short is None or short.stands_in.max() < sum(each.fit.sum() for each in short.context.measure.records)
 
 
