@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from protocols.definition.probes import probe_contradictions
 from protocols.definition.problem import Problem
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ ROUNDING_N = 1e-9
 
 def contradictions(protocol: StudyProtocol) -> list[Problem]:
     """All contradictions between tables of the protocol; empty if it is consistent."""
-    return [*_levels(protocol), *_times(protocol), *_names(protocol)]
+    return [*_levels(protocol), *_times(protocol), *_names(protocol), *probe_contradictions(protocol)]
 
 
 def _levels(protocol: StudyProtocol) -> list[Problem]:

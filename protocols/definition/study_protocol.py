@@ -17,6 +17,7 @@ from protocols.definition.preparation import (
     PracticeSettings,
     SetupSettings,
 )
+from protocols.definition.probes import ProbeSettings
 from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT, StaircaseRule
 from protocols.definition.study_contradictions import contradictions
@@ -271,6 +272,7 @@ class StudyProtocol:
     catch: CatchSettings = Field(default_factory=CatchSettings)
     gate: GateSettings = Field(default_factory=GateSettings)
     limits: SittingLimits = Field(default_factory=SittingLimits)
+    probes: ProbeSettings = Field(default_factory=ProbeSettings)
     analysis: AnalysisSettings = Field(default_factory=AnalysisSettings)
     debrief: Annotated[
         tuple[DebriefQuestion, ...], Field(max_length=20, description="Asked after the last run. Default: nothing.")

@@ -14,6 +14,7 @@ from protocols.definition.preparation import (
     PracticeSettings,
     SetupSettings,
 )
+from protocols.definition.probes import ProbeSettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.dumping import protocol_values
@@ -30,6 +31,7 @@ TABLES_SINCE = {
     "catch": CatchSettings(),
     "gate": GateSettings(),
     "limits": SittingLimits(),
+    "probes": ProbeSettings(),
     "analysis": AnalysisSettings(),
     "debrief": (),
 }

@@ -178,6 +178,11 @@ class Device(Protocol):
         """
         ...
 
+    def simulate_hand(self, on_handle: bool) -> None:
+        """The simulated hand of a simulated device lets go of the handle, or takes it again. Only while nothing is
+        played. Nothing at any other device; limits stay as they are in every case."""
+        ...
+
     def stop(self) -> None:
         """Emergency stop: no force from the next tick on, until the device is opened again.
 

@@ -68,6 +68,10 @@ def no_buttons() -> frozenset[int]:
     return frozenset()
 
 
+def no_hand(on_handle: bool) -> None:
+    """A device with no simulated hand."""
+
+
 def not_prepared(rows: FloatArray, repeats: bool, wait: int) -> None:
     """A device knows nothing of what is to come."""
 
@@ -91,6 +95,8 @@ class CompiledRig:
     prepare: Callable[[FloatArray, bool, int], None] = not_prepared
     """prepare(rows, repeats, wait): told before a stimulus begins, for a rig that only acts as if it were driven. rows
     (n, 3), N: played once or, if it `find_repeats`, again and again; the first comes after `wait` ticks."""
+    simulate_hand: Callable[[bool], None] = no_hand
+    """simulate_hand(on_handle): the simulated hand lets go, or takes the handle again."""
 
     def close(self) -> None:
         """Nothing to disconnect."""

@@ -22,7 +22,7 @@ from study.devices.drive.seen import look_of
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import VirtualDrive
 from study.devices.governor.governor import SETTLE_S, Governor
-from study.devices.rig import CompiledRig, Rig
+from study.devices.rig import CompiledRig, Rig, no_hand
 from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
@@ -47,6 +47,7 @@ class SafeDevice:
         if not isinstance(rig, CompiledRig):
             check_hardware(rig.drops_force_after_s, rig.info, settings)
         self._info = rig.info
+        self._simulated_hand = rig.simulate_hand if isinstance(rig, CompiledRig) else no_hand
         self._limits = settings.limits
         self._clock = clock
         self._ring = ring
@@ -113,6 +114,10 @@ class SafeDevice:
         fresh = not self._closing and self._drive.refresh()
         missed_ticks = self._governor.missed if self._held is not None or self._runner.moving else 0
         return look_of(self._runner.seen if fresh else None, missed_ticks)
+
+    def simulate_hand(self, on_handle: bool) -> None:
+        self._must_be_idle()
+        self._simulated_hand(on_handle)
 
     def stop(self) -> None:
         self._governor.ask_stop()

@@ -163,6 +163,9 @@ class RemoteDevice:
             return look
         return Look(None, None, sensor_clipped=False, buttons=frozenset(), missed_ticks=0)
 
+    def simulate_hand(self, on_handle: bool) -> None:
+        """Real devices have none."""
+
     def stop(self) -> None:
         if self._lost or self._ended:
             return

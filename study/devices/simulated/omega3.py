@@ -29,6 +29,13 @@ def build_omega3(seed: int, hand: bool, place_m: Vector = (0.0, 0.0, 0.0), frict
     if not math.dist(place_m, (0.0, 0.0, 0.0)) < parameters.stops.radius_m:
         raise ValueError(f"place_m must be within {parameters.stops.radius_m} m of the centre, not {place_m}")
     packed = pack_parameters(parameters, hand, place_m)
+    free, held = pack_parameters(parameters, False, place_m), packed.copy()
+
+    def simulate_hand(on_handle: bool) -> None:
+        """Only what the hand adds changes, not what a test has planted elsewhere."""
+        changed = free != held
+        packed[changed] = (held if on_handle and hand else free)[changed]
+
     info = DeviceInfo(
         name=NAME if friction else f"{NAME} without friction",
         simulated=True,
@@ -44,4 +51,5 @@ def build_omega3(seed: int, hand: bool, place_m: Vector = (0.0, 0.0, 0.0), frict
         noise=np.array(np.random.SeedSequence(seed).generate_state(1, np.uint64), dtype=np.uint64),
         sense=sense,
         advance=advance,
+        simulate_hand=simulate_hand,
     )

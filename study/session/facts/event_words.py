@@ -20,6 +20,8 @@ from study.session.facts.events import (
     OnsetPulsed,
     PauseTaken,
     PlaceTaken,
+    ProbeMeasured,
+    ProbePlayed,
     RestTaken,
     SessionClosed,
     SessionInterrupted,
@@ -94,7 +96,7 @@ def _describe_other(event: Event) -> str:
             return "The demonstration is over."
         case PauseTaken():
             return f"A pause of {_seconds(event.paused_s)}, asked for by the {event.who}."
-        case OnsetPulsed() | MaskingPlayed():
+        case OnsetPulsed() | MaskingPlayed() | ProbePlayed() | ProbeMeasured():
             return _describe_beside(event)
         case NoteTaken():
             return f"{'Adverse event' if event.adverse else 'Note'} by the {event.who}: {_one_line(event.text)}"
@@ -102,7 +104,9 @@ def _describe_other(event: Event) -> str:
             return f"{event.event.replace('_', ' ').capitalize()}."
 
 
-def _describe_beside(event: OnsetPulsed | MaskingPlayed) -> str:
+def _describe_beside(event: OnsetPulsed | MaskingPlayed | ProbePlayed | ProbeMeasured) -> str:
+    if isinstance(event, ProbePlayed | ProbeMeasured):
+        return _describe_probe(event)
     if isinstance(event, OnsetPulsed):
         sent = "was sent" if event.pulsed_s is not None else f"was lost: {_one_line(event.trouble)}"
         return f"Onset pulse, {_one_line(event.line)}: {sent}."
@@ -112,6 +116,21 @@ def _describe_beside(event: OnsetPulsed | MaskingPlayed) -> str:
         return "The masking noise was stopped."
     band = f"{event.low_hz:g} to {event.high_hz:g} Hz"
     return f"Masking noise on {_one_line(event.output)}: {event.level_db:g} dB, {band}, seed {event.seed}."
+
+
+PROBES = {
+    "hand": "Probe with the hand on the handle",
+    "free": "Test whether the handle is free",
+    "reference": "Reference without a hand",
+}
+
+
+def _describe_probe(event: ProbePlayed | ProbeMeasured) -> str:
+    if isinstance(event, ProbePlayed):
+        return f"{PROBES[event.kind]}, number {event.number + 1}: {event.level_n:.3g} N."
+    kept = "kept" if event.recording else "not kept"
+    why = f": {_one_line(event.trouble)}" if event.trouble else ""
+    return f"The probe, number {event.number + 1}, was {kept}{why}."
 
 
 def _describe_sitting(event: SessionOpened | SessionResumed | SessionInterrupted | SessionClosed) -> str:

@@ -40,6 +40,8 @@ from study.session.facts.sitting_events import (
     OnsetPulsed,
     PauseTaken,
     PlaceTaken,
+    ProbeMeasured,
+    ProbePlayed,
     RestTaken,
     SessionClosed,
 )
@@ -60,6 +62,8 @@ __all__ = [
     "OnsetPulsed",
     "PauseTaken",
     "PlaceTaken",
+    "ProbeMeasured",
+    "ProbePlayed",
     "RestTaken",
     "SessionClosed",
     "SessionInterrupted",
@@ -234,6 +238,8 @@ Event = (
     | NoteTaken
     | MaskingPlayed
     | OnsetPulsed
+    | ProbePlayed
+    | ProbeMeasured
     | SessionInterrupted
     | SessionResumed
     | SessionClosed

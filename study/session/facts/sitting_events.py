@@ -5,7 +5,18 @@ from typing import Literal
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
-from study.session.facts.fact_types import AngleDeg, Count, ForceN, FrequencyHz, Index, Magnitude, Seconds, UtcTime
+from study.session.facts.fact_types import (
+    AngleDeg,
+    Count,
+    ForceN,
+    FrequencyHz,
+    Index,
+    Magnitude,
+    RecordingPath,
+    Seconds,
+    Sha256,
+    UtcTime,
+)
 
 FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -92,6 +103,40 @@ class OnsetPulsed:
     trouble: str = ""
     monotonic_s: Seconds | None = None
     event: Literal["onset_pulsed"] = "onset_pulsed"
+
+
+@dataclass(frozen=True, config=FACT)
+class ProbePlayed:
+    """A known force between trials, written before the device moves."""
+
+    utc: UtcTime
+    number: Index
+    """Counts all probes of the session, from 0."""
+    kind: Literal["hand", "free", "reference"]
+    """With a hand; as a test whether the handle is free; the reference."""
+    level_n: ForceN
+    """Peak of the norm."""
+    monotonic_s: Seconds | None = None
+    event: Literal["probe_played"] = "probe_played"
+
+
+@dataclass(frozen=True, config=FACT)
+class ProbeMeasured:
+    """What came of the probe that was played last. One without this line was cut off by the program's end."""
+
+    utc: UtcTime
+    number: Index
+    vibrated_s: Seconds
+    recording: RecordingPath | None = None
+    sha256: Sha256 | None = None
+    rms_mps2: Magnitude | None = None
+    """Of the measured acceleration, all axes together; null where nothing was kept."""
+    apparent_mass_kg: Magnitude | None = None
+    """Force over acceleration at its upper lines: a hand on the handle adds to it."""
+    trouble: str = ""
+    """Why nothing was kept of it, or what speaks against using it."""
+    monotonic_s: Seconds | None = None
+    event: Literal["probe_measured"] = "probe_measured"
 
 
 @dataclass(frozen=True, config=FACT)

@@ -1,5 +1,6 @@
 """A session as the fold of its events: `begin_session` in `state` takes the first, `apply` each of the others."""
 
+import math
 from dataclasses import replace
 
 from study.session.facts.events import (
@@ -10,7 +11,10 @@ from study.session.facts.events import (
     Event,
     FormFilled,
     NoteTaken,
+    PauseTaken,
     PlaceTaken,
+    ProbeMeasured,
+    ProbePlayed,
     RestTaken,
     SessionClosed,
     SessionInterrupted,
@@ -24,6 +28,7 @@ from study.session.facts.log_time import Moment
 from study.session.state.daily_dose import with_dose_elsewhere
 from study.session.state.draw_check import LogContradiction
 from study.session.state.fold_trial import answer_trial, measure_trial, present_trial, spoil_trial
+from study.session.state.probing import STRONGEST_WEIGHT_HZ, ProbingState, after_break, begin_probe, end_probe
 from study.session.state.rules import place_comes_later
 from study.session.state.sitting_state import (
     SittingState,
@@ -68,6 +73,10 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
     match event:
         case RestTaken():
             return _rest(state, event)
+        case PauseTaken():
+            return _with_probing(state, after_break(state.sitting.probing, event, state.protocol.probes))
+        case ProbePlayed() | ProbeMeasured():
+            return _probe(state, event)
         case FormFilled() | DeviceChecked() | DemoPlayed() | DemoFinished():
             return _apply_preparation(state, event)
         case SessionResumed():
@@ -79,14 +88,35 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
             return _close(state, event)
         case SessionOpened():
             raise LogContradiction("a session cannot be opened twice")
-        case _:  # notes, pauses and interruptions change nothing
+        case _:  # notes and interruptions change nothing
             return state
 
 
 def _rest(state: SessionState, event: RestTaken) -> SessionState:
     if state.rest_due_s <= 0:
         raise LogContradiction(f"a rest before trial {event.trial} of run {event.run}, where none was due")
-    return replace(state, rest_due_s=0.0)
+    rested = _with_probing(state, after_break(state.sitting.probing, event, state.protocol.probes))
+    return replace(rested, rest_due_s=0.0)
+
+
+def _with_probing(state: SessionState, probing: ProbingState) -> SessionState:
+    return replace(state, sitting=replace(state.sitting, probing=probing))
+
+
+def _probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> SessionState:
+    """Never within a trial: what a hand feels in one is the trial's own stimulus and nothing else."""
+    if state.presented is not None:
+        raise LogContradiction(f"{event.event} while a trial is open")
+    probing = state.sitting.probing
+    if isinstance(event, ProbePlayed):
+        moved = start_motion(state.sitting) if event.kind == "hand" else state.sitting
+        return replace(state, sitting=replace(moved, probing=begin_probe(probing, event, state.protocol.probes)))
+    after = _with_probing(state, end_probe(probing, event))
+    if probing.open is None or probing.open.kind != "hand":
+        return after
+    amplitude_mps2 = None if event.rms_mps2 is None else math.sqrt(2) * event.rms_mps2
+    sitting = add_exposure(after.sitting, STRONGEST_WEIGHT_HZ, amplitude_mps2, event.vibrated_s)
+    return replace(after, sitting=sitting)
 
 
 def _take_place(state: SessionState, event: PlaceTaken) -> SessionState:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from study.session.facts.log_time import Moment
 from study.session.state.due_trial import Present
+from study.session.state.probing import Probe, Reference, due_probe, due_reference
 from study.session.state.sitting_state import dose_now, pass_time
 from study.session.state.state import SessionState, due
 from study.session.state.vibration_dose import a8_mps2
@@ -45,7 +46,7 @@ class Finish:
 
 
 Preparation = FillIn | CheckDevice | Leave
-Action = Demonstrate | Present | Rest | FillIn | Leave | Finish
+Action = Demonstrate | Present | Probe | Reference | Rest | FillIn | Leave | Finish
 
 
 def next_preparation(state: SessionState) -> Preparation | None:
@@ -80,11 +81,12 @@ def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = 
         return FillIn(form) if form is not None and not state.closed else Finish()
     if person and utc and (reason := limit_reached(state, utc, monotonic_s)):
         return Leave(reason)
+    probing, probes = state.sitting.probing, state.protocol.probes
     if person and state.protocol.demo.level_n > 0 and not state.sitting.demo_done and not state.trials:
         return Demonstrate()
     if state.rest_due_s > 0:
         return Rest(seconds=state.rest_due_s)
-    return due(state)
+    return due_reference(probing, probes) or due_probe(probing, probes) or due(state)
 
 
 def limit_reached(state: SessionState, utc: str, monotonic_s: float | None = None) -> str:

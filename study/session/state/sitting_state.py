@@ -8,6 +8,7 @@ from typing import Literal
 from protocols.trial import Trial
 from study.session.facts.log_time import ClockStep, Moment, clock_step, elapsed_s
 from study.session.facts.sitting_events import DemoFinished, DeviceChecked, FormFilled
+from study.session.state.probing import ProbingState
 from study.session.state.vibration_dose import NO_DOSE, Dose, add, total
 
 
@@ -57,6 +58,7 @@ class SittingState:
     """The last long rest."""
     clock_steps: tuple[ClockStep, ...] = ()
     """Where the computer's wall clock was set."""
+    probing: ProbingState = ProbingState()  # noqa: RUF009 - frozen
 
 
 NIGHT_H = 10.0
@@ -100,6 +102,7 @@ def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
         busy_voids=0,
         turned_away="",
         answers_before=answers,
+        probing=replace(sitting.probing, since_s=None, referenced=False, open=None, hand_mass_kg=None),
     )
 
 
@@ -108,9 +111,11 @@ def pass_time(sitting: SittingState, now: Moment, resumed: bool = False) -> Sitt
     earlier ones."""
     last = Moment(sitting.last.utc) if resumed else sitting.last
     passed, step = elapsed_s(last, now), clock_step(last, now, between_sittings=resumed)
+    since_s = sitting.probing.since_s
     later = replace(
         sitting,
         last=now,
+        probing=replace(sitting.probing, since_s=None if since_s is None else since_s + passed),
         sat_s=None if sitting.sat_s is None else sitting.sat_s + passed,
         still_s=None if sitting.still_s is None else sitting.still_s + passed,
     )

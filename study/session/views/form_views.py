@@ -9,6 +9,8 @@ class FormKind(Enum):
     EXCLUSION = "exclusion"
     SETUP = "setup"
     DEBRIEF = "debrief"
+    HANDLE = "handle"
+    """Whether it is free, or held again: asked around a reference, and logged with it."""
 
 
 @dataclass(frozen=True, slots=True)

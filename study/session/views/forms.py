@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from protocols.definition.preparation import ConsentSettings, DebriefQuestion, SetupSettings
+from protocols.definition.probes import ProbeSettings
 from protocols.definition.study_protocol import StudyProtocol
 from study.session.views.form_views import Form, FormField, FormKind, FormReply
 
@@ -23,13 +24,15 @@ def form_of(protocol: StudyProtocol, kind: FormKind) -> Form | None:
     """The form; None if the protocol asks nothing of that kind."""
     match kind:
         case FormKind.CONSENT:
-            return _consent(protocol.consent) if protocol.consent.statements else None
+            return _consent(protocol) if protocol.consent.statements or protocol.probes.played else None
         case FormKind.EXCLUSION:
             return _exclusion(protocol.consent) if protocol.consent.exclusions else None
         case FormKind.SETUP:
             return _setup(protocol.setup) if protocol.setup.ask else None
         case FormKind.DEBRIEF:
             return _debrief(protocol.debrief) if protocol.debrief else None
+        case FormKind.HANDLE:
+            return _let_go(protocol) if protocol.probes.reference_s > 0 else None
 
 
 def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> FormOutcome:
@@ -47,6 +50,8 @@ def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> For
             return FormOutcome(True, answers, _reminder(protocol.setup, answers))
         case FormKind.DEBRIEF:
             return FormOutcome(True, {key: answer for key, answer in answers.items() if answer})
+        case FormKind.HANDLE:
+            return FormOutcome(answers.get("free") == "yes", {})
 
 
 def confirmation_of(form: Form, reply: FormReply) -> Form:
@@ -70,10 +75,12 @@ def is_confirmed(reply: FormReply) -> bool:
     return reply.answers.get("right", "").strip() == "yes"
 
 
-def _consent(settings: ConsentSettings) -> Form:
+def _consent(protocol: StudyProtocol) -> Form:
+    """Probes are consented to by a statement of their own, which no protocol can leave out."""
+    settings = protocol.consent
+    statements = (*settings.statements, *probe_statements(protocol.probes))
     fields = tuple(
-        FormField(f"statement_{number}", statement, YES_NO)
-        for number, statement in enumerate(settings.statements, start=1)
+        FormField(f"statement_{number}", statement, YES_NO) for number, statement in enumerate(statements, start=1)
     )
     return Form(
         FormKind.CONSENT,
@@ -82,6 +89,38 @@ def _consent(settings: ConsentSettings) -> Form:
         fields,
         settings.version,
         settings.ethics_id,
+    )
+
+
+def probe_statements(probes: ProbeSettings) -> tuple[str, ...]:
+    """What a participant agrees to beside the trials."""
+    if not probes.levels_n:
+        return ()
+    often = f"at most once in {probes.interval_s:g} seconds"
+    return (
+        f"Between trials, {often}, the handle may shake weakly for under two seconds (at most {max(probes.levels_n):g} "
+        "newtons), so that the device and my grip can be measured. Nothing is asked about it.",
+    )
+
+
+def _let_go(protocol: StudyProtocol) -> Form:
+    probes = protocol.probes
+    return Form(
+        FormKind.HANDLE,
+        "Let go of the handle",
+        f"Take the hand off the handle and keep it away. It will shake for {probes.reference_s + 3:.0f} seconds, "
+        f"with at most {probes.reference_n:g} newtons.",
+        (FormField("free", "Is the handle free, and does nothing touch it?", ("yes", "not now")),),
+    )
+
+
+def take_the_handle() -> Form:
+    """After a reference."""
+    return Form(
+        FormKind.HANDLE,
+        "Take the handle again",
+        "The measurement without a hand is over.",
+        (FormField("held", "Do you hold the handle as before?", ("yes",)),),
     )
 
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 Activity = Literal[
-    "preparing", "form", "instructions", "demo", "waiting for the handle", "trial", "rest", "pause", "idle"
+    "preparing", "form", "instructions", "demo", "waiting for the handle", "trial", "rest", "pause", "idle",
+    "probe", "reference",
 ]  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from study.session.watching.watched import Watched
 
 SILENT_AFTER_S = 3.0
 """`live.json` is written about four times a second; a slow disk may delay it by a second or two."""
-_LIVELY = ("demo", "waiting for the handle", "rest")
+_LIVELY = ("demo", "waiting for the handle", "rest", "probe", "reference")
 """Activities during which the session writes `live.json` continuously; not while a form or a notice is read."""
 HANDLE_AWAY_S = 2.0
 UNANSWERED_S = 60.0

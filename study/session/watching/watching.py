@@ -121,6 +121,8 @@ _WORDS = {
     "rest": "resting",
     "pause": "pausing",
     "idle": "between two trials",
+    "probe": "a probe between two trials",
+    "reference": "the reference, hands off the handle",
 }
 
 

@@ -11,6 +11,7 @@ from study.session.facts.events import RestTaken, SessionClosed, SessionInterrup
 from study.session.facts.void_reasons import busy_sentence, why_too_many
 from study.session.state.due_trial import Present, labels_are_swapped
 from study.session.state.machine import Action, Demonstrate, FillIn, Finish, Leave, Rest, next_action
+from study.session.state.probing import Probe, Reference
 from study.session.state.progress import progress
 from study.session.state.state import SessionState, felt
 from study.session.views.archive_views import TURNED_AWAY
@@ -23,6 +24,7 @@ from study.workflows.session.prepare_sitting import fill_in, prepare_sitting, tu
 from study.workflows.trial.after_trial import AfterTrial
 from study.workflows.trial.demonstrate import demonstrate
 from study.workflows.trial.masking import check_masking, start_masking, stop_masking
+from study.workflows.trial.play_probe import play_probe, play_reference
 from study.workflows.trial.present_trial import present_trial
 from study.workflows.trial.sitting import Sitting, record, tell, write_notes
 from study.workflows.trial.take_pause import take_pause
@@ -130,7 +132,8 @@ def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
             seal_log(sitting.folder.log)
             return SessionEnd(state, left="")
         after = _act(state, action, sitting)
-        voids = (*voids, after.void) if after.void else ()
+        if not isinstance(action, Probe | Reference):  # these neither void anything nor end a row of void trials
+            voids = (*voids, after.void) if after.void else ()
         if len(voids) >= VOID_TRIALS_IN_A_ROW:
             after = replace(after, leave=after.leave or why_too_many(voids))
         pause = _pause_wanted(after, sitting)
@@ -163,6 +166,12 @@ def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
             if not after.leave:
                 _finish_trial(after, present, state, sitting)
             return after
+        case Probe():
+            after = play_probe(state, action, sitting)
+            sitting.clock.sleep(state.protocol.trial.pause_between_s)
+            return after
+        case Reference():
+            return play_reference(state, sitting)
         case Finish():
             return AfterTrial(state)
 

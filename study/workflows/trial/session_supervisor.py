@@ -13,7 +13,7 @@ from study.workflows.trial.requests_port import Requests
 LIVE_EVERY_S = 0.25
 """Often enough for a viewer, with little load on the disk."""
 
-PLAYING = ("trial", "demo")
+PLAYING = ("trial", "demo", "probe", "reference")
 
 
 class SessionSupervisor:

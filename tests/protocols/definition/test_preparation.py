@@ -7,6 +7,7 @@ import pytest
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings
 from protocols.definition.preparation import MaskingSettings, PracticeSettings
+from protocols.definition.probes import ProbeSettings
 from protocols.document.hashing import TABLES_SINCE, protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
 from protocols.procedure.practice import PracticeState, add_answer, practice_over, practice_passed, right_of_last
@@ -89,8 +90,9 @@ def test_absent_tables_leave_an_old_fingerprint_alone(small_protocol):
 
 @pytest.mark.parametrize("table", sorted(TABLES_SINCE))
 def test_a_table_that_is_used_counts(small_protocol, table, threshold):
-    used = replace(small_protocol, **{table: _other(table, threshold)})
-    assert protocol_hash(used) != protocol_hash(small_protocol)
+    kept = replace(small_protocol, measurement=threshold.measurement)
+    used = replace(kept, **{table: _other(table, threshold)})
+    assert protocol_hash(used) != protocol_hash(kept)
 
 
 def _other(table, threshold):
@@ -102,6 +104,8 @@ def _other(table, threshold):
         return CatchSettings(one_in=20)
     if table == "masking":
         return MaskingSettings(play=True)
+    if table == "probes":
+        return ProbeSettings(levels_n=(0.5,))
     if table == "limits":
         return replace(threshold.limits, longest_min=60.0)
     return getattr(threshold, table)

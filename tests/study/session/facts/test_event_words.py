@@ -20,6 +20,8 @@ from study.session.facts.events import (
     OnsetPulsed,
     PauseTaken,
     PlaceTaken,
+    ProbeMeasured,
+    ProbePlayed,
     RestTaken,
     SessionClosed,
     SessionInterrupted,
@@ -85,6 +87,9 @@ SENTENCES = [
     ),
     (OnsetPulsed(UTC, 0, 1, 0, "DTR of COM3", 2.5), "Onset pulse, DTR of COM3: was sent."),
     (OnsetPulsed(UTC, 0, 1, 0, "DTR", None, "gone"), "Onset pulse, DTR: was lost: gone."),
+    (ProbePlayed(UTC, 4, "hand", 0.4), "Probe with the hand on the handle, number 5: 0.4 N."),
+    (ProbeMeasured(UTC, 4, 1.6, trouble="3 ticks late"), "The probe, number 5, was not kept: 3 ticks late."),
+    (ProbeMeasured(UTC, 4, 1.6, "recordings/probe-004.h5"), "The probe, number 5, was kept."),
     (NoteTaken(UTC, "experimenter", "door\nslammed"), "Note by the experimenter: door slammed"),
     (NoteTaken(UTC, "experimenter", "numb thumb", adverse=True), "Adverse event by the experimenter: numb thumb"),
 ]

@@ -1,0 +1,84 @@
+"""A probe's answer line by line: force and acceleration at the lines that drive each axis, and what lies between."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+ComplexArray = npt.NDArray[np.complex128]
+IntArray = npt.NDArray[np.int64]
+
+DRIVEN_SHARE = 0.1
+"""Of an axis' strongest line: what is weaker was not driven, but comes from rounding and spring."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProbeLines:
+    """Means over the whole periods of one probe. Spectra are amplitudes: a cosine of 1 N has 1 N."""
+
+    frequency_hz: FloatArray
+    """(lines,): of all lines, driven or not, without that of zero."""
+    driven: npt.NDArray[np.bool_]
+    """(lines, axes)"""
+    force_n: ComplexArray
+    """(lines, axes): what was sent, spring and damper included."""
+    acceleration_mps2: ComplexArray
+    """(lines, axes)"""
+    position_m: ComplexArray
+    """(lines, axes): encoders; NaN where there are none."""
+
+
+def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
+    """Raises ValueError where less than a period was kept, or samples are missing."""
+    period = round(period_s * recording.sample_rate_hz)
+    decided = recording.command if recording.excitation is None else recording.excitation
+    first, last = 0, len(recording)
+    if recording.segments:
+        first, last = recording.segments[0].start, recording.segments[0].stop
+    if last - first > 2 * period:  # the first of many periods holds the transient
+        first += period
+    excitation, force, acceleration = (
+        _mean_spectrum(each.samples[first:last], period) for each in (decided, recording.command, recording.response)
+    )
+    if not np.isfinite(force).all() or not np.isfinite(acceleration).all():
+        raise ValueError("samples of it are missing")
+    position = np.full(force.shape, np.nan, dtype=complex)
+    if recording.position is not None and recording.position.samples.shape[1] == force.shape[1]:
+        position = _mean_spectrum(recording.position.samples[first:last], period)
+    size = np.abs(excitation)
+    return ProbeLines(
+        frequency_hz=np.arange(1, len(force) + 1) / period_s,
+        driven=size > DRIVEN_SHARE * size.max(axis=0),
+        force_n=force,
+        acceleration_mps2=acceleration,
+        position_m=position,
+    )
+
+
+def apparent_mass_kg(lines: ProbeLines, from_hz: float = 30.0) -> float:
+    """Median of the real part of force over acceleration along each driven axis, from `from_hz` on, where neither
+    friction nor springs matter much: a hand on the handle adds to it."""
+    rows, axes = np.nonzero(lines.driven & (lines.frequency_hz >= from_hz)[:, None])
+    return float(np.median((lines.force_n[rows, axes] / lines.acceleration_mps2[rows, axes]).real))
+
+
+def even_share(lines: ProbeLines, to_hz: float) -> float:
+    """Even distortion with noise: rms of the acceleration on even lines over that on the driven ones, up to to_hz."""
+    number = np.arange(1, len(lines.frequency_hz) + 1)
+    here = lines.frequency_hz <= to_hz
+    even = np.abs(lines.acceleration_mps2[here & (number % 2 == 0)]) ** 2
+    driven = np.abs(lines.acceleration_mps2[here & lines.driven.any(axis=1)]) ** 2
+    return float(np.sqrt(even.sum() / driven.sum()))
+
+
+def _mean_spectrum(samples: FloatArray, period: int) -> ComplexArray:
+    """(lines, axes), without the line of zero and half the rate."""
+    whole = len(samples) // period
+    if not whole:
+        raise ValueError("less than one period of it was kept")
+    mean = samples[len(samples) - whole * period :].reshape(whole, period, -1).mean(axis=0)
+    spectrum: ComplexArray = (2 / period * np.fft.rfft(mean, axis=0))[1 : period // 2]
+    return spectrum

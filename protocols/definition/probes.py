@@ -1,0 +1,106 @@
+"""Short known forces between trials, and a reference without a hand: what the device and the grip are at the time."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Self
+
+from pydantic import Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from protocols.definition.problem import Problem, refuse
+from protocols.definition.staircase_rule import STRICT
+
+if TYPE_CHECKING:
+    from protocols.definition.study_protocol import StudyProtocol
+
+PERIOD_S = 1.0
+"""Period of a probe's multisine: its odd lines lie 2 Hz apart, and each of them drives a single axis."""
+
+FROM_HZ = 3.0
+"""Lowest line: below it the accelerometer sees next to nothing of forces that are hardly felt."""
+
+LevelN = Annotated[float, Field(gt=0, le=1.5)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class ProbeSettings:
+    """Odd multisines on all three axes at once. The only forces of a session that no trial asks about."""
+
+    levels_n: Annotated[
+        tuple[LevelN, ...],
+        Field(
+            max_length=6,
+            description="Peaks of the force of the probes with a hand on the handle, in newtons, in turn: friction is "
+            "told from damping by how the answer depends on the level. Three levels, such as [0.2, 0.4, 0.8]. "
+            "Default: none, and nothing is played between trials.",
+        ),
+    ] = ()
+    probe_cap_n: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=1.5,
+            description="No probe with a hand on the handle is stronger; below staircase.cap_n. Default 1.",
+        ),
+    ] = 1.0
+    interval_s: Annotated[
+        float,
+        Field(ge=15, le=3600, description="Shortest time from one probe to the next. Default 60: once a minute."),
+    ] = 60.0
+    to_hz: Annotated[float, Field(ge=20, le=150, description="No line lies above. Default 60.")] = 60.0
+    reference_s: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=120,
+            description="Length of the reference, played while no hand is on the handle, at the start of a sitting and "
+            "after long pauses. 20 is enough. Default 0: no reference.",
+        ),
+    ] = 0.0
+    reference_n: Annotated[
+        float, Field(gt=0, le=1.5, description="Its peak; not above staircase.cap_n. Default 1.")
+    ] = 1.0
+    reference_after_pause_s: Annotated[
+        float,
+        Field(ge=0, le=36000, description="A pause of this length or longer is followed by another. Default 120."),
+    ] = 120.0
+
+    @model_validator(mode="after")
+    def _within_the_cap(self) -> Self:
+        if self.levels_n and max(self.levels_n) > self.probe_cap_n:
+            wrong = f"holds {max(self.levels_n):g} N, above probe_cap_n"
+            refuse([Problem("levels_n", wrong, f"at most {self.probe_cap_n:g} N each")])
+        if self.reference_s and not self.levels_n:
+            wrong = "is set without levels_n: only beside a probe with a hand is a free handle seen to be free"
+            refuse([Problem("reference_s", wrong, "0, or levels_n beside it")])
+        return self
+
+    @property
+    def played(self) -> bool:
+        """Whether there are probes, with or without references."""
+        return bool(self.levels_n)
+
+
+def probe_contradictions(protocol: StudyProtocol) -> list[Problem]:
+    """Problems of the probes beside the rest of the protocol: strength, steepness, and what is kept of them."""
+    probes, cap_n = protocol.probes, protocol.staircase.cap_n
+    if not probes.played:
+        return []
+    problems = []
+    if probes.probe_cap_n >= cap_n:
+        wrong = f"is {probes.probe_cap_n:g} N, not below staircase.cap_n"
+        problems.append(Problem("probes.probe_cap_n", wrong, f"less than {cap_n:g} N"))
+    if probes.reference_s and probes.reference_n > cap_n:
+        wrong = f"is {probes.reference_n:g} N, above staircase.cap_n"
+        problems.append(Problem("probes.reference_n", wrong, f"at most {cap_n:g} N"))
+    if protocol.measurement.keep_s < PERIOD_S:
+        wrong = f"is {protocol.measurement.keep_s:g} s, less than the period of a probe"
+        problems.append(Problem("measurement.keep_s", wrong, f"at least {PERIOD_S:g} s"))
+    # A bound of a multisine's slope beside that of the steepest stimulus, which the slew limit leaves room for.
+    highest_n = max((*probes.levels_n, probes.reference_n if probes.reference_s else 0.0))
+    room_hz = cap_n * max(protocol.all_frequencies_hz, default=0.0) / (math.sqrt(2) * highest_n)
+    if probes.to_hz > room_hz:
+        wrong = f"is {probes.to_hz:g} Hz: at {highest_n:g} N a probe might change faster than the steepest stimulus"
+        problems.append(Problem("probes.to_hz", wrong, f"at most {math.floor(room_hz):g} Hz, or lower forces"))
+    return problems

@@ -1,0 +1,94 @@
+"""Probes and references of a session as its log tells them, and which one is due. Part of the fold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from study.session.facts.sitting_events import PauseTaken, ProbeMeasured, ProbePlayed, RestTaken
+from study.session.state.draw_check import LogContradiction
+
+if TYPE_CHECKING:
+    from protocols.definition.probes import ProbeSettings
+
+STRONGEST_WEIGHT_HZ = 12.5
+"""Where hand-arm vibration is weighted most: a probe's acceleration counts as if all of it lay there."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProbingState:
+    played: int = 0
+    """In the session, of all kinds."""
+    with_hand: int = 0
+    """Of them with the hand on the handle: the next level follows from it."""
+    open: ProbePlayed | None = None
+    """Played, and not measured yet, or cut off for good by the program's end."""
+    since_s: float | None = None
+    """Since the last one with a hand in this sitting; None before."""
+    referenced: bool = False
+    """The reference of this sitting, since its last long pause, was played, tried or declined."""
+    hand_mass_kg: float | None = None
+    """Apparent mass of the handle with the hand, at the last such probe of this sitting; None where not known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """A probe with the hand on the handle is due."""
+
+    level_n: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A reference is due: nothing holds the handle."""
+
+
+def due_probe(probing: ProbingState, settings: ProbeSettings) -> Probe | None:
+    """The next probe with a hand; None where none is due yet."""
+    if not settings.levels_n or (probing.since_s is not None and probing.since_s < settings.interval_s):
+        return None
+    return Probe(settings.levels_n[probing.with_hand % len(settings.levels_n)])
+
+
+def due_reference(probing: ProbingState, settings: ProbeSettings) -> Reference | None:
+    """After the first probe with a hand, beside which a free handle is seen to be free."""
+    due = settings.reference_s > 0 and not probing.referenced and probing.since_s is not None
+    return Reference() if due else None
+
+
+def begin_probe(probing: ProbingState, event: ProbePlayed, settings: ProbeSettings) -> ProbingState:
+    """The state with this probe playing. Raises LogContradiction where the protocol does not allow it."""
+    hand = event.kind == "hand"
+    highest_n = settings.reference_n if event.kind == "reference" else settings.probe_cap_n
+    if event.level_n > highest_n or not settings.played:
+        raise LogContradiction(f"a probe of {event.level_n:g} N, where the protocol allows {highest_n:g} N")
+    if event.number != probing.played:
+        raise LogContradiction(f"probe {event.number} after {probing.played} probes")
+    return replace(
+        probing,
+        played=probing.played + 1,
+        with_hand=probing.with_hand + hand,
+        open=event,
+        since_s=0.0 if hand else probing.since_s,
+        referenced=probing.referenced or not hand,
+    )
+
+
+def end_probe(probing: ProbingState, event: ProbeMeasured) -> ProbingState:
+    """The state after a measurement, or after a reference that was declined. Raises LogContradiction."""
+    declined = event.number == probing.played and event.recording is None
+    if not declined and (probing.open is None or probing.open.number != event.number):
+        raise LogContradiction(f"probe {event.number} was measured, which is not playing")
+    hand = probing.open is not None and probing.open.kind == "hand" and event.apparent_mass_kg is not None
+    return replace(
+        probing,
+        open=None,
+        referenced=probing.referenced or declined,
+        hand_mass_kg=event.apparent_mass_kg if hand else probing.hand_mass_kg,
+    )
+
+
+def after_break(probing: ProbingState, event: PauseTaken | RestTaken, settings: ProbeSettings) -> ProbingState:
+    """The state after a pause or rest: a long one asks for another reference."""
+    seconds = event.paused_s if isinstance(event, PauseTaken) else event.rested_s
+    return replace(probing, referenced=False) if seconds >= settings.reference_after_pause_s else probing

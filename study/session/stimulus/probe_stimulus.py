@@ -1,0 +1,54 @@
+"""Forces of a probe: an odd multisine on three axes at once, every line on a single axis."""
+
+import numpy as np
+
+from equalizer.signals.excitation import apply_fades
+from equalizer.signals.multisine import DRAWS, lines_between
+from equalizer.signals.recording import Segment
+from equalizer.signals.signal import FloatArray, Signal
+from protocols.definition.probes import FROM_HZ, PERIOD_S, ProbeSettings
+from study.session.stimulus.held_stimulus import HeldStimulus
+
+FADE_S = 0.25
+HELD_S = FADE_S + PERIOD_S + 0.1
+"""Until it fades out: the fade, one whole period, and a tenth of a second for what the program does meanwhile."""
+PHASES_SEED = 16
+"""Every probe has the same phases: only so may one be compared with another line by line."""
+
+
+def probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:
+    """(n, 3): one period whose norm peaks at 1. Axis a has each third odd line, beginning with the a-th."""
+    n = round(PERIOD_S * sample_rate_hz)
+    lines = lines_between(FROM_HZ, settings.to_hz, n, sample_rate_hz, odd_only=True)
+    axis = np.arange(len(lines)) % 3
+    draw = np.random.default_rng(PHASES_SEED)
+    waves = []
+    for _ in range(DRAWS):
+        spectrum = np.zeros((n // 2 + 1, 3), dtype=complex)
+        spectrum[lines, axis] = np.exp(2j * np.pi * draw.uniform(size=len(lines)))
+        wave = np.fft.irfft(spectrum, n, axis=0)
+        waves.append(wave / np.sqrt(np.mean(np.sum(wave**2, axis=1))))
+    peaks = [float(np.linalg.norm(wave, axis=1).max()) for wave in waves]
+    return np.asarray(waves[int(np.argmin(peaks))] / min(peaks))
+
+
+def probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: float) -> HeldStimulus:
+    """A probe with this peak of its norm. Raises ValueError above the probes' own cap."""
+    if not 0 < level_n <= settings.probe_cap_n:
+        raise ValueError(f"a probe of {level_n:g} N is not within its cap of {settings.probe_cap_n:g} N")
+    loop = _forces(level_n * probe_wave(settings, sample_rate_hz), sample_rate_hz)
+    return HeldStimulus(loop, fade_in_s=FADE_S, fade_out_s=FADE_S, fade_shape="raised_cosine")
+
+
+def reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[Signal, Segment]:
+    """The reference as commands, and where its whole periods lie in them."""
+    wave = settings.reference_n * probe_wave(settings, sample_rate_hz)
+    n, fade = len(wave), round(FADE_S * sample_rate_hz)
+    periods = max(2, round(settings.reference_s / PERIOD_S))
+    forces = apply_fades(wave[np.arange(-fade, periods * n + fade) % n], fade, fade)
+    segment = Segment(fade, fade + periods * n, "multisine", settings.reference_n, n, "fit")
+    return _forces(forces, sample_rate_hz), segment
+
+
+def _forces(samples: FloatArray, sample_rate_hz: float) -> Signal:
+    return Signal(samples, sample_rate_hz, "force", "N", ("fx", "fy", "fz"))

@@ -1,0 +1,189 @@
+"""A probe between two trials, and the reference without a hand: logged, played, kept. Neither ever voids a trial."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from analysis.device_change.probe_lines import apparent_mass_kg, probe_lines
+from equalizer.signals.recording import Recording
+from protocols.definition.probes import PERIOD_S
+from study.devices.device import Fault, Played
+from study.session.facts.events import ProbeMeasured, ProbePlayed
+from study.session.state.probing import Probe
+from study.session.state.state import SessionState
+from study.session.stimulus.probe_stimulus import HELD_S, probe_stimulus, reference_commands
+from study.session.views.form_views import FormKind
+from study.session.views.forms import form_of, judge_form, take_the_handle
+from study.session.views.views import PlayingNotice, Unanswered
+from study.store.disk.provenance import versions
+from study.store.sessions.trial_recordings import save_trial_recording
+from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
+from study.workflows.trial.sitting import Sitting, record, release_device, tell
+
+LIGHTER_WITHOUT_A_HAND = 0.9
+"""A handle that was let go answers like a mass at least a tenth smaller than just before, in the hand."""
+
+NO_QUESTION = "Nothing to answer: the device is measured"
+
+Kind = Literal["hand", "free", "reference"]
+
+
+class _EndedEarlyError(Exception):
+    """A stop, a pause or a fault while the reference plays."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    state: SessionState
+    reply: Unanswered | None
+    """Why it was cut short; None where it was not."""
+    played: Played
+    mass_kg: float | None
+    """That the handle seems to have; None where nothing was kept."""
+
+
+def play_probe(state: SessionState, probe: Probe, sitting: Sitting) -> AfterTrial:
+    """One probe with the hand on the handle."""
+    measured = _hold(state, "hand", probe.level_n, sitting)
+    return _after(measured.state, measured.reply, measured.played, sitting)
+
+
+def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
+    """Ask for a free handle, test with a probe whether it is, and only then play the reference."""
+    form = form_of(state.protocol, FormKind.HANDLE)
+    assert form is not None, "a reference is due only where the protocol has one"
+    sitting.supervisor.begin("form")
+    if not judge_form(state.protocol, FormKind.HANDLE, sitting.display.fill_in(form)).passed:
+        return AfterTrial(_decline(state, "the handle was not free", sitting))
+    sitting.device.simulate_hand(False)
+    after = _test_and_play(state, sitting)
+    if after.leave:
+        return after
+    sitting.device.simulate_hand(True)
+    if not after.pause:
+        sitting.supervisor.begin("form")
+        sitting.display.fill_in(take_the_handle())
+    return after
+
+
+def _test_and_play(state: SessionState, sitting: Sitting) -> AfterTrial:
+    held_kg, probes = state.sitting.probing.hand_mass_kg, state.protocol.probes
+    test = _hold(state, "free", max(probes.levels_n), sitting)
+    after = _after(test.state, test.reply, test.played, sitting)
+    if after.leave or after.pause or after.fault is not Fault.NONE:
+        return after
+    if held_kg is None or test.mass_kg is None or test.mass_kg > LIGHTER_WITHOUT_A_HAND * held_kg:
+        return AfterTrial(_decline(test.state, _not_free(held_kg, test.mass_kg), sitting))
+    return _play_free(test.state, sitting)
+
+
+def _not_free(held_kg: float | None, free_kg: float | None) -> str:
+    if held_kg is None or free_kg is None:
+        return "whether the handle is free could not be measured"
+    return f"the handle seems to be held: it answers like {free_kg:.2f} kg, and {held_kg:.2f} kg in the hand"
+
+
+def _decline(state: SessionState, why: str, sitting: Sitting) -> SessionState:
+    tell(f"No reference was played: {why}.", sitting)
+    number = state.sitting.probing.played
+    event = ProbeMeasured(utc=sitting.clock.utc(), number=number, vibrated_s=0.0, trouble=why)
+    return record(state, event, sitting)
+
+
+def _play_free(state: SessionState, sitting: Sitting) -> AfterTrial:
+    probes, rate_hz = state.protocol.probes, sitting.device.info.sample_rate_hz
+    commands, segment = reference_commands(probes, rate_hz)
+    state = _begin(state, "reference", probes.reference_n, sitting)
+    sitting.supervisor.begin("reference")
+    sitting.display.trouble(f"Hands off: the reference plays for {commands.duration_s:.0f} s.")
+
+    def attend(share: float) -> None:
+        if not sitting.supervisor.glance():
+            raise _EndedEarlyError
+
+    try:
+        played = sitting.device.play(commands, attend)
+    except _EndedEarlyError:
+        fault = sitting.device.fault()
+        state = _end(state, None, 0.0, "it was cut short", sitting).state
+        reply = sitting.supervisor.resolve(Unanswered("the reference was cut short", leave=False, asked=True))
+        after = cut_short(state, reply) if isinstance(reply, Unanswered) else AfterTrial(state)
+        return replace(after, leave=after.leave or reason_to_leave(fault), fault=fault)
+    kept = None if played.recording is None else replace(played.recording, segments=(segment,))
+    trouble = "" if kept is not None else played.health.fault.value
+    state = _end(state, kept, commands.duration_s, trouble, sitting).state
+    return AfterTrial(state, leave=reason_to_leave(played.health.fault), fault=played.health.fault)
+
+
+def _hold(state: SessionState, kind: Kind, level_n: float, sitting: Sitting) -> _Measured:
+    """Log, play through the same port and under the same signs of life as a demonstration, and keep what came."""
+    stimulus = probe_stimulus(state.protocol.probes, level_n, sitting.device.info.sample_rate_hz)
+    state = _begin(state, kind, level_n, sitting)
+    sitting.supervisor.begin("probe")
+    sitting.device.hold(stimulus)
+    notice = PlayingNotice(NO_QUESTION, 0, HELD_S, picture=None)
+    reply = sitting.display.show_playing(notice, sitting.supervisor.glance)
+    played = release_device(sitting)
+    missed = played.health.missed_ticks
+    trouble = played.health.fault.value if played.health.fault is not Fault.NONE else ""
+    if not trouble and missed > state.protocol.measurement.missed_ticks_limit * max(played.health.ticks, 1):
+        trouble = f"{missed} ticks of it were missed"
+    seconds = played.health.ticks / sitting.device.info.sample_rate_hz
+    ended = _end(state, None if trouble else played.recording, seconds, trouble, sitting)
+    return replace(ended, reply=reply, played=played)
+
+
+def _begin(state: SessionState, kind: Kind, level_n: float, sitting: Sitting) -> SessionState:
+    number = state.sitting.probing.played
+    return record(state, ProbePlayed(sitting.clock.utc(), number, kind, level_n), sitting)
+
+
+def _end(state: SessionState, recording: Recording | None, seconds: float, trouble: str, sitting: Sitting) -> _Measured:
+    """Save the recording, then log it."""
+    probing = state.sitting.probing
+    assert probing.open is not None, "a probe is measured after it was played"
+    saved, mass_kg, rms = None, None, None
+    if recording is None:
+        trouble = trouble or "too little of it was kept"
+    else:
+        try:
+            mass_kg = max(0.0, apparent_mass_kg(probe_lines(recording, PERIOD_S)))
+        except ValueError as problem:
+            trouble = str(problem)
+        name = f"recordings/probe-{probing.open.number:03d}.h5"
+        saved = save_trial_recording(sitting.folder, name, recording, _conditions(probing.open, sitting))
+        rms = float(np.sqrt(np.nanmean(np.sum(recording.response.samples**2, axis=1))))
+    if trouble:
+        sitting.display.trouble(f"A probe is not used: {trouble}.")
+    event = ProbeMeasured(
+        utc=sitting.clock.utc(),
+        number=probing.open.number,
+        vibrated_s=seconds,
+        recording=saved.name if saved else None,
+        sha256=saved.sha256 if saved else None,
+        rms_mps2=rms,
+        apparent_mass_kg=mass_kg,
+        trouble=trouble,
+    )
+    return _Measured(record(state, event, sitting), None, Played(recording, sitting.device.health()), mass_kg)
+
+
+def _conditions(probe: ProbePlayed, sitting: Sitting) -> dict[str, Any]:
+    return {
+        "session": sitting.folder.name,
+        "probe": {"number": probe.number, "kind": probe.kind, "period_s": PERIOD_S},
+        "level_n": probe.level_n,
+        "hand": "held" if probe.kind == "hand" else "none",
+        "provenance": {"versions": versions()},
+    }
+
+
+def _after(state: SessionState, reply: Unanswered | None, played: Played, sitting: Sitting) -> AfterTrial:
+    """A probe ends a sitting only where a trial would too: on request, or with a device that is lost."""
+    fault = played.health.fault
+    if leave := reason_to_leave(fault):
+        return AfterTrial(state, leave=leave, fault=fault)
+    resolved = sitting.supervisor.resolve(reply or Unanswered("", leave=False, asked=True))
+    after = cut_short(state, resolved) if isinstance(resolved, Unanswered) else AfterTrial(state)
+    return replace(after, void="", fault=fault)

@@ -1,0 +1,149 @@
+"""Sessions with probes between trials: strength, order, faults, a handle that is not free, a program that ends."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from protocols.definition.probes import ProbeSettings
+from protocols.document.dumping import dump_protocol
+from study.devices.safe import SafeDevice
+from study.errors import LeftError
+from study.session.facts.events import ProbeMeasured, ProbePlayed, TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.state.draw_check import LogContradiction
+from study.session.state.fold import apply
+from study.session.stimulus.probe_stimulus import probe_stimulus, reference_commands
+from study.session.views.views import PlayingNotice
+from study.store.formats.recording_file import read_recording
+from study.store.sessions.event_log import EventLog, read_log
+from study.workflows.session.simulated_display import SimulatedDisplay
+from study.workflows.trial.play_probe import NO_QUESTION
+
+PROBES = ProbeSettings(levels_n=(0.2, 0.4, 0.8), interval_s=20.0, reference_s=3.0)
+
+
+def with_probes(protocol):
+    return replace(protocol, probes=PROBES, measurement=replace(protocol.measurement, keep_s=1.0))
+
+
+@pytest.fixture
+def probed(sitter):
+    sitter.protocol = with_probes(sitter.protocol)
+    sitter.text = dump_protocol(sitter.protocol)
+    return sitter
+
+
+def events_of(folder):
+    return read_log(folder.log).events
+
+
+def trials_of(done):
+    return [(t.run, t.trial, t.level_n, t.answer) for t in done.state.trials if t.counts]
+
+
+def test_no_probe_is_stronger_than_its_own_cap_and_all_come_between_trials(probed):
+    done = probed.whole()
+    assert done.left == ""
+    events = events_of(done.folder)
+    played = {e.number: e for e in events if isinstance(e, ProbePlayed)}
+    measured = [e for e in events if isinstance(e, ProbeMeasured)]
+    assert len([e for e in played.values() if e.kind == "hand"]) >= 4
+    for kept in measured:
+        recording = read_recording(done.folder.path / kept.recording)
+        peak_n = float(np.linalg.norm(recording.excitation.samples, axis=1).max())
+        highest_n = PROBES.reference_n if played[kept.number].kind == "reference" else PROBES.probe_cap_n
+        assert 0 < peak_n <= highest_n * (1 + 1e-6)
+        assert recording.position is not None
+    open_trial = False
+    for event in events:
+        open_trial = isinstance(event, TrialPresented) or (
+            open_trial and not isinstance(event, TrialMeasured | TrialSpoiled)
+        )
+        assert not (open_trial and isinstance(event, ProbePlayed | ProbeMeasured))
+
+
+def test_levels_come_in_turn_and_never_sooner_than_the_protocol_says(probed):
+    hand = [e for e in events_of(probed.whole().folder) if isinstance(e, ProbePlayed) and e.kind == "hand"]
+    assert [e.level_n for e in hand] == [PROBES.levels_n[i % 3] for i in range(len(hand))]
+    assert min(np.diff([e.monotonic_s for e in hand])) >= PROBES.interval_s
+
+
+def test_a_probes_answer_never_reaches_that_of_a_trial(sitter, sitter_of, tmp_path):
+    plain = sitter.whole()
+    protocol = with_probes(sitter.protocol)
+    other = sitter_of(tmp_path / "other", protocol, dump_protocol(protocol)).whole()
+    assert trials_of(plain) == trials_of(other)
+
+
+def test_a_probe_is_on_the_disk_before_the_device_moves(probed, monkeypatch):
+    calls, hold, append = [], SafeDevice.hold, EventLog.append
+    monkeypatch.setattr(SafeDevice, "hold", lambda self, stimulus: calls.append("hold") or hold(self, stimulus))
+    monkeypatch.setattr(EventLog, "append", lambda self, event: append(self, event) or calls.append(event.event))
+    probed.whole()
+    for place, call in enumerate(calls):
+        if call == "probe_played" and calls[place + 1] != "probe_measured":
+            assert calls[place + 1] == "hold"
+    assert "probe_played" in calls
+
+
+def test_a_handle_that_is_still_held_gets_no_reference_and_the_session_goes_on(probed, monkeypatch):
+    monkeypatch.setattr(SafeDevice, "simulate_hand", lambda self, on_handle: None)
+    done = probed.whole()
+    events = events_of(done.folder)
+    assert done.left == ""
+    assert not [e for e in events if isinstance(e, ProbePlayed) and e.kind == "reference"]
+    assert any("seems to be held" in e.trouble for e in events if isinstance(e, ProbeMeasured))
+
+
+def test_a_program_that_ends_within_a_probe_repeats_and_loses_none(probed, monkeypatch):
+    show, shown = SimulatedDisplay.show_playing, []
+
+    def ends_within_the_fourth(self, notice: PlayingNotice, sign_of_life):
+        shown.append(notice.title)
+        if notice.title == NO_QUESTION and shown.count(NO_QUESTION) == 4:
+            raise KeyboardInterrupt
+        return show(self, notice, sign_of_life)
+
+    monkeypatch.setattr(SimulatedDisplay, "show_playing", ends_within_the_fourth)
+    with pytest.raises(LeftError):
+        probed.whole()
+    (folder,) = (f for f in probed.data.iterdir() if f.is_dir())
+    from study.store.sessions.archive import SessionFolder
+
+    done = probed.resumed(SessionFolder(folder))
+    assert done.left == ""
+    events = events_of(done.folder)
+    numbers = [e.number for e in events if isinstance(e, ProbePlayed)]
+    assert numbers == list(range(len(numbers)))
+    lost = set(numbers) - {e.number for e in events if isinstance(e, ProbeMeasured)}
+    assert len(lost) == 1
+    assert len([e for e in events if isinstance(e, ProbePlayed) and e.kind == "reference"]) == 2
+
+
+def test_a_probe_within_a_trial_or_above_its_cap_is_refused_by_the_log(probed):
+    state = replace(probed.whole().state, closed=False)
+    number = state.sitting.probing.played
+    probe = ProbePlayed("2026-01-01T00:00:00.000+00:00", number, "hand", 0.8)
+    with pytest.raises(LogContradiction, match="allows 1 N"):
+        apply(state, replace(probe, level_n=1.01))
+    with pytest.raises(LogContradiction, match="after"):
+        apply(state, replace(probe, number=number + 1))
+    within = replace(state, presented=TrialPresented.__new__(TrialPresented))
+    with pytest.raises(LogContradiction, match="while a trial is open"):
+        apply(within, probe)
+
+
+def test_a_stimulus_above_the_cap_is_not_even_made():
+    with pytest.raises(ValueError, match="not within its cap"):
+        probe_stimulus(PROBES, 1.01, 1000.0)
+
+
+def test_the_forces_are_odd_lines_one_axis_each_and_the_same_in_probe_and_reference():
+    loop = probe_stimulus(PROBES, 0.8, 1000.0).loop.samples
+    lines = np.abs(np.fft.rfft(loop, axis=0)) > 1e-6
+    assert not lines[::2].any()
+    assert lines.sum(axis=1).max() == 1
+    assert lines.sum(axis=0).min() >= 9
+    commands, segment = reference_commands(PROBES, 1000.0)
+    assert np.allclose(commands.samples[segment.start : segment.start + 1000], loop / 0.8)
+    assert (segment.stop - segment.start) % segment.period == 0
