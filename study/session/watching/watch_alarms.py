@@ -7,7 +7,7 @@ from protocols.trial import Phase, Trial, TrialStatus
 from study.session.facts.log_time import Moment, elapsed_s, seconds_between
 from study.session.facts.void_reasons import computer_too_busy
 from study.session.watching.live import Live
-from study.session.watching.watch_view import ON, Alarm, Exposure, Standing
+from study.session.watching.watch_view import ON, Alarm, DriftLine, Exposure, Standing
 from study.session.watching.watched import Watched
 
 SILENT_AFTER_S = 3.0
@@ -38,6 +38,7 @@ class Situation:
     standing: Standing
     exposure: Exposure
     now_utc: str
+    drifts: tuple[DriftLine, ...] = ()
 
     @property
     def trials(self) -> tuple[Trial, ...]:
@@ -177,6 +178,14 @@ def _load_alarm(now: Situation) -> Alarm | None:
     return Alarm("busy", f"The computer is too busy: {many}. Close other programs.", now.watched.last_utc)
 
 
+def _drift_alarm(now: Situation) -> Alarm | None:
+    beyond = [drift.sentence for drift in now.drifts if drift.beyond]
+    if not beyond:
+        return None
+    left = f"Device or grip left what the analysis allows: {'; '.join(beyond)}. Pause, and look at both."
+    return Alarm("drift", left, now.watched.last_utc)
+
+
 def _last_void(now: Situation) -> str:
     remarks = zip(now.trials, now.watched.remarks, strict=True)
     return [remark for trial, remark in remarks if trial.status is TrialStatus.SPOILED][-1]
@@ -196,5 +205,5 @@ _ENDS = ("gone", "ended")
 _OVER: tuple[Callable[[Situation], Alarm | None], ...] = (_log_alarm, _gone_alarm, _end_alarm)
 _RUNNING: tuple[Callable[[Situation], Alarm | None], ...] = (
     _device_alarm, _silence_alarm, _log_alarm, _adverse_alarm, _handle_alarm, _sensor_alarm, _dose_alarm,
-    _time_alarm, _lapse_alarm, _load_alarm, _void_alarm, _answer_alarm,
+    _time_alarm, _lapse_alarm, _drift_alarm, _load_alarm, _void_alarm, _answer_alarm,
 )  # fmt: skip

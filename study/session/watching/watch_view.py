@@ -119,6 +119,17 @@ class NoteLine:
 
 
 @dataclass(frozen=True, slots=True)
+class DriftLine:
+    """Something that the probes of the session found changed."""
+
+    since_s: float
+    """Since the session was opened, when it was first seen."""
+    sentence: str
+    beyond: bool
+    """It leaves what the analysis of the session allows."""
+
+
+@dataclass(frozen=True, slots=True)
 class Alarm:
     kind: str
     sentence: str
@@ -174,6 +185,9 @@ class WatchView:
     live: Live | None
     """None where nothing was told for some seconds."""
     alarms: tuple[Alarm, ...]
+    probes: int = 0
+    """Kept so far, references included."""
+    drifts: tuple[DriftLine, ...] = ()
 
     @property
     def present_run(self) -> WatchedRun | None:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from protocols.definition.study_protocol import StudyProtocol
 from study.session.facts.events import (
     Event,
+    ProbeMeasured,
+    ProbePlayed,
     SessionInterrupted,
     SessionOpened,
     SessionResumed,
@@ -12,6 +14,7 @@ from study.session.facts.events import (
     TrialPresented,
     TrialSpoiled,
 )
+from study.session.facts.log_time import seconds_between
 from study.session.facts.sitting_events import FormFilled, NoteTaken
 from study.session.state.fold import apply
 from study.session.state.state import SessionState, begin_session
@@ -19,6 +22,20 @@ from study.session.watching.watch_view import FormLine, NoteLine
 
 NO_STEADY_PART = "no steady part to measure, or too little of it"
 """A flag of logs before version 1.1: on nearly every trial, and no fault. Later logs have the status `unmeasured`."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlayedProbe:
+    """A probe and what was kept of it."""
+
+    number: int
+    kind: str
+    level_n: float
+    at_s: float
+    """Since the session was opened."""
+    sitting: int
+    recording: str = ""
+    trouble: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +54,10 @@ class Watched:
     """How many of `notes` are older than the present sitting."""
     last_utc: str
     """Of the last fact."""
+    sitting: int = 0
+    playing: PlayedProbe | None = None
+    probes: tuple[PlayedProbe, ...] = ()
+    """Measured ones."""
 
 
 def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> Watched:
@@ -63,6 +84,8 @@ def follow(watched: Watched, event: Event) -> Watched:
             return _set_remark(after, ", ".join(flag for flag in event.flags if flag != NO_STEADY_PART))
         case TrialSpoiled():
             return _set_remark(after, event.reason)
+        case ProbePlayed() | ProbeMeasured():
+            return _probe(after, event)
         case FormFilled():
             return replace(after, forms=(*watched.forms, FormLine(event.utc, event.form, event.passed)))
         case NoteTaken():
@@ -71,9 +94,22 @@ def follow(watched: Watched, event: Event) -> Watched:
         case SessionInterrupted():
             return replace(after, left=event.reason)
         case SessionResumed():
-            return replace(after, left="", sitting_utc=event.utc, notes_before=len(watched.notes))
+            return replace(
+                after, left="", sitting_utc=event.utc, notes_before=len(watched.notes), sitting=watched.sitting + 1
+            )
         case _:
             return after
+
+
+def _probe(watched: Watched, event: ProbePlayed | ProbeMeasured) -> Watched:
+    if isinstance(event, ProbePlayed):
+        at_s = max(0.0, seconds_between(watched.state.opened.utc, event.utc))
+        return replace(watched, playing=PlayedProbe(event.number, event.kind, event.level_n, at_s, watched.sitting))
+    played = watched.playing
+    if played is None or played.number != event.number:
+        return watched
+    kept = replace(played, recording=event.recording or "", trouble=event.trouble)
+    return replace(watched, playing=None, probes=(*watched.probes, kept))
 
 
 def _set_remark(watched: Watched, remark: str) -> Watched:

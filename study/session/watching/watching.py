@@ -9,7 +9,7 @@ from study.session.state.vibration_dose import a8_mps2
 from study.session.views.archive_views import TURNED_AWAY
 from study.session.watching.live import Live
 from study.session.watching.watch_alarms import Situation, alarms_of
-from study.session.watching.watch_view import ON, Exposure, Standing, WatchView
+from study.session.watching.watch_view import ON, DriftLine, Exposure, Standing, WatchView
 from study.session.watching.watched import Watched
 from study.session.watching.watched_trials import (
     last_trials,
@@ -31,6 +31,7 @@ class LiveInfo:
     """Whether a program holds the session's lock; None if not checked."""
     problem: str = ""
     """Why the log cannot be followed any further; empty where it can."""
+    drifts: tuple[DriftLine, ...] = ()
 
 
 def watch_view(watched: Watched, beside: LiveInfo, now_utc: str, before: WatchView | None = None) -> WatchView:
@@ -39,7 +40,7 @@ def watch_view(watched: Watched, beside: LiveInfo, now_utc: str, before: WatchVi
     live = _of_this_sitting(watched, beside.live)
     standing = _find_standing(watched, live, beside.writer)
     exposure = _exposure(watched, live, standing, now_utc)
-    situation = Situation(watched, live, beside.problem, standing, exposure, now_utc)
+    situation = Situation(watched, live, beside.problem, standing, exposure, now_utc, beside.drifts)
     activity, since_utc = _activity(watched, live, standing)
     catches = [trial for trial in state.trials if trial.phase is Phase.CATCH and trial.counts]
     run = shown_run(state)
@@ -72,6 +73,8 @@ def watch_view(watched: Watched, beside: LiveInfo, now_utc: str, before: WatchVi
         gate_radius_mm=state.protocol.gate.radius_mm,
         live=live if standing in ON and situation.fresh else None,
         alarms=alarms_of(situation, before.alarms if before is not None else ()),
+        probes=len(watched.probes),
+        drifts=beside.drifts,
     )
 
 

@@ -8,6 +8,7 @@ from study.tui.watch.watch_words import (
     clock_time,
     device_words,
     dose_words,
+    drift_words,
     handle_words,
     not_measured,
     reversals,
@@ -33,6 +34,8 @@ def changes(before: WatchView | None, now: WatchView) -> list[str]:
     lines += [_trial_line(trial) for trial in _new_trials(before, now)]
     known = len(before.notes)
     lines += [f"Note by the {note.who}: {note.text}" for note in now.notes[: len(now.notes) - known][::-1]]
+    known_drifts = {drift.sentence for drift in before.drifts}
+    lines += [f"Drift: {drift.sentence}" for drift in now.drifts if drift.sentence not in known_drifts]
     if now.shown_run != before.shown_run and now.shown_run is not None:
         lines.append(staircase_title(now))
     if now.standing != before.standing:
@@ -53,6 +56,9 @@ def status(view: WatchView) -> list[str]:
         f"Sensor     {sensor_words(view)}",
         f"Device     {view.device}: {device_words(view)}",
     ]
+    if view.probes:
+        lines.append(f"Drift      {drift_words(view)}")
+    lines += [f"Drift      {drift.sentence}{' BEYOND' if drift.beyond else ''}" for drift in view.drifts]
     for run in view.runs:
         lines.append(f"Run        {run_name(view, run)}, {run.frequency_hz:g} Hz: {run.status}, {run.trials} trials")
         if run.reversals_needed:

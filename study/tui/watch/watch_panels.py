@@ -13,6 +13,7 @@ from study.tui.watch.watch_words import (
     clock_time,
     device_words,
     dose_words,
+    drift_words,
     handle_words,
     not_measured,
     reversals,
@@ -89,6 +90,9 @@ def gauges(view: WatchView) -> Content:
         ("Sensor", Content(sensor_words(view))),
         ("Device", Content(device_words(view))),
     ]
+    if view.probes:
+        beyond = any(drift.beyond for drift in view.drifts)
+        rows.append(("Drift", Content.styled(drift_words(view), "bold $text-error" if beyond else "")))
     return Content("\n").join(Content.assemble((f"{name:<6} ", MUTED), text) for name, text in rows)
 
 
@@ -102,6 +106,7 @@ def details(view: WatchView) -> Content:
             "Practice",
             [f"{p.frequency_hz:g} Hz: {p.right} right of {p.of}, {_outcome_words(p.passed)}" for p in view.practice],
         ),
+        *(_section("Drift", [d.sentence for d in view.drifts]) if view.probes else ()),
         *_section(
             "Notes",
             [f"{clock_time(n.utc)}  {'ADVERSE ' if n.adverse else ''}{n.who}: {n.text}" for n in view.notes],

@@ -124,3 +124,13 @@ def device_words(view: WatchView) -> str:
         return f"FAULT: {view.live.fault}"
     late = f", {view.live.missed_ticks} late ticks" if view.live.missed_ticks else ""
     return ("simulated" if view.simulated else "no fault") + late
+
+
+def drift_words(view: WatchView) -> str:
+    """What the probes say; empty where there are none."""
+    if not view.probes:
+        return ""
+    beyond = sum(drift.beyond for drift in view.drifts)
+    if not view.drifts:
+        return f"nothing found in {view.probes} probes"
+    return f"{len(view.drifts)} changed, {beyond} beyond what is allowed"

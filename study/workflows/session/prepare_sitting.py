@@ -7,7 +7,7 @@ from study.session.facts.events import DeviceChecked, FormFilled, SessionClosed
 from study.session.state.machine import CheckDevice, FillIn, Leave, next_preparation
 from study.session.state.state import SessionState
 from study.session.views.archive_views import TURNED_AWAY
-from study.session.views.form_views import Form
+from study.session.views.form_views import Form, FormKind
 from study.session.views.forms import confirmation_of, is_confirmed, judge_form
 from study.session.views.views import DeviceFinding
 from study.session.watching.requests import NoteAsked
@@ -36,6 +36,8 @@ def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState
 
 def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
     """Ask for one form and log it."""
+    if form.kind is FormKind.HANDLE:
+        raise ValueError("whether the handle is free is logged with the reference, not as a form")
     sitting.supervisor.begin("form")
     reply = sitting.display.fill_in(form)
     outcome = judge_form(state.protocol, form.kind, reply)

@@ -2,6 +2,7 @@
 
 import io
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from study.errors import StudyError
 from study.regular_file import TABLE_BYTES, open_regular
@@ -12,7 +13,7 @@ from study.session.state.draw_check import LogContradiction
 from study.session.watching.live import Live
 from study.session.watching.requests import Request
 from study.session.watching.watch_alarms import SILENT_AFTER_S
-from study.session.watching.watch_view import WatchView
+from study.session.watching.watch_view import DriftLine, WatchView
 from study.session.watching.watched import Watched, begin_watching
 from study.session.watching.watched import follow as after
 from study.session.watching.watching import LiveInfo, watch_view
@@ -22,6 +23,9 @@ from study.store.sessions.log_seal import read_seal, seal_paths
 from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.results.fold_session import protocol_of
+
+if TYPE_CHECKING:
+    from study.workflows.views.session_drift import DriftReader
 
 PROBE_EVERY_S = 1.0
 """Shortest interval between probes of the lock of a session without a sign of life."""
@@ -51,6 +55,7 @@ class Follower:
         self._view: WatchView | None = None
         self._writer: bool | None = None
         self._probed_utc = ""
+        self._drifts: DriftReader | None = None
 
     def look(self, now_utc: str) -> WatchView | None:
         """The current view; None while there is no first line. Raises StudyError where the first line is invalid."""
@@ -58,9 +63,18 @@ class Follower:
         if self._watched is None:
             return None
         live = read_live(self._folder.path)
-        beside = LiveInfo(live, self._is_written(live, now_utc), self._problem)
+        beside = LiveInfo(live, self._is_written(live, now_utc), self._problem, self._look_for_drifts(self._watched))
         self._view = watch_view(self._watched, beside, now_utc, self._view)
         return self._view
+
+    def _look_for_drifts(self, watched: Watched) -> tuple[DriftLine, ...]:
+        if not watched.probes:
+            return ()
+        if self._drifts is None:  # its arrays take long to import, and most sessions have no probes
+            from study.workflows.views.session_drift import DriftReader
+
+            self._drifts = DriftReader(self._folder)
+        return self._drifts.look(watched.probes)
 
     def _take_in_what_is_new(self) -> None:
         sealed_bytes = self._sealed_bytes()  # before the log is read: it is written after the lines that it covers

@@ -1,0 +1,121 @@
+"""What drifts in a session, from the recordings of its probes, in sentences for who follows it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from analysis.device_change.compare_devices import ChangeLimits
+from analysis.device_change.probe_drift import Drift, TimedProbe, drifts
+from analysis.device_change.probe_lines import probe_lines
+from equalizer.signals.recording import Recording
+from protocols.definition.probes import PERIOD_S
+from study.errors import StudyError
+from study.session.watching.watch_view import DriftLine
+from study.session.watching.watched import PlayedProbe
+from study.store.formats.recording_file import read_recording
+from study.store.sessions.archive import SessionFolder
+
+LIMITS = ChangeLimits()
+ALLOWED = {
+    "friction": LIMITS.friction_n,
+    "gain": LIMITS.share,
+    "delay": 1e-3,
+    "mass": 0.05,
+    "damping": 3.0,
+    "stiffness": 75.0,
+}
+"""Beyond these a threshold may move by more than the finest step of a staircase. Friction and gain as in the daily
+check; a delay by one tick of the loop; of a hand half of a light grip."""
+
+WITHOUT_HAND = ("friction", "gain", "delay")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Read:
+    rate_hz: float
+    timed: tuple[TimedProbe, ...]
+    """Of a probe one; of a reference its two halves."""
+
+
+class DriftReader:
+    """Keeps what it has read: each look reads and compares new probes only."""
+
+    def __init__(self, folder: SessionFolder) -> None:
+        self._folder = folder
+        self._read: list[tuple[PlayedProbe, _Read]] = []
+        self._seen = 0
+        self._since_s: dict[tuple[str, str, str], float] = {}
+        self._found: dict[str, tuple[DriftLine, ...]] = {}
+
+    def look(self, probes: tuple[PlayedProbe, ...]) -> tuple[DriftLine, ...]:
+        """Present drifts: of device and hand together, in this sitting; of the device alone, between references."""
+        for probe in probes[self._seen :]:
+            read = self._take(probe)
+            if read is not None and probe.kind in ("hand", "reference"):
+                self._read.append((probe, read))
+                self._found[probe.kind] = tuple(self._say(probe.kind, self._compare(probe)))
+        self._seen = len(probes)
+        return tuple(line for lines in self._found.values() for line in lines)
+
+    def _compare(self, newest: PlayedProbe) -> tuple[Drift, ...]:
+        """The newest one beside the earlier ones of its kind: a hand's of its sitting, a free handle's of them all."""
+        if newest.kind == "reference":
+            references = [read for probe, read in self._read if probe.kind == "reference"]
+            first, last = references[0], references[-1]
+            return drifts((*first.timed, last.timed[-1]), _period(last), WITHOUT_HAND) if last is not first else ()
+        alike = [read for probe, read in self._read if (probe.kind, probe.sitting) == ("hand", newest.sitting)]
+        return drifts([timed for read in alike for timed in read.timed], _period(alike[-1]))
+
+    def _say(self, kind: str, found: tuple[Drift, ...]) -> Iterator[DriftLine]:
+        named = {(kind, drift.number, drift.axis): drift for drift in found}
+        # What is gone again has no beginning any more.
+        self._since_s = {key: s for key, s in self._since_s.items() if key[0] != kind or key in named}
+        for key, drift in named.items():
+            since_s = self._since_s.setdefault(key, drift.at_s)
+            words = sentence(replace(drift, at_s=since_s))
+            yield DriftLine(since_s, f"without a hand, {words}" if kind == "reference" else words, is_beyond(drift))
+
+    def _take(self, probe: PlayedProbe) -> _Read | None:
+        """None where nothing was kept, or it cannot be used."""
+        if not probe.recording or probe.trouble:
+            return None
+        try:
+            recording = read_recording(self._folder.path / probe.recording)
+            parts = _halves(recording) if probe.kind == "reference" else (recording,)
+            timed = tuple(TimedProbe(probe.at_s, probe.level_n, probe_lines(part, PERIOD_S)) for part in parts)
+        except (StudyError, ValueError):
+            return None
+        return _Read(recording.sample_rate_hz, timed)
+
+
+def sentence(drift: Drift) -> str:
+    """ "friction along x 0.12 -> 0.20 N at minute 14"."""
+    minute = f"at minute {drift.at_s / 60:.0f}"
+    along = f" along {drift.axis}" if drift.axis else ""
+    other = f" (or {' or '.join(drift.rivals)}: the probes cannot tell)" if drift.rivals else ""
+    if drift.before is not None:
+        return f"friction{along} {drift.before:.2f} -> {max(0.0, drift.before + drift.change):.2f} N {minute}{other}"
+    if drift.number == "gain":
+        return f"gain{along} {100 * drift.change:+.0f} % {minute}{other}"
+    if drift.number == "delay":
+        return f"delay {1000 * drift.change:+.2f} ms {minute}{other}"
+    what = "friction" if drift.number == "friction" else f"grip: {drift.number}"
+    return f"{what}{along} {drift.change:+.3g} {drift.unit} {minute}{other}"
+
+
+def is_beyond(drift: Drift) -> bool:
+    """Whether it leaves what the analysis of a session allows."""
+    return abs(drift.change) > ALLOWED[drift.number]
+
+
+def _halves(recording: Recording) -> tuple[Recording, Recording]:
+    """Of a reference, without its first period."""
+    (whole,) = recording.segments
+    middle = whole.start + (whole.stop - whole.start) // 2 // whole.period * whole.period
+    return (
+        replace(recording, segments=(replace(whole, stop=middle),)),
+        replace(recording, segments=(replace(whole, start=middle),)),
+    )
+
+
+def _period(read: _Read) -> int:
+    return round(PERIOD_S * read.rate_hz)

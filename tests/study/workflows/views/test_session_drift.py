@@ -1,0 +1,80 @@
+"""A session whose device changes in its middle, as who follows it sees it."""
+
+from dataclasses import replace
+
+import pytest
+
+from protocols.definition.probes import ProbeSettings
+from protocols.document.dumping import dump_protocol
+from study.devices.safe import SafeDevice
+from study.devices.simulated import layout, omega3
+from study.session.watching.watched import PlayedProbe
+from study.tui.watch.watch_lines import status
+from study.workflows.views.session_drift import DriftReader
+from study.workflows.views.watch_session import follow
+
+AFTER = 7
+"""Probes with a hand before something changes: two of each level, and one."""
+
+
+@pytest.fixture
+def probed(sitter, monkeypatch):
+    """Conducts a session in which the simulated device's friction becomes `times` as large."""
+
+    def session(times: float):
+        packed, held, hold = [], [], SafeDevice.hold
+
+        def build(*values, **named):
+            rig = build_omega3(*values, **named)
+            packed.append(rig.parameters)
+            return rig
+
+        def counted(self, stimulus):
+            held.extend([1] * (stimulus.fade_in_s == 0.25))
+            if len(held) == AFTER + 2:  # and the test of the free handle
+                packed[-1][layout.FRICTION] *= times
+                held.append(1)
+            hold(self, stimulus)
+
+        build_omega3 = omega3.build_omega3
+        monkeypatch.setattr("study.devices.rigs_by_name.build_omega3", build)
+        monkeypatch.setattr(SafeDevice, "hold", counted)
+        probes = ProbeSettings(levels_n=(0.2, 0.4, 0.8), interval_s=15.0, reference_s=5.0)
+        kept = replace(sitter.protocol.measurement, keep_s=1.0)
+        slow = replace(sitter.protocol.trial, pause_between_s=8.0)
+        sitter.protocol = replace(sitter.protocol, probes=probes, measurement=kept, trial=slow)
+        sitter.text = dump_protocol(sitter.protocol)
+        return sitter.whole().folder
+
+    return session
+
+
+def view_of(folder):
+    return follow(folder.path).look("2030-01-01T00:00:00.000+00:00")
+
+
+def test_more_friction_in_mid_session_is_named_with_number_and_time(probed):
+    view = view_of(probed(2.0))
+    assert view.probes >= 11
+    assert {drift.sentence[:16] for drift in view.drifts} == {f"friction along {axis}" for axis in "xyz"}
+    assert all(" N at minute " in drift.sentence for drift in view.drifts)
+    assert any(line.startswith("Drift      friction along x 0.") for line in status(view))
+
+
+def test_where_nothing_changes_nothing_is_named(probed):
+    view = view_of(probed(1.0))
+    assert view.probes >= 11
+    assert view.drifts == ()
+    assert any("nothing found" in line for line in status(view))
+
+
+def test_a_session_without_probes_says_nothing_of_them(sitter):
+    view = view_of(sitter.whole().folder)
+    assert (view.probes, view.drifts) == (0, ())
+    assert not any(line.startswith("Drift") for line in status(view))
+
+
+def test_a_recording_that_is_gone_is_left_out(sitter):
+    folder = sitter.whole().folder
+    lost = PlayedProbe(0, "hand", 0.2, 1.0, 0, "recordings/probe-000.h5")
+    assert DriftReader(folder).look((lost, replace(lost, number=1, recording=""))) == ()
