@@ -40,14 +40,25 @@ def probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: floa
     return HeldStimulus(loop, fade_in_s=FADE_S, fade_out_s=FADE_S, fade_shape="raised_cosine")
 
 
-def reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[Signal, Segment]:
-    """The reference as commands, and where its whole periods lie in them."""
-    wave = settings.reference_n * probe_wave(settings, sample_rate_hz)
+def reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[Signal, tuple[Segment, ...]]:
+    """The reference as commands, and its whole periods in them: first at full level, then, to show friction, at half of
+    it. Of each part the last third is kept for the test of a model."""
+    wave = probe_wave(settings, sample_rate_hz)
     n, fade = len(wave), round(FADE_S * sample_rate_hz)
-    periods = max(2, round(settings.reference_s / PERIOD_S))
-    forces = apply_fades(wave[np.arange(-fade, periods * n + fade) % n], fade, fade)
-    segment = Segment(fade, fade + periods * n, "multisine", settings.reference_n, n, "fit")
-    return _forces(forces, sample_rate_hz), segment
+    part = max(4, round(settings.reference_s / PERIOD_S / 2))
+    # A period between the parts, in which the amplitude falls.
+    share = np.concatenate([np.ones(fade + part * n), np.ones(n), np.full(part * n + fade, 0.5)])
+    share[fade + part * n : fade + part * n + n] = np.linspace(1.0, 0.5, n)
+    level = settings.reference_n * share
+    forces = apply_fades(level[:, None] * wave[np.arange(-fade, len(share) - fade) % n], fade, fade)
+    segments = []
+    for start, level_n in ((fade, settings.reference_n), (fade + (part + 1) * n, settings.reference_n / 2)):
+        middle, stop = start + (2 * part // 3) * n, start + part * n
+        segments += [
+            Segment(start, middle, "multisine", level_n, n, "fit"),
+            Segment(middle, stop, "multisine", level_n, n, "test"),
+        ]
+    return _forces(forces, sample_rate_hz), tuple(segments)
 
 
 def _forces(samples: FloatArray, sample_rate_hz: float) -> Signal:

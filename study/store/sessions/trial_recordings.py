@@ -10,6 +10,9 @@ from study.store.disk.provenance import sha256_of
 from study.store.formats.recording_file import read_recording, write_recording
 from study.store.sessions.archive import SessionFolder
 
+PROBE_PREFIX = "probe-"
+"""Of files that hold a probe, and no trial."""
+
 
 @dataclass(frozen=True, slots=True)
 class SavedRecording:
@@ -21,6 +24,11 @@ class SavedRecording:
 def recording_name(run: int, trial: int, attempt: int) -> str:
     """Name of a trial's recording, relative to the session folder."""
     return f"recordings/run-{run:02d}_trial-{trial:03d}_attempt-{attempt}.h5"
+
+
+def probe_name(number: int) -> str:
+    """Name of a probe's recording, relative to the session folder."""
+    return f"recordings/{PROBE_PREFIX}{number:03d}.h5"
 
 
 def save_trial_recording(

@@ -1,7 +1,7 @@
 """Input of a diagnosis: recordings or a session's trials, and the model to compare with."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -46,7 +46,12 @@ def read_input(
     if folders:
         # Here, for all that reads sessions takes long to import.
         from study.workflows.diagnosis.session_as_recordings import session_recordings
+        from study.workflows.diagnosis.session_references import find_references
 
+        if (references := find_references(folders[0])) is not None:
+            free = read_input(references.paths, seed, plain)
+            parents, remarks = (references.log, *references.paths), (*references.remarks, *free.remarks)
+            return replace(free, parents=parents, remarks=remarks)
         session = session_recordings(folders[0], seed)
         kept = _translate_refusal(lambda: comparable((session.recording,), (session.name,), plain))
         return DiagnosisInput(

@@ -24,6 +24,7 @@ from study.session.facts.events import TrialMeasured
 from study.store.disk.provenance import sha256_of
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import SessionFolder, find_session
+from study.store.sessions.trial_recordings import PROBE_PREFIX
 from study.workflows.results.fold_session import fold_session
 
 MOST_S = 60.0
@@ -65,7 +66,8 @@ def session_recordings(session: Path, seed: int) -> SessionRecordings:
     folded = fold_session(folder)
     opened = folded.state.opened
     logged = {e.recording: e.sha256 for e in folded.contents.events if isinstance(e, TrialMeasured) and e.recording}
-    found = [_trial(path, logged) for path in sorted(folder.recordings.glob("*.h5"))]
+    paths = [path for path in sorted(folder.recordings.glob("*.h5")) if not path.name.startswith(PROBE_PREFIX)]
+    found = [_trial(path, logged) for path in paths]
     usable = [trial for trial in found if trial is not None]
     if not usable:
         raise StudyError(

@@ -17,7 +17,7 @@ from study.session.views.form_views import FormKind
 from study.session.views.forms import form_of, judge_form, take_the_handle
 from study.session.views.views import PlayingNotice, Unanswered
 from study.store.disk.provenance import versions
-from study.store.sessions.trial_recordings import save_trial_recording
+from study.store.sessions.trial_recordings import probe_name, save_trial_recording
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
 from study.workflows.trial.sitting import Sitting, record, release_device, tell
 
@@ -93,7 +93,7 @@ def _decline(state: SessionState, why: str, sitting: Sitting) -> SessionState:
 
 def _play_free(state: SessionState, sitting: Sitting) -> AfterTrial:
     probes, rate_hz = state.protocol.probes, sitting.device.info.sample_rate_hz
-    commands, segment = reference_commands(probes, rate_hz)
+    commands, segments = reference_commands(probes, rate_hz)
     state = _begin(state, "reference", probes.reference_n, sitting)
     sitting.supervisor.begin("reference")
     sitting.display.trouble(f"Hands off: the reference plays for {commands.duration_s:.0f} s.")
@@ -110,7 +110,7 @@ def _play_free(state: SessionState, sitting: Sitting) -> AfterTrial:
         reply = sitting.supervisor.resolve(Unanswered("the reference was cut short", leave=False, asked=True))
         after = cut_short(state, reply) if isinstance(reply, Unanswered) else AfterTrial(state)
         return replace(after, leave=after.leave or reason_to_leave(fault), fault=fault)
-    kept = None if played.recording is None else replace(played.recording, segments=(segment,))
+    kept = None if played.recording is None else replace(played.recording, segments=segments)
     trouble = "" if kept is not None else played.health.fault.value
     state = _end(state, kept, commands.duration_s, trouble, sitting).state
     return AfterTrial(state, leave=reason_to_leave(played.health.fault), fault=played.health.fault)
@@ -151,7 +151,7 @@ def _end(state: SessionState, recording: Recording | None, seconds: float, troub
             mass_kg = max(0.0, apparent_mass_kg(probe_lines(recording, PERIOD_S)))
         except ValueError as problem:
             trouble = str(problem)
-        name = f"recordings/probe-{probing.open.number:03d}.h5"
+        name = probe_name(probing.open.number)
         saved = save_trial_recording(sitting.folder, name, recording, _conditions(probing.open, sitting))
         rms = float(np.sqrt(np.nanmean(np.sum(recording.response.samples**2, axis=1))))
     if trouble:

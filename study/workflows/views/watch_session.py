@@ -25,7 +25,7 @@ from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.results.fold_session import protocol_of
 
 if TYPE_CHECKING:
-    from study.workflows.views.session_drift import DriftReader
+    from study.workflows.results.session_drift import DriftReader
 
 PROBE_EVERY_S = 1.0
 """Shortest interval between probes of the lock of a session without a sign of life."""
@@ -71,7 +71,7 @@ class Follower:
         if not watched.probes:
             return ()
         if self._drifts is None:  # its arrays take long to import, and most sessions have no probes
-            from study.workflows.views.session_drift import DriftReader
+            from study.workflows.results.session_drift import DriftReader
 
             self._drifts = DriftReader(self._folder)
         return self._drifts.look(watched.probes)

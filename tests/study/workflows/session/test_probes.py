@@ -144,6 +144,14 @@ def test_the_forces_are_odd_lines_one_axis_each_and_the_same_in_probe_and_refere
     assert not lines[::2].any()
     assert lines.sum(axis=1).max() == 1
     assert lines.sum(axis=0).min() >= 9
-    commands, segment = reference_commands(PROBES, 1000.0)
-    assert np.allclose(commands.samples[segment.start : segment.start + 1000], loop / 0.8)
-    assert (segment.stop - segment.start) % segment.period == 0
+    commands, segments = reference_commands(PROBES, 1000.0)
+    for segment in segments:
+        played = commands.samples[segment.start : segment.start + 1000]
+        assert np.allclose(played, segment.amplitude / 0.8 * loop)
+        assert (segment.stop - segment.start) % segment.period == 0
+    assert [(each.amplitude, each.role) for each in segments] == [
+        (1.0, "fit"),
+        (1.0, "test"),
+        (0.5, "fit"),
+        (0.5, "test"),
+    ]

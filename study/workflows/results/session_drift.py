@@ -108,13 +108,8 @@ def is_beyond(drift: Drift) -> bool:
 
 
 def _halves(recording: Recording) -> tuple[Recording, Recording]:
-    """Of a reference, without its first period."""
-    (whole,) = recording.segments
-    middle = whole.start + (whole.stop - whole.start) // 2 // whole.period * whole.period
-    return (
-        replace(recording, segments=(replace(whole, stop=middle),)),
-        replace(recording, segments=(replace(whole, start=middle),)),
-    )
+    """Both segments of a reference at full level."""
+    return replace(recording, segments=recording.segments[:1]), replace(recording, segments=recording.segments[1:2])
 
 
 def _period(read: _Read) -> int:

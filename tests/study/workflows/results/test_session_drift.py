@@ -10,7 +10,7 @@ from study.devices.safe import SafeDevice
 from study.devices.simulated import layout, omega3
 from study.session.watching.watched import PlayedProbe
 from study.tui.watch.watch_lines import status
-from study.workflows.views.session_drift import DriftReader
+from study.workflows.results.session_drift import DriftReader
 from study.workflows.views.watch_session import follow
 
 AFTER = 7
@@ -78,3 +78,24 @@ def test_a_recording_that_is_gone_is_left_out(sitter):
     folder = sitter.whole().folder
     lost = PlayedProbe(0, "hand", 0.2, 1.0, 0, "recordings/probe-000.h5")
     assert DriftReader(folder).look((lost, replace(lost, number=1, recording=""))) == ()
+
+
+def test_two_references_tell_what_changed_at_the_device_alone(sitter, monkeypatch):
+    """Ends after the first trials, and goes on with more friction: between the sittings, and so without a hand too."""
+    probes = ProbeSettings(levels_n=(0.4,), interval_s=15.0, reference_s=6.0)
+    kept = replace(sitter.protocol.measurement, keep_s=1.0)
+    sitter.protocol = replace(sitter.protocol, probes=probes, measurement=kept)
+    sitter.text = dump_protocol(sitter.protocol)
+    folder = sitter.interrupted(3).folder
+    build_omega3 = omega3.build_omega3
+
+    def build(*values, **named):
+        rig = build_omega3(*values, **named)
+        rig.parameters[layout.FRICTION] *= 2.0
+        return rig
+
+    monkeypatch.setattr("study.devices.rigs_by_name.build_omega3", build)
+    view = view_of(sitter.resumed(folder).folder)
+    alone = [drift.sentence for drift in view.drifts if drift.sentence.startswith("without a hand, ")]
+    assert alone
+    assert all("friction" in each for each in alone)

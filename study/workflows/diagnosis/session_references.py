@@ -1,0 +1,62 @@
+"""The references of a session, played without a hand, as the recordings that a diagnosis names effects from.
+
+With a hand at single frequencies nothing can be named; a multisine on a free handle is a recording like those of
+`hapteq record`. What the probes with a hand found changed is said beside.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from study.session.facts.events import ProbeMeasured, ProbePlayed
+from study.session.watching.watched import begin_watching, follow
+from study.store.disk.provenance import sha256_of
+from study.store.sessions.archive import SessionFolder, find_session
+from study.workflows.results.fold_session import FoldedSession, fold_session
+from study.workflows.results.session_drift import DriftReader
+
+
+@dataclass(frozen=True, slots=True)
+class SessionReferences:
+    log: Path
+    paths: tuple[Path, ...]
+    remarks: tuple[str, ...]
+
+
+def find_references(session: Path) -> SessionReferences | None:
+    """None where none was kept, or none is as it was logged. Raises StudyError where the session cannot be read."""
+    folder = find_session(str(session), session.absolute().parent)
+    folded = fold_session(folder)
+    if not folded.state.protocol.probes.played:
+        return None
+    events = folded.contents.events
+    kinds = {event.number: event.kind for event in events if isinstance(event, ProbePlayed)}
+    measured = [e for e in events if isinstance(e, ProbeMeasured) and e.recording and not e.trouble]
+    paths = tuple(
+        folder.path / event.recording
+        for event in measured
+        if event.recording and kinds[event.number] == "reference" and _is_as_logged(folder, event)
+    )
+    if not paths:
+        return None
+    what = "the reference" if len(paths) == 1 else f"the {len(paths)} references"
+    said = (
+        f"Of {folder.name} {what} without a hand went into the diagnosis, and not its trials, which show single "
+        "frequencies with a hand."
+    )
+    return SessionReferences(folder.log, paths, (said, *_drifts(folder, folded)))
+
+
+def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
+    path = folder.path / (event.recording or "")
+    return path.is_file() and sha256_of(path) == event.sha256
+
+
+def _drifts(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
+    """What changed from probe to probe, in one remark."""
+    watched = begin_watching(folded.state.opened, folded.state.protocol)
+    for event in folded.contents.events[1:]:
+        watched = follow(watched, event)
+    told = "; ".join(drift.sentence for drift in DriftReader(folder).look(watched.probes))
+    return (
+        f"In its {len(watched.probes)} probes {f'there changed: {told}' if told else 'nothing is seen to change'}.",
+    )
