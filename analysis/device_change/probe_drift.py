@@ -1,7 +1,7 @@
 """What drifts during a session: probes compared line by line with the first ones, in physical numbers.
 
 A line drives one axis j with the force F; all axes answer with accelerations A. With A0, F0 of the first probes at the
-same level, and a mechanism that is reciprocal, whatever else it does drops out of
+same level, and a mechanism that is reciprocal, all else that it does drops out of
 
     (F A0_j - F0 A_j) / (A0_j A_j) = sum over k of (dM_k + dC_k / iw - dK_k / w^2) A0_k A_k / (A0_j A_j)
                                      - g_j F / A_j + iw T F / A_j + friction
@@ -21,8 +21,7 @@ from itertools import combinations
 
 import numpy as np
 
-from analysis.device_change.probe_friction import friction_shapes
-from analysis.device_change.probe_lines import ComplexArray, IntArray, ProbeLines
+from analysis.device_change.probe_lines import ComplexArray, IntArray, ProbeLines, friction_shapes
 from equalizer.signals.signal import FloatArray
 
 AXES = "xyz"
@@ -32,8 +31,9 @@ COST = 8.0
 """Of one more number, in units of the squared misfit over noise: twice Akaike's and more, against false alarms."""
 MOST = 2
 """Causes at a time: with more of them, what friction does beyond its law is taken for hand and motor."""
-SAME = 1.5
-"""Ratio of squared misfits below which two causes cannot be told apart."""
+SAME = 2.0
+"""Ratio of squared misfits below which two causes cannot be told apart. On the simulated omega.3 a hand that becomes half
+or one and a half of what it was leaves 1.2 to 1.7 times what a gain leaves: friction is more there than its law."""
 DELAY_STEPS = 3
 DEVIATIONS = 4.0
 """Standard errors beyond which a number is more than the scatter."""

@@ -108,7 +108,7 @@ def _let_go(protocol: StudyProtocol) -> Form:
     return Form(
         FormKind.HANDLE,
         "Let go of the handle",
-        f"Take the hand off the handle and keep it away. It will shake for {probes.reference_s + 3:.0f} seconds, "
+        f"Take the hand off the handle and keep it away. It will shake for {probes.reference_s + 5:.0f} seconds, "
         f"with at most {probes.reference_n:g} newtons.",
         (FormField("free", "Is the handle free, and does nothing touch it?", ("yes", "not now")),),
     )

@@ -37,10 +37,8 @@ class LiveInfo:
 def watch_view(watched: Watched, beside: LiveInfo, now_utc: str, before: WatchView | None = None) -> WatchView:
     """The view at `now_utc`. before: the previous view, so that a lasting alarm keeps its start time."""
     state = watched.state
-    live = _of_this_sitting(watched, beside.live)
-    standing = _find_standing(watched, live, beside.writer)
-    exposure = _exposure(watched, live, standing, now_utc)
-    situation = Situation(watched, live, beside.problem, standing, exposure, now_utc, beside.drifts)
+    situation = _situation(watched, beside, now_utc)
+    live, standing = situation.live, situation.standing
     activity, since_utc = _activity(watched, live, standing)
     catches = [trial for trial in state.trials if trial.phase is Phase.CATCH and trial.counts]
     run = shown_run(state)
@@ -64,7 +62,7 @@ def watch_view(watched: Watched, beside: LiveInfo, now_utc: str, before: WatchVi
         open_trial=open_trial(state, situation.open_s),
         last=last_trials(watched),
         answers=state.answers,
-        exposure=exposure,
+        exposure=situation.exposure,
         catch_given=len(catches),
         catch_lapses=sum(not trial.correct for trial in catches),
         practice=practice(state),
@@ -76,6 +74,13 @@ def watch_view(watched: Watched, beside: LiveInfo, now_utc: str, before: WatchVi
         probes=len(watched.probes),
         drifts=beside.drifts,
     )
+
+
+def _situation(watched: Watched, beside: LiveInfo, now_utc: str) -> Situation:
+    live = _of_this_sitting(watched, beside.live)
+    standing = _find_standing(watched, live, beside.writer)
+    exposure = _exposure(watched, live, standing, now_utc)
+    return Situation(watched, live, beside.problem, standing, exposure, now_utc, beside.drifts)
 
 
 def _of_this_sitting(watched: Watched, live: Live | None) -> Live | None:

@@ -43,6 +43,10 @@ class PlayingScreen(Screen[Unanswered | None]):
     def compose(self) -> ComposeResult:
         notice = self._notice
         yield LiteralText(notice.title, id="title")
+        if notice.title and not notice.number:  # a probe: nothing will be asked about it
+            yield LiteralText("It ends by itself. No key is needed.", id="said")
+            yield Footer(show_command_palette=False)
+            return
         with Horizontal(id="answers"):
             for number in (1, 2):
                 panel = DirectionPanel(number, notice.picture)

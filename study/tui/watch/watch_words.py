@@ -132,5 +132,5 @@ def drift_words(view: WatchView) -> str:
         return ""
     beyond = sum(drift.beyond for drift in view.drifts)
     if not view.drifts:
-        return f"nothing found in {view.probes} probes"
+        return f"none in {view.probes} probes"
     return f"{len(view.drifts)} changed, {beyond} beyond what is allowed"

@@ -5,7 +5,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from analysis.device_change.probe_lines import apparent_mass_kg, probe_lines
 from equalizer.signals.recording import Recording
 from protocols.definition.probes import PERIOD_S
 from study.devices.device import Fault, Played
@@ -147,10 +146,7 @@ def _end(state: SessionState, recording: Recording | None, seconds: float, troub
     if recording is None:
         trouble = trouble or "too little of it was kept"
     else:
-        try:
-            mass_kg = max(0.0, apparent_mass_kg(probe_lines(recording, PERIOD_S)))
-        except ValueError as problem:
-            trouble = str(problem)
+        mass_kg, trouble = _mass_kg(recording, trouble)
         name = probe_name(probing.open.number)
         saved = save_trial_recording(sitting.folder, name, recording, _conditions(probing.open, sitting))
         rms = float(np.sqrt(np.nanmean(np.sum(recording.response.samples**2, axis=1))))
@@ -167,6 +163,17 @@ def _end(state: SessionState, recording: Recording | None, seconds: float, troub
         trouble=trouble,
     )
     return _Measured(record(state, event, sitting), None, Played(recording, sitting.device.health()), mass_kg)
+
+
+def _mass_kg(recording: Recording, trouble: str) -> tuple[float | None, str]:
+    """What the handle seems to weigh, None where that cannot be said; and the trouble, with that."""
+    # Here, because most sessions have no probes and begin sooner without it.
+    from analysis.device_change.probe_lines import apparent_mass_kg, probe_lines
+
+    try:
+        return max(0.0, apparent_mass_kg(probe_lines(recording, PERIOD_S))), trouble
+    except ValueError as problem:
+        return None, str(problem)
 
 
 def _conditions(probe: ProbePlayed, sitting: Sitting) -> dict[str, Any]:
