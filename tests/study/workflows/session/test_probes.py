@@ -18,6 +18,7 @@ from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import EventLog, read_log
 from study.workflows.session.simulated_display import SimulatedDisplay
 from study.workflows.trial.play_probe import NO_QUESTION
+from study.workflows.trial.session_supervisor import SessionSupervisor
 
 PROBES = ProbeSettings(levels_n=(0.2, 0.4, 0.8), interval_s=20.0, reference_s=3.0)
 
@@ -155,3 +156,38 @@ def test_the_forces_are_odd_lines_one_axis_each_and_the_same_in_probe_and_refere
         (0.5, "fit"),
         (0.5, "test"),
     ]
+
+
+def test_a_reference_that_is_cut_short_by_a_pause_lets_go_and_the_session_goes_on_held(probed, monkeypatch):
+    glance, hands = SessionSupervisor.glance, []
+
+    def asks_for_a_pause(self):
+        if self._activity == "reference":
+            self.pause_asked = "experimenter"
+        return glance(self)
+
+    simulate = SafeDevice.simulate_hand
+    monkeypatch.setattr(SessionSupervisor, "glance", asks_for_a_pause)
+    monkeypatch.setattr(SafeDevice, "simulate_hand", lambda self, on: hands.append(on) or simulate(self, on))
+    done = probed.whole()
+    assert done.left == ""
+    assert hands == [False, True]
+    events = events_of(done.folder)
+    (cut,) = (e for e in events if isinstance(e, ProbeMeasured) and e.trouble)
+    assert cut.trouble == "it was cut short"
+    assert cut.recording is None
+
+
+def test_a_stop_within_a_reference_ends_the_sitting_without_force(probed, monkeypatch):
+    glance = SessionSupervisor.glance
+
+    def asks_for_a_stop(self):
+        if self._activity == "reference":
+            self._device.stop()
+            self.stop_asked = "experimenter"
+        return glance(self)
+
+    monkeypatch.setattr(SessionSupervisor, "glance", asks_for_a_stop)
+    done = probed.whole()
+    assert "the experimenter stopped the session" in done.left
+    assert done.state.answers == 0
