@@ -1,6 +1,22 @@
 """Notice before a real device moves by itself: who may touch it."""
 
+from collections.abc import Callable
+
 from protocols.definition.recording_protocol import RecordingProtocol
+from study.errors import StudyError
+
+BeforeMoving = Callable[[str], None]
+"""Told a notice for the people around a real device; an exception from it keeps the device still."""
+
+
+def refuse_unannounced(notice: str) -> None:
+    """Of a caller that tells no person: a real device does not move for it. Raises StudyError."""
+    raise StudyError(
+        "The device was not moved",
+        f"A real device would move without a warning. {notice}",
+        "Use the command, which asks first; from Python, give before_moving.",
+        saved="Nothing moved.",
+    )
 
 
 def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> str:

@@ -19,6 +19,7 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
 from study.errors import StudyError, WrongUseError
+from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.protocol_files import read_recording_protocol
@@ -61,7 +62,7 @@ class WrittenTwin:
 def write_twin(
     plan: TwinPlan,
     on_progress: Callable[[float], None],
-    before_moving: Callable[[str], None] = lambda notice: None,
+    before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenTwin:
     """Record, fit and write. `on_progress(share)`; before_moving as for `record_device`. Raises StudyError; no model
     is written then."""
@@ -129,9 +130,7 @@ def _reduce_amplitudes(protocol: RecordingProtocol) -> RecordingProtocol:
     return replace(protocol, segments=segments)
 
 
-def _record(
-    plan: RecordingPlan, on_progress: Callable[[float], None], before_moving: Callable[[str], None]
-) -> Recording:
+def _record(plan: RecordingPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving) -> Recording:
     total = max(plan.total_s, 1e-9)
     record_device(plan, lambda seconds: on_progress(min(seconds / total, 1.0)), before_moving)
     return _last_realisation_tests(read_recording(plan.out))

@@ -28,19 +28,18 @@ from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError, StudyError, WrongUseError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
+from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.disk.json_document import write_json
 from study.store.disk.new_folder import new_folder, require_new_folder
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.models_for_playing import ModelsForPlaying, Vector, models_for_playing
 from study.workflows.equalizer.play_forces import (
-    BeforeMoving,
     acting_spring,
     announce_motion,
     measured_acceleration,
     play_forces,
     playback_settings,
-    refuse_unannounced,
     require_device_alone,
 )
 

@@ -10,7 +10,7 @@ from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from study.devices.device import Device, DeviceSettings, Fault, Played
 from study.errors import DeviceError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
-from study.session.views.handle_notice import free_handle_notice
+from study.session.views.handle_notice import BeforeMoving, free_handle_notice
 from study.workflows.equalizer.models_for_playing import ModelsForPlaying
 from study.workflows.equalizer.spring_beside_model import spring_outside_model
 
@@ -68,15 +68,6 @@ def playback_settings(cap_n: float, models: ModelsForPlaying) -> DeviceSettings:
         place_m=models.at.place_m,
         beyond_hand_ceiling=cap_n > HAND_CAP_N,
     )
-
-
-BeforeMoving = Callable[[str], None]
-"""Told a notice for the people around a real device; an exception from it keeps the device still."""
-
-
-def refuse_unannounced(notice: str) -> None:
-    """Of a caller that tells no person: a real device does not move for it. Raises StudyError."""
-    raise _refusal(f"A real device would move without a warning. {notice}", "Use the command, which asks first.")
 
 
 def announce_motion(device: Device, peak_n: float, total_s: float, before_moving: BeforeMoving) -> None:

@@ -16,13 +16,12 @@ from study.devices.device import Device, Fault, Played
 from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
+from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.formats.repeats_file import repeats_path
 from study.workflows.equalizer.play_forces import (
-    BeforeMoving,
     announce_motion,
     measured_acceleration,
     play_forces,
-    refuse_unannounced,
 )
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, make_result, write_repeated
 

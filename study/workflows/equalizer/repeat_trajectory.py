@@ -15,6 +15,7 @@ from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.workspace.convergence_at_place import convergence_at
 from equalizer.tracking.workspace.feedforward_at_place import inverse_at
 from study.errors import StudyError
+from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.formats.repeats_file import repeats_path
 from study.workflows.equalizer.equalize_trajectory import (
     EqualizedTrajectory,
@@ -25,10 +26,8 @@ from study.workflows.equalizer.equalize_trajectory import (
 from study.workflows.equalizer.equalized_summary import summary, summary_lines
 from study.workflows.equalizer.models_for_playing import ModelsForPlaying
 from study.workflows.equalizer.play_forces import (
-    BeforeMoving,
     acting_spring,
     playback_settings,
-    refuse_unannounced,
     require_device_alone,
 )
 from study.workflows.equalizer.repeat_playback import OnProgress, repeat_playback

@@ -15,7 +15,7 @@ from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError
 from study.session.stimulus.limits import limits_of_recording
 from study.session.stimulus.recording_plan import pieces
-from study.session.views.handle_notice import handle_notice
+from study.session.views.handle_notice import BeforeMoving, handle_notice, refuse_unannounced
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import write_recording
 from study.workflows.free_name import require_free
@@ -46,18 +46,14 @@ class WrittenRecording:
     warnings: tuple[str, ...]
 
 
-def _ignore_notice(notice: str) -> None:
-    """For callers that know that no person is near the device."""
-
-
 def record_device(
     plan: RecordingPlan,
     on_progress: Callable[[float], None],
-    before_moving: Callable[[str], None] = _ignore_notice,
+    before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
     """Record the whole protocol. `on_progress(seconds)` counts recorded time, and steps back where something is
     repeated. `before_moving(notice)` is called before a real device moves, with the notice for those around it; an
-    exception from it keeps the device still.
+    exception from it keeps the device still. Without one, a real device is refused.
 
     If interrupted (KeyboardInterrupt), the complete pieces are written, and LeftError says so. Raises StudyError before
     anything moves if `out` exists already.
@@ -72,7 +68,7 @@ def record_on(
     device: Device,
     plan: RecordingPlan,
     on_progress: Callable[[float], None],
-    before_moving: Callable[[str], None] = _ignore_notice,
+    before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
     """As `record_device`, on an open device."""
     done: list[Take] = []

@@ -66,7 +66,7 @@ def recorded(device_like, kept):
         once = kept / f"{'-'.join(map(str, (seed, *changed, *changed.values())))}.h5"
         if not once.exists():
             with device_like(seed, changed) as (device, plan):
-                record_on(device, plan, lambda done: None)
+                record_on(device, plan, lambda done: None, lambda notice: None)
             plan.out.rename(once)
         shutil.copyfile(once, out)
         return read_recording(out)

@@ -13,8 +13,9 @@ from protocols.definition.recording_segments import MultisineSegment, SweepSegme
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.devices.safe import SafeDevice
-from study.errors import DeviceError, LeftError
+from study.errors import DeviceError, LeftError, StudyError
 from study.store.formats.recording_file import read_recording
+from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 from study.workflows.recording.play_pieces import MOST_TRIES
 from study.workflows.recording.record_device import RecordingPlan, record_device, record_on
 
@@ -178,6 +179,23 @@ def test_a_real_device_does_not_move_after_the_answer_no(tmp_path, device_that_c
     with pytest.raises(LeftError, match="0 of 2 pieces were recorded"):
         record_on(device, plan(tmp_path / "r.h5"), lambda _: None, no)
     assert device.look().position_m == (0.0, 0.0, 0.0)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "move",
+    [
+        lambda folder: record_device(plan(folder / "r.h5"), lambda _: None),
+        lambda folder: write_twin(TwinPlan(folder / "m.toml"), lambda _: None),
+    ],
+    ids=["record_device", "write_twin"],
+)
+def test_from_python_a_real_device_does_not_move_unannounced(tmp_path, device_that_clips_at, monkeypatch, move):
+    device = device_that_clips_at(1e3, simulated=False)
+    monkeypatch.setattr("study.workflows.recording.record_device.open_device", lambda *given: device)
+    monkeypatch.setattr(device, "play", lambda *given: pytest.fail("it moved"))
+    with pytest.raises(StudyError, match="without a warning"):
+        move(tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
