@@ -41,6 +41,7 @@ KEYS = (
     ("down", "", "↓", "Next"),
 )
 """Footer entries: key, where it has this meaning (empty: everywhere), how it is shown, meaning."""
+FOOTER_KEYS = frozenset(key for key, *_ in KEYS)
 FINISHED = "Go down to Continue and press Enter."
 
 
@@ -113,7 +114,9 @@ class FormScreen(Screen[FormReply]):
         return at < len(self._entry.form.fields) and self.query(FormQuestion)[at].stacked
 
     def on_key(self, event: Key) -> None:
-        if self._take(press(self._entry, event.key, event.character, self.stacked)):
+        taken = self._take(press(self._entry, event.key, event.character, self.stacked))
+        # A key without a meaning here would go on to its binding, which acts after the keys behind it.
+        if taken or event.key in FOOTER_KEYS:
             event.stop()
             event.prevent_default()
 

@@ -138,6 +138,18 @@ def test_keys_that_arrive_at_once_answer_the_questions_that_they_were_typed_for(
     assert on_stage(FormScreen(EXCLUSION), story) == [FormReply({"s1": "yes", "s2": "no", "s3": "yes"})]
 
 
+def test_a_key_without_a_meaning_where_it_was_typed_means_nothing_later(on_stage):
+    """At Continue "1" chooses nothing: it must not choose at the question that keys behind it go to."""
+
+    async def story(stage):
+        stage.burst("down", "down", "down", "1", "up", "n")
+        await stage.until(lambda: stage.app.screen.entry.given[2].answer)
+        await stage.pilot.pause(0.2)
+        assert [given.answer for given in stage.app.screen.entry.given] == ["", "", "no"]
+
+    on_stage(FormScreen(EXCLUSION), story)
+
+
 @pytest.mark.parametrize("form", [EXCLUSION, MIXED], ids=["choices", "mixed"])
 @pytest.mark.parametrize("seed", range(2))
 def test_any_burst_fills_in_what_the_same_keys_fill_in_one_by_one(on_stage, form, seed):
