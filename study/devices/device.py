@@ -26,6 +26,8 @@ class DeviceInfo:
     """At the handle, centre of the workspace: what the virtual spring's natural frequency refers to."""
     details: str = ""
     """Serial number, firmware, or the simulation's parameter set."""
+    has_sensor: bool = True
+    """Whether there is an accelerometer: a real device's is named by the lab's file."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """Builds the rig of a named device: library, device, watchdog and its proof, gravity compensation."""
 
 import time
+from dataclasses import replace
 from datetime import UTC, datetime
 
 from study.devices.accelerometer.serial_reader import SerialAccelerometer
@@ -39,7 +40,7 @@ def _rig(
 ) -> ForceDimensionRig:
     handle = open_model(library, model)
     try:
-        info = info_of(handle, library, model, lab.effective_mass_kg)
+        info = replace(info_of(handle, library, model, lab.effective_mass_kg), has_sensor=sensor is not None)
         if settings.hand_on_handle:
             check_accepted(info, datetime.now(UTC).date())
         cap_n = min(settings.limits.total_cap_n, model.max_force_n)

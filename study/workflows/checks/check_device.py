@@ -44,15 +44,14 @@ def check_device(
     place_m: where trials start. total_cap_n: the largest force that will be requested, if known; safety: its parts.
     with_sensor: False where the device was opened without its accelerometer, of which nothing is said then.
     """
-    looks = []
+    looks, info = [], device.info
     for _ in range(LOOKS):
         looks.append(device.look())
         clock.sleep(EVERY_S)
     answered = [look for look in looks if look.position_m is not None or look.acceleration_mps2 is not None]
     sensors = (_handle(answered, place_m),) if answered else ()
     if answered and with_sensor:
-        sensors = (*sensors, _accelerometer(answered))
-    info = device.info
+        sensors = (*sensors, _accelerometer(answered) if info.has_sensor else _no_accelerometer())
     largest = _largest_force(info, total_cap_n)
     made_of = (DeviceFinding("Force on a hand", forces_in_words(safety), fine=True),) if safety is not None else ()
     findings = (_kind(info), _answers(len(answered)), *sensors, _rate(info), largest, *made_of)
@@ -92,6 +91,11 @@ def _accelerometer(looks: list[Look]) -> DeviceFinding:
             "Lay the handle at rest. If that does not help, check the sensor's range, cable and mounting.",
         )
     return _noise(readings)
+
+
+def _no_accelerometer() -> DeviceFinding:
+    advice = "Trials run all the same; what the device delivered stays unknown. To add one, see `hapteq doctor`."
+    return DeviceFinding("Accelerometer", "none is configured", fine=False, advice=advice, warning=True)
 
 
 def _noise(readings_mps2: FloatArray) -> DeviceFinding:

@@ -144,6 +144,19 @@ def test_an_accelerometer_that_cannot_be_trusted_is_found(rig, rigs, clock, sens
     assert advice in sensor.advice
 
 
+def test_where_no_accelerometer_is_configured_that_is_said(rigs, clock):
+    class UnsensedRig(rigs.ScriptedRig):
+        @property
+        def info(self):
+            return replace(super().info, has_sensor=False)
+
+    rig = UnsensedRig()
+    rig.instead_of_sensing = changed(noisy(0.05), 4, math.nan)
+    sensor = findings(rig, rigs, clock)["Accelerometer"]
+    assert (sensor.value, sensor.fine, sensor.warning) == ("none is configured", False, True)
+    assert sensor.advice.startswith("Trials run all the same; what the device delivered stays unknown.")
+
+
 def test_a_rate_other_than_a_kilohertz_is_found(rigs, clock):
     class SlowRig(rigs.ScriptedRig):
         @property
