@@ -1,7 +1,9 @@
 """What every device keeps to, behind the same safety layer."""
 
 import contextlib
+import runpy
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,8 @@ from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 from study.store.formats.recording_file import write_recording
 
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+
 KINDS = (
     "simulated omega.3",
     "compiled mass",
@@ -21,6 +25,7 @@ KINDS = (
     "driver on the stub",
     "driver behind pipes",
     "replay of a recording",
+    "driver of the docs",
 )
 
 
@@ -54,6 +59,9 @@ def device(request, rigs, clock, pressed):
         opened = open_device("simulated", rigs.SETTINGS, clock, seed=3)
     elif request.param == "replay of a recording":
         opened = open_device(f"replay:{request.getfixturevalue('recorded')}", rigs.SETTINGS, clock, seed=3)
+    elif request.param == "driver of the docs":
+        example = runpy.run_path(str(EXAMPLES / "drive_own_device.py"))
+        opened = SafeDevice(example["InventedRig"](example["InventedLibrary"]()), rigs.SETTINGS, clock)
     elif request.param == "driver on the stub":
         stub = request.getfixturevalue("stepped_stub")
         opened = SafeDevice(stub.rig(), rigs.SETTINGS, clock)

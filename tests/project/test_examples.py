@@ -37,6 +37,14 @@ def test_a_protocol_is_written_and_a_wrong_one_refused(capsys):
     assert "0.800 N, answered right" in said
 
 
+def test_a_driver_of_ones_own_moves_its_handle_and_keeps_the_cap():
+    """That it is a driver at all: `tests/contracts/test_device_contract.py`."""
+    found = run("drive_own_device")
+    assert 1.0 < found["moved_mm"] < 2.0
+    assert "Nothing has moved" in found["refusal"]
+    assert not found["library"].force_mn.any()
+
+
 @pytest.mark.slow
 def test_a_simulated_study_has_a_threshold_per_frequency():
     assert len(run("simulate_and_analyse")["results"].thresholds) >= 10
