@@ -154,7 +154,7 @@ def _fit_sums(
         return ()
     best = fits[0]
     # Of a law's two starts the cheaper one may be that which ends where re-tuning without the law did.
-    ends = [refine(context, start) for start, each in fits if each is best[1]]
+    ends = [refine(context, start) for start, each in fits if each is best[1] and np.isfinite(start.cost)]
     refined = [(context.candidate(min(ends, key=lambda end: end.cost)), best[1])]
     others = {id(each): (start, each) for start, each in reversed(fits) if each is not best[1]}
     rest = [
@@ -164,7 +164,7 @@ def _fit_sums(
     close = [
         pair
         for pair in rest
-        if _count_numbers(pair) < _count_numbers(refined[0]) and inseparable(refined[0][0], pair[0])
+        if time_left() and _count_numbers(pair) < _count_numbers(refined[0]) and inseparable(refined[0][0], pair[0])
     ]
     refined += [(context.candidate(refine(context, candidate.fitted)), item) for candidate, item in close]
     return (*refined, *(pair for pair in rest if pair not in close))

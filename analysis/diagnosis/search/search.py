@@ -8,6 +8,8 @@ import numpy as np
 
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, explain, is_worthwhile
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
@@ -16,9 +18,9 @@ from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (
     Judgement,
     as_good_as_noise,
-    is_confirmed,
     judge,
     shares_taken,
+    test_confirms_addition,
     worth_naming,
 )
 from analysis.diagnosis.search.without_effect import without_effect
@@ -133,15 +135,21 @@ def _find_with_half(
     found = _prune_guarded(half, explain(half, catalogue, progress, time_left), time_left)
     judged = _judge_with_prediction(half, found)
     before = first.found.after if first.judgement.named else first.found.retuned
-    if not judged.named or not _names(before) < _names(found.after):
+    if not judged.named or not _sites(before) < _sites(found.after):
         return None
-    if not is_confirmed(half.with_test_score(before), found.after):
-        return None
+    if first.judgement.named:
+        # Fitted to the same samples: what the opened half does to the first effect is no merit of the second.
+        measure, fitted = half.measure, before.fitted
+        start = evaluate_fit(measure, half.tuning, fitted.deviations, fitted.hypothesis)
+        refitted = half.with_test_score(half.candidate(refine(half, start)))
+        if not test_confirms_addition(refitted, found.after):
+            return None
     return SearchResult(half, found, judged, (TEST_HALF_USED, *_remarks(found)))
 
 
-def _names(candidate: FittedCandidate) -> set[str]:
-    return {claim.effect.name for claim in candidate.fitted.hypothesis.claims}
+def _sites(candidate: FittedCandidate) -> set[tuple[str, int]]:
+    """Each effect's name at each of its places."""
+    return {(claim.effect.name, site) for claim in candidate.fitted.hypothesis.claims for site in claim.sites}
 
 
 def _prune_guarded(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:

@@ -114,11 +114,16 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
     placed = held.hypothesis.placed_effects()
     if any(each.effect.of_time for each in (*measure.known, *placed)):
         return None
+    remembers = any(isinstance(each.effect.acts, (AxisForce, JointForce)) for each in placed)
     before_s, behind_s = _run_in_s(measure, context.tuning.model)
+    kept = -1
     while (short := _shorten(context, measure, (before_s, behind_s))) is not None:
-        if not any(isinstance(each.effect.acts, (AxisForce, JointForce)) for each in placed) or short.agrees(held):
+        if not remembers or short.agrees(held):
             return short
-        before_s, behind_s = 2 * before_s, 2 * behind_s
+        # A simulation that ran away agrees with none, and all that lies before what is fitted may be kept already.
+        if (now := sum(map(len, short.kept))) == kept:
+            return None
+        kept, before_s, behind_s = now, 2 * before_s, 2 * behind_s
     return None
 
 

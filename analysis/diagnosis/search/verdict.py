@@ -21,6 +21,7 @@ from analysis.diagnosis.settings import (
     NAMED_GAIN,
     NAMED_SHARE,
     NOISE_ALONE,
+    SEALED_ALONE_ERROR,
     SEALED_TOO_SMALL,
 )
 
@@ -34,7 +35,7 @@ class Judgement:
 
 def judge(found: Explanation) -> Judgement:
     """The verdict by the samples to fit and to choose by; held-out ones can only withdraw a name, or `explained`."""
-    if not found.after.fitted.hypothesis.claims or not is_confirmed(found.retuned, found.after):
+    if not found.after.fitted.hypothesis.claims or not _is_confirmed(found):
         if found.before.score.worst_channel <= NOISE_ALONE:
             return Judgement("no_mismatch", False)
         return Judgement("parameters" if found.retuned.score.worst_channel <= NOISE_ALONE else "unexplained", False)
@@ -62,12 +63,21 @@ def worth_naming(found: Explanation) -> bool:
     return found.after.score.worst_channel <= NAMED_ERROR or share >= NAMED_SHARE or taken >= NAMED_GAIN
 
 
-def is_confirmed(without: FittedCandidate, with_it: FittedCandidate) -> bool:
-    """Whether the held-out samples confirm what `with_it` adds; yes where nothing was held out."""
-    whole, left = (float(np.mean(np.log(candidate.score.test))) for candidate in (without, with_it))
+def _is_confirmed(found: Explanation) -> bool:
+    """Whether the held-out samples confirm the explanation; yes where nothing was held out."""
+    whole, left = (float(np.mean(np.log(candidate.score.test))) for candidate in (found.retuned, found.after))
     if not np.isfinite(whole):
         return True
     return whole <= SEALED_TOO_SMALL or whole - left >= CONFIRMED_SHARE * whole
+
+
+def test_confirms_addition(without: FittedCandidate, with_it: FittedCandidate) -> bool:
+    """Whether the held-out samples, in their worst channel without it, confirm what `with_it` adds to a name."""
+    worst = float(np.max(without.score.test))
+    if not np.isfinite(worst) or worst <= SEALED_ALONE_ERROR:
+        return False
+    left = float(np.max(with_it.score.test))
+    return float(np.log(worst) - np.log(left)) >= CONFIRMED_SHARE * float(np.log(worst))
 
 
 def share_of_mismatch(without: FittedCandidate, with_it: FittedCandidate) -> float:
