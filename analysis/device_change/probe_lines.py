@@ -74,11 +74,23 @@ def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
     )
 
 
-def apparent_mass_kg(lines: ProbeLines, from_hz: float = 30.0) -> float:
-    """Median of the real part of force over acceleration along each driven axis, from `from_hz` on, where neither
-    friction nor springs matter much: a hand on the handle adds to it."""
-    rows, axes = np.nonzero(lines.driven & (lines.frequency_hz >= from_hz)[:, None])
-    return float(np.median((lines.force_n[rows, axes] / lines.acceleration_mps2[rows, axes]).real))
+MASS_LINES_HZ = (30.0, 60.0)
+"""Where neither friction and springs nor the linkage's modes matter much."""
+
+
+def apparent_mass_kg(lines: ProbeLines) -> float:
+    """Median of the real part of force over acceleration along each driven axis, on `MASS_LINES_HZ`: a hand on the
+    handle adds to it. Raises ValueError where there is no such line, or what comes out is no mass."""
+    low_hz, high_hz = MASS_LINES_HZ
+    here = (lines.frequency_hz >= low_hz) & (lines.frequency_hz <= high_hz)
+    rows, axes = np.nonzero(lines.driven & here[:, None])
+    if not len(rows):
+        raise ValueError(f"it has no line between {low_hz:g} and {high_hz:g} Hz, which would tell the handle's mass")
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a dead sensor
+        mass_kg = float(np.median((lines.force_n[rows, axes] / lines.acceleration_mps2[rows, axes]).real))
+    if not np.isfinite(mass_kg) or mass_kg <= 0:
+        raise ValueError("its acceleration does not follow the force: is the accelerometer right?")
+    return mass_kg
 
 
 def even_share(lines: ProbeLines, to_hz: float) -> float:

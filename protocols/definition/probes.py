@@ -14,6 +14,9 @@ from protocols.definition.staircase_rule import STRICT
 if TYPE_CHECKING:
     from protocols.definition.study_protocol import StudyProtocol
 
+REFERENCE_TO_HZ = 45.0
+"""The handle is seen to be free by lines from 30 Hz on: below this highest line there are too few."""
+
 PERIOD_S = 1.0
 """Period of a probe's multisine: its odd lines lie 2 Hz apart, and each of them drives a single axis."""
 
@@ -48,7 +51,9 @@ class ProbeSettings:
         float,
         Field(ge=15, le=3600, description="Shortest time from one probe to the next. Default 60: once a minute."),
     ] = 60.0
-    to_hz: Annotated[float, Field(ge=20, le=150, description="No line lies above. Default 60.")] = 60.0
+    to_hz: Annotated[
+        float, Field(ge=20, le=150, description="No line lies above; with a reference at least 45. Default 60.")
+    ] = 60.0
     reference_s: Annotated[
         float,
         Field(
@@ -74,6 +79,9 @@ class ProbeSettings:
         if self.reference_s and not self.levels_n:
             wrong = "is set without levels_n: only beside a probe with a hand is a free handle seen to be free"
             refuse([Problem("reference_s", wrong, "0, or levels_n beside it")])
+        if self.reference_s and self.to_hz < REFERENCE_TO_HZ:
+            wrong = f"is {self.to_hz:g} Hz: too low to see by a probe whether the handle is free for the reference"
+            refuse([Problem("to_hz", wrong, f"at least {REFERENCE_TO_HZ:g} Hz, or reference_s = 0")])
         return self
 
     @property

@@ -28,7 +28,9 @@ class ProbingState:
     referenced: bool = False
     """The reference of this sitting, since its last long pause, was played, tried or declined."""
     hand_mass_kg: float | None = None
-    """Apparent mass of the handle with the hand, at the last such probe of this sitting; None where not known."""
+    """Apparent mass of the handle with the hand, at the last such probe since a long pause; None where not known."""
+    hand_level_n: float = 0.0
+    """Level of that probe."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,16 +81,22 @@ def end_probe(probing: ProbingState, event: ProbeMeasured) -> ProbingState:
     declined = event.number == probing.played and event.recording is None
     if not declined and (probing.open is None or probing.open.number != event.number):
         raise LogContradiction(f"probe {event.number} was measured, which is not playing")
-    hand = probing.open is not None and probing.open.kind == "hand" and event.apparent_mass_kg is not None
+    hand = probing.open is not None and probing.open.kind == "hand"
     return replace(
         probing,
         open=None,
         referenced=probing.referenced or declined,
         hand_mass_kg=event.apparent_mass_kg if hand else probing.hand_mass_kg,
+        hand_level_n=probing.open.level_n if hand and probing.open is not None else probing.hand_level_n,
     )
 
 
 def after_break(probing: ProbingState, event: PauseTaken | RestTaken, settings: ProbeSettings) -> ProbingState:
-    """The state after a pause or rest: a long one asks for another reference."""
+    """The state after a pause or rest. A long one asks for another reference, and so for a probe of the grip as it is
+    then; after a shorter pause the next probe waits as long as after another: the handle is only being taken again."""
     seconds = event.paused_s if isinstance(event, PauseTaken) else event.rested_s
-    return replace(probing, referenced=False) if seconds >= settings.reference_after_pause_s else probing
+    if seconds >= settings.reference_after_pause_s:
+        return replace(probing, referenced=False, since_s=None, hand_mass_kg=None)
+    if isinstance(event, RestTaken) or probing.since_s is None:
+        return probing
+    return replace(probing, since_s=0.0)

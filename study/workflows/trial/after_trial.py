@@ -1,10 +1,16 @@
 """Result of a trial, a demonstration or a wait for the handle."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from study.devices.device import Fault
 from study.session.state.state import SessionState
 from study.session.views.views import Unanswered
+
+if TYPE_CHECKING:
+    from study.workflows.trial.sitting import Sitting
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +34,13 @@ def cut_short(state: SessionState, reply: Unanswered) -> AfterTrial:
     if reply.pause:
         return AfterTrial(state, pause=reply.reason)
     return AfterTrial(state, void="" if reply.asked else reply.reason)
+
+
+def check_end_request(state: SessionState, sitting: Sitting) -> AfterTrial | None:
+    """A stop or pause requested while nothing was played."""
+    sitting.supervisor.listen()
+    reply = sitting.supervisor.resolve(Unanswered("", leave=False, asked=True))
+    return cut_short(state, reply) if isinstance(reply, Unanswered) and (reply.leave or reply.pause) else None
 
 
 def reason_to_leave(fault: Fault) -> str:

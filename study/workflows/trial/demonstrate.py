@@ -8,7 +8,7 @@ from study.session.state.due_trial import labels_are_swapped
 from study.session.state.state import SessionState, felt
 from study.session.stimulus.stimulus import direction_angle_deg, direction_vector, held_stimulus
 from study.session.views.views import DemoDone, DemoMenu, PlayDemo, PlayingNotice, Unanswered, picture_of
-from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
+from study.workflows.trial.after_trial import AfterTrial, check_end_request, cut_short, reason_to_leave
 from study.workflows.trial.sitting import Sitting, record
 
 
@@ -19,7 +19,7 @@ def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
     while True:
         sitting.supervisor.begin("demo")
         choice = sitting.display.choose_demo(_menu(state, felt_so_far, vibration), sitting.supervisor.glance)
-        ended = _check_end_request(state, sitting)
+        ended = check_end_request(state, sitting)
         if ended is not None:
             return ended
         if isinstance(choice, DemoDone):
@@ -43,12 +43,6 @@ def _menu(state: SessionState, felt_so_far: tuple[tuple[int, int], ...], vibrati
         felt=felt_so_far,
         handle_moves=felt(state.opened) is not False,
     )
-
-
-def _check_end_request(state: SessionState, sitting: Sitting) -> AfterTrial | None:
-    """A stop or pause requested while nothing was played."""
-    reply = sitting.supervisor.resolve(Unanswered("", leave=False, asked=True))
-    return cut_short(state, reply) if isinstance(reply, Unanswered) and (reply.leave or reply.pause) else None
 
 
 def _play(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial:

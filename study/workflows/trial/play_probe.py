@@ -1,5 +1,6 @@
 """A probe between two trials, and the reference without a hand: logged, played, kept. Neither ever voids a trial."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -17,7 +18,8 @@ from study.session.views.forms import form_of, judge_form, take_the_handle
 from study.session.views.views import PlayingNotice, Unanswered
 from study.store.disk.provenance import versions
 from study.store.sessions.trial_recordings import probe_name, save_trial_recording
-from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
+from study.workflows.trial.after_trial import AfterTrial, check_end_request, cut_short, reason_to_leave
+from study.workflows.trial.present_trial import await_handle
 from study.workflows.trial.sitting import Sitting, record, release_device, tell
 
 LIGHTER_WITHOUT_A_HAND = 0.9
@@ -43,7 +45,12 @@ class _Measured:
 
 
 def play_probe(state: SessionState, probe: Probe, sitting: Sitting) -> AfterTrial:
-    """One probe with the hand on the handle."""
+    """One probe with the hand on the handle, which waits for it as a trial does."""
+    hindrance = await_handle(state, sitting)
+    if hindrance is not None:
+        return cut_short(state, hindrance)
+    if (ended := check_end_request(state, sitting)) is not None:
+        return ended
     measured = _hold(state, "hand", probe.level_n, sitting)
     return _after(measured.state, measured.reply, measured.played, sitting)
 
@@ -55,6 +62,8 @@ def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
     sitting.supervisor.begin("form")
     if not judge_form(state.protocol, FormKind.HANDLE, sitting.display.fill_in(form)).passed:
         return AfterTrial(_decline(state, "the handle was not free", sitting))
+    if (ended := check_end_request(state, sitting)) is not None:
+        return ended
     sitting.device.simulate_hand(False)
     after = _test_and_play(state, sitting)
     if after.leave:
@@ -67,8 +76,10 @@ def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
 
 
 def _test_and_play(state: SessionState, sitting: Sitting) -> AfterTrial:
-    held_kg, probes = state.sitting.probing.hand_mass_kg, state.protocol.probes
-    test = _hold(state, "free", max(probes.levels_n), sitting)
+    probing, probes = state.sitting.probing, state.protocol.probes
+    held_kg = probing.hand_mass_kg
+    # At the level of the probe that it is compared with: what friction and springs add depends on it.
+    test = _hold(state, "free", probing.hand_level_n or max(probes.levels_n), sitting)
     after = _after(test.state, test.reply, test.played, sitting)
     if after.leave or after.pause or after.fault is not Fault.NONE:
         return after
@@ -149,7 +160,8 @@ def _end(state: SessionState, recording: Recording | None, seconds: float, troub
         mass_kg, trouble = _mass_kg(recording, trouble)
         name = probe_name(probing.open.number)
         saved = save_trial_recording(sitting.folder, name, recording, _conditions(probing.open, sitting))
-        rms = float(np.sqrt(np.nanmean(np.sum(recording.response.samples**2, axis=1))))
+        mean_square = float(np.mean(np.sum(recording.response.samples**2, axis=1)))
+        rms = math.sqrt(mean_square) if math.isfinite(mean_square) else None
     if trouble:
         sitting.display.trouble(f"A probe is not used: {trouble}.")
     event = ProbeMeasured(
@@ -171,7 +183,7 @@ def _mass_kg(recording: Recording, trouble: str) -> tuple[float | None, str]:
     from analysis.device_change.probe_lines import apparent_mass_kg, probe_lines
 
     try:
-        return max(0.0, apparent_mass_kg(probe_lines(recording, PERIOD_S))), trouble
+        return apparent_mass_kg(probe_lines(recording, PERIOD_S)), trouble
     except ValueError as problem:
         return None, str(problem)
 

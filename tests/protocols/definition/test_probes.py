@@ -35,6 +35,7 @@ def test_a_table_that_is_not_written_changes_no_fingerprint_and_plays_nothing(sm
         ("[probes]\nlevels_n = [0.5]\ninterval_s = 5.0\n", "interval_s"),
         ("[probes]\nlevels_n = [0.5]\nreference_s = 20.0\nreference_n = 2.0\n", "reference_n"),
         ("[probes]\nreference_s = 20.0\n", "without levels_n"),
+        ("[probes]\nlevels_n = [0.5]\nreference_s = 20.0\nto_hz = 30.0\n", "whether the handle is free"),
         ("[measurement]\nkeep_s = 0.5\n[probes]\nlevels_n = [0.5]\n", r"measurement\.keep_s"),
     ],
 )

@@ -9,14 +9,23 @@ from protocols.definition.probes import ProbeSettings
 from protocols.document.dumping import dump_protocol
 from study.devices.safe import SafeDevice
 from study.errors import LeftError
-from study.session.facts.events import ProbeMeasured, ProbePlayed, TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.facts.events import (
+    PauseTaken,
+    ProbeMeasured,
+    ProbePlayed,
+    TrialMeasured,
+    TrialPresented,
+    TrialSpoiled,
+)
 from study.session.state.draw_check import LogContradiction
 from study.session.state.fold import apply
+from study.session.state.probing import ProbingState, after_break
 from study.session.stimulus.probe_stimulus import probe_stimulus, reference_commands
 from study.session.views.views import PlayingNotice
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import EventLog, read_log
 from study.workflows.session.simulated_display import SimulatedDisplay
+from study.workflows.trial import play_probe
 from study.workflows.trial.play_probe import NO_QUESTION
 from study.workflows.trial.session_supervisor import SessionSupervisor
 
@@ -94,6 +103,55 @@ def test_a_handle_that_is_still_held_gets_no_reference_and_the_session_goes_on(p
     assert done.left == ""
     assert not [e for e in events if isinstance(e, ProbePlayed) and e.kind == "reference"]
     assert any("seems to be held" in e.trouble for e in events if isinstance(e, ProbeMeasured))
+
+
+@pytest.mark.parametrize("factor", [-1.0, 0.0, np.nan], ids=["turned over", "dead", "no number"])
+def test_a_sensor_that_is_wrong_never_frees_a_held_handle_and_ends_no_session(probed, monkeypatch, factor):
+    hold = play_probe.release_device
+
+    def wrong(sitting):
+        played = hold(sitting)
+        response = played.recording.response
+        spoiled = replace(response, samples=factor * response.samples)
+        return replace(played, recording=replace(played.recording, response=spoiled))
+
+    monkeypatch.setattr(SafeDevice, "simulate_hand", lambda self, on_handle: None)
+    monkeypatch.setattr(play_probe, "release_device", wrong)
+    done = probed.whole()
+    events = events_of(done.folder)
+    assert done.left == ""
+    assert not [e for e in events if isinstance(e, ProbePlayed) and e.kind == "reference"]
+    assert all(e.apparent_mass_kg is None and e.trouble for e in events if isinstance(e, ProbeMeasured))
+
+
+def test_the_free_handle_is_compared_at_the_level_of_the_probe_in_the_hand(probed):
+    events = [e for e in events_of(probed.whole().folder) if isinstance(e, ProbePlayed)]
+    free = next(number for number, e in enumerate(events) if e.kind == "free")
+    assert events[free].level_n == events[free - 1].level_n
+    assert events[free - 1].kind == "hand"
+
+
+@pytest.mark.parametrize(("paused_s", "since_s", "mass_kg"), [(200.0, None, None), (30.0, 0.0, 0.4)])
+def test_after_a_pause_no_probe_compares_with_the_grip_before_it(paused_s, since_s, mass_kg):
+    before = ProbingState(played=3, with_hand=2, since_s=50.0, referenced=True, hand_mass_kg=0.4, hand_level_n=0.2)
+    after = after_break(before, PauseTaken("2026-01-01T00:00:00.000+00:00", "participant", paused_s), PROBES)
+    assert (after.since_s, after.hand_mass_kg, after.referenced) == (since_s, mass_kg, paused_s < 120)
+
+
+def test_a_stop_while_the_hand_lets_go_plays_nothing(probed, monkeypatch):
+    begin, begun = SessionSupervisor.begin, []
+
+    def stop_at_the_form(self, activity):
+        begun.append(activity)
+        begin(self, activity)
+        if activity == "form" and "probe" in begun:
+            self._device.stop()
+            self.stop_asked = "experimenter"
+
+    monkeypatch.setattr(SessionSupervisor, "begin", stop_at_the_form)
+    done = probed.whole()
+    assert done.left == "the experimenter stopped the session"
+    assert [e.kind for e in events_of(done.folder) if isinstance(e, ProbePlayed)] == ["hand"]
 
 
 def test_a_program_that_ends_within_a_probe_repeats_and_loses_none(probed, monkeypatch):
