@@ -106,22 +106,22 @@ def search_effects(
     time_left: TimeBudget = always,
     beyond: Callable[[SearchResult], SearchResult] = lambda seen: seen,
 ) -> SearchResult:
-    """The search for effects with its verdict. beyond: tried where the catalogue leaves a mismatch, before held-out
-    samples are used."""
+    """The search for effects with its verdict. beyond: tried where the catalogue leaves a mismatch, with and without
+    the half of the held-out samples that is opened where only they show it."""
     found = _prune_guarded(context, explain(context, catalogue, progress, time_left), time_left)
     judged = _judge_with_prediction(context, found)
     first = SearchResult(context, found, judged, _remarks(found))
     opens = not (found.ended_early or found.barred) and _shows_in_test_alone(
         found.after if judged.named else found.retuned
     )
-    if opens and judged.named and (more := _find_with_half(first, catalogue, progress, time_left)) is not None:
-        return more
+    half = _find_with_half(first, catalogue, progress, time_left) if opens else None
+    if half is not None and (judged.named or half.judgement.verdict == "explained"):
+        return half
     tried = beyond(first)
     if not opens or judged.named or tried.judgement.named:
         return tried
-    second = _find_with_half(tried, catalogue, progress, time_left)
-    if second is not None:
-        return replace(second, unconfirmed=tried.unconfirmed)
+    if half is not None:
+        return replace(half, unconfirmed=tried.unconfirmed)
     judged = replace(judged, verdict="unexplained")
     return replace(tried, judgement=judged, remarks=(NOT_SHOWN, *tried.remarks))
 
