@@ -6,6 +6,8 @@ experiments of a group are orthogonal (Dobrowiecki, Schoukens and Guillaume 2006
 from one experiment to the next axis a turns by a thirds of a circle.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -57,13 +59,30 @@ def multisines(
 def _draw_group(lines: IntArray, n: int, axes: int, random: np.random.Generator) -> FloatArray:
     """(axes, n, axes): the experiments of one group, from the draw whose highest peak is lowest."""
     turns = np.exp(2j * np.pi * np.outer(np.arange(axes), np.arange(axes)) / axes)
-    best, lowest = np.zeros((axes, n, axes)), np.inf
-    for _ in range(DRAWS):
+
+    def draw() -> FloatArray:
         phases = random.uniform(0, 2 * np.pi, (len(lines), axes))
         spectrum = np.zeros((axes, n // 2 + 1, axes), dtype=complex)
         spectrum[:, lines] = np.exp(1j * phases) * turns[:, None, :]
-        waves = np.fft.irfft(spectrum, n, axis=1)
-        peak = float(np.linalg.norm(waves, axis=2).max())
-        if peak < lowest:
-            best, lowest = waves, peak
-    return best
+        return np.fft.irfft(spectrum, n, axis=1)
+
+    return _best_of_draws(draw)
+
+
+def interleaved_multisine(lines: IntArray, n: int, axes: int, seed: int) -> FloatArray:
+    """One period, shape (n, axes), whose norm over the axes peaks at 1. Each line drives one axis alone: axis a has
+    every `axes`-th line, beginning with the a-th."""
+    random, axis = np.random.default_rng(seed), np.arange(len(lines)) % axes
+
+    def draw() -> FloatArray:
+        spectrum = np.zeros((n // 2 + 1, axes), dtype=complex)
+        spectrum[lines, axis] = np.exp(2j * np.pi * random.uniform(size=len(lines)))
+        return np.fft.irfft(spectrum, n, axis=0)
+
+    wave = _best_of_draws(draw)
+    return np.asarray(wave / np.linalg.norm(wave, axis=1).max())
+
+
+def _best_of_draws(draw: Callable[[], FloatArray]) -> FloatArray:
+    """The draw whose highest peak of the norm over the axes, its last dimension, is lowest."""
+    return min((draw() for _ in range(DRAWS)), key=lambda waves: float(np.linalg.norm(waves, axis=-1).max()))

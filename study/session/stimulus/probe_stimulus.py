@@ -3,7 +3,7 @@
 import numpy as np
 
 from equalizer.signals.excitation import apply_fades
-from equalizer.signals.multisine import DRAWS, lines_between
+from equalizer.signals.multisine import interleaved_multisine, lines_between
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray, Signal
 from protocols.definition.probes import FROM_HZ, PERIOD_S, ProbeSettings
@@ -20,16 +20,7 @@ def probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:
     """(n, 3): one period whose norm peaks at 1. Axis a has each third odd line, beginning with the a-th."""
     n = round(PERIOD_S * sample_rate_hz)
     lines = lines_between(FROM_HZ, settings.to_hz, n, sample_rate_hz, odd_only=True)
-    axis = np.arange(len(lines)) % 3
-    draw = np.random.default_rng(PHASES_SEED)
-    waves = []
-    for _ in range(DRAWS):
-        spectrum = np.zeros((n // 2 + 1, 3), dtype=complex)
-        spectrum[lines, axis] = np.exp(2j * np.pi * draw.uniform(size=len(lines)))
-        wave = np.fft.irfft(spectrum, n, axis=0)
-        waves.append(wave / np.sqrt(np.mean(np.sum(wave**2, axis=1))))
-    peaks = [float(np.linalg.norm(wave, axis=1).max()) for wave in waves]
-    return np.asarray(waves[int(np.argmin(peaks))] / min(peaks))
+    return interleaved_multisine(lines, n, 3, PHASES_SEED)
 
 
 def probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: float) -> HeldStimulus:
