@@ -93,15 +93,6 @@ def apparent_mass_kg(lines: ProbeLines) -> float:
     return mass_kg
 
 
-def even_share(lines: ProbeLines, to_hz: float) -> float:
-    """Even distortion with noise: rms of the acceleration on even lines over that on the driven ones, up to to_hz."""
-    number = np.arange(1, len(lines.frequency_hz) + 1)
-    here = lines.frequency_hz <= to_hz
-    even = np.abs(lines.acceleration_mps2[here & (number % 2 == 0)]) ** 2
-    driven = np.abs(lines.acceleration_mps2[here & lines.driven.any(axis=1)]) ** 2
-    return float(np.sqrt(even.sum() / driven.sum()))
-
-
 def _mean_spectrum(samples: FloatArray, period: int) -> ComplexArray:
     """(lines, axes), without the line of zero and half the rate."""
     whole = len(samples) // period

@@ -81,14 +81,10 @@ def end_probe(probing: ProbingState, event: ProbeMeasured) -> ProbingState:
     declined = event.number == probing.played and event.recording is None
     if not declined and (probing.open is None or probing.open.number != event.number):
         raise LogContradiction(f"probe {event.number} was measured, which is not playing")
-    hand = probing.open is not None and probing.open.kind == "hand"
-    return replace(
-        probing,
-        open=None,
-        referenced=probing.referenced or declined,
-        hand_mass_kg=event.apparent_mass_kg if hand else probing.hand_mass_kg,
-        hand_level_n=probing.open.level_n if hand and probing.open is not None else probing.hand_level_n,
-    )
+    ended = replace(probing, open=None, referenced=probing.referenced or declined)
+    if probing.open is None or probing.open.kind != "hand":
+        return ended
+    return replace(ended, hand_mass_kg=event.apparent_mass_kg, hand_level_n=probing.open.level_n)
 
 
 def after_break(probing: ProbingState, event: PauseTaken | RestTaken, settings: ProbeSettings) -> ProbingState:

@@ -59,13 +59,16 @@ def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
     """Ask for a free handle, test with a probe whether it is, and only then play the reference."""
     form = form_of(state.protocol, FormKind.HANDLE)
     assert form is not None, "a reference is due only where the protocol has one"
+    held_kg = state.sitting.probing.hand_mass_kg
+    if held_kg is None:
+        return AfterTrial(_decline(state, "what the handle weighs in the hand could not be measured", sitting))
     sitting.supervisor.begin("form")
     if not judge_form(state.protocol, FormKind.HANDLE, sitting.display.fill_in(form)).passed:
         return AfterTrial(_decline(state, "the handle was not free", sitting))
     if (ended := check_end_request(state, sitting)) is not None:
         return ended
     sitting.device.simulate_hand(False)
-    after = _test_and_play(state, sitting)
+    after = _test_and_play(state, held_kg, sitting)
     if after.leave:
         return after
     sitting.device.simulate_hand(True)
@@ -75,23 +78,18 @@ def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
     return after
 
 
-def _test_and_play(state: SessionState, sitting: Sitting) -> AfterTrial:
-    probing, probes = state.sitting.probing, state.protocol.probes
-    held_kg = probing.hand_mass_kg
+def _test_and_play(state: SessionState, held_kg: float, sitting: Sitting) -> AfterTrial:
     # At the level of the probe that it is compared with: what friction and springs add depends on it.
-    test = _hold(state, "free", probing.hand_level_n or max(probes.levels_n), sitting)
+    test = _hold(state, "free", state.sitting.probing.hand_level_n, sitting)
     after = _after(test.state, test.reply, test.played, sitting)
     if after.leave or after.pause or after.fault is not Fault.NONE:
         return after
-    if held_kg is None or test.mass_kg is None or test.mass_kg > LIGHTER_WITHOUT_A_HAND * held_kg:
-        return AfterTrial(_decline(test.state, _not_free(held_kg, test.mass_kg), sitting))
+    if test.mass_kg is None:
+        return AfterTrial(_decline(test.state, "whether the handle is free could not be measured", sitting))
+    if test.mass_kg > LIGHTER_WITHOUT_A_HAND * held_kg:
+        why = f"the handle seems to be held: it answers like {test.mass_kg:.2f} kg, and {held_kg:.2f} kg in the hand"
+        return AfterTrial(_decline(test.state, why, sitting))
     return _play_free(test.state, sitting)
-
-
-def _not_free(held_kg: float | None, free_kg: float | None) -> str:
-    if held_kg is None or free_kg is None:
-        return "whether the handle is free could not be measured"
-    return f"the handle seems to be held: it answers like {free_kg:.2f} kg, and {held_kg:.2f} kg in the hand"
 
 
 def _decline(state: SessionState, why: str, sitting: Sitting) -> SessionState:
