@@ -18,9 +18,9 @@ from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (
     Judgement,
     as_good_as_noise,
+    confirms_addition,
     judge,
     shares_taken,
-    test_confirms_addition,
     worth_naming,
 )
 from analysis.diagnosis.search.without_effect import without_effect
@@ -142,7 +142,7 @@ def _find_with_half(
         measure, fitted = half.measure, before.fitted
         start = evaluate_fit(measure, half.tuning, fitted.deviations, fitted.hypothesis)
         refitted = half.with_test_score(half.candidate(refine(half, start)))
-        if not test_confirms_addition(refitted, found.after):
+        if not confirms_addition(refitted, found.after):
             return None
     return SearchResult(half, found, judged, (TEST_HALF_USED, *_remarks(found)))
 

@@ -116,8 +116,8 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
         return None
     remembers = any(isinstance(each.effect.acts, (AxisForce, JointForce)) for each in placed)
     before_s, behind_s = _run_in_s(measure, context.tuning.model)
-    kept = -1
-    while (short := _shorten(context, measure, (before_s, behind_s))) is not None:
+    periods, kept = [_last_periods(record) for record in measure.records], -1
+    while (short := _shorten(context, measure, periods, (before_s, behind_s))) is not None:
         if not remembers or short.agrees(held):
             return short
         # A simulation that ran away agrees with none, and all that lies before what is fitted may be kept already.
@@ -128,9 +128,12 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
 
 
 def _shorten(
-    context: SearchContext, measure: FreeSimulation | PredictedForce, around_s: tuple[float, float]
+    context: SearchContext,
+    measure: FreeSimulation | PredictedForce,
+    periods: Sequence[tuple[Mask, Places]],
+    around_s: tuple[float, float],
 ) -> ShortRecordings | None:
-    cut = [_cut(record, around_s) for record in measure.records]
+    cut = [_cut(record, each, around_s) for record, each in zip(measure.records, periods, strict=True)]
     before = sum(len(record.command) for record in measure.records)
     if not len(cut[0].kept) or sum(len(each.kept) for each in cut) > SHORT_SHARE * before:
         return None
@@ -162,7 +165,8 @@ def _run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) 
     return (rings_s + RUN_IN_CONSTANTS / measure.band_hz,) * 2
 
 
-def _cut(record: Observed, around_s: tuple[float, float]) -> _Cut:
+def _last_periods(record: Observed) -> tuple[Mask, Places]:
+    """`fit` and `instead` of a `_Cut`: of each settled segment the last period."""
     fit, instead = record.fit.copy(), np.arange(len(record.fit))
     for periods in settled_periods(record.recording):
         inside = slice(periods.segment.start, periods.segment.stop)
@@ -171,6 +175,11 @@ def _cut(record: Observed, around_s: tuple[float, float]) -> _Cut:
             fit[inside] = False
             fit[last] = True
             instead[inside] = last.start + (instead[inside] - last.start) % periods.length
+    return fit, instead
+
+
+def _cut(record: Observed, periods: tuple[Mask, Places], around_s: tuple[float, float]) -> _Cut:
+    fit, instead = periods
     before, behind = (int(np.ceil(min(s * record.recording.sample_rate_hz, len(fit)))) for s in around_s)
     needed, edges = fit.copy(), np.diff(np.concatenate([[0], fit.astype(np.int8), [0]]))
     for start, stop in zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True):

@@ -71,7 +71,7 @@ def _is_confirmed(found: Explanation) -> bool:
     return whole <= SEALED_TOO_SMALL or whole - left >= CONFIRMED_SHARE * whole
 
 
-def test_confirms_addition(without: FittedCandidate, with_it: FittedCandidate) -> bool:
+def confirms_addition(without: FittedCandidate, with_it: FittedCandidate) -> bool:
     """Whether the held-out samples, in their worst channel without it, confirm what `with_it` adds to a name."""
     worst = float(np.max(without.score.test))
     if not np.isfinite(worst) or worst <= SEALED_ALONE_ERROR:

@@ -88,6 +88,18 @@ def test_friction_that_remembers_what_was_cut_out_gets_a_longer_run_in(arena_of,
     assert len(short.kept[0]) < 0.7 * len(rubbing.measure.records[0].command)
 
 
+@pytest.mark.timeout(60)
+def test_a_fit_that_ran_away_agrees_with_no_run_in_and_the_whole_is_compared(lagging):
+    """Of three levels one is kept to choose by: where it comes last, all before what is fitted may be kept already."""
+    running = held(lagging, claim("hardening_stiffness", k3=1e3))
+    away = replace(running, residuals=tuple(np.full_like(each, np.nan) for each in running.residuals), cost=np.inf)
+    (record,) = lagging.measure.records
+    early = record.fit & (np.arange(len(record.fit)) < np.flatnonzero(record.fit)[0] + 2000)
+    cut = Observed(record.recording, record.command, record.measured, early, record.choose, record.test)
+    context = replace(lagging, measure=lagging.measure.with_records((cut,)))
+    assert short_recordings_of(context, away) is None
+
+
 def test_the_sensitivities_of_one_period_stand_for_those_of_all(lagging):
     short, at = short_recordings_of(lagging, held(lagging)), np.zeros(len(lagging.tuning.names))
     (record,) = lagging.measure.records

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.verdict import judge, share_of_mismatch, shares_taken
+from analysis.diagnosis.search.verdict import confirms_addition, judge, share_of_mismatch, shares_taken
 
 RUBS = "coulomb_friction"
 
@@ -96,3 +96,22 @@ def test_what_two_effects_take_adds_up_to_what_both_take(standing_at):
     shares = shares_taken(bare, steps)
     assert 0 < shares[0] < shares[1]
     assert sum(shares) == pytest.approx(share_of_mismatch(bare, steps[1]))
+
+
+@pytest.mark.parametrize(
+    ("without", "with_it", "confirmed"),
+    [
+        ([1.0, 5.0], [1.0, 1.1], True),
+        ([1.0, 5.0], [1.0, 4.0], False),
+        ([1.0, 1.0, 1.0, 1.0, 1.0, 1.3], [1.0, 1.0, 1.0, 1.0, 1.0, 2.0], False),
+        ([1.0, 1.2], [1.0, 1.0], False),
+        ([1.0, np.inf], [1.0, 1.0], False),
+        ([1.0, np.nan], [1.0, 1.0], False),
+    ],
+    ids=["taken", "hardly taken", "worse in one of six", "nothing to take", "ran away", "nothing held out"],
+)
+def test_an_effect_is_added_to_a_name_where_the_worst_held_out_channel_says_so(
+    standing_at, without, with_it, confirmed
+):
+    left = [standing_at(1.0, RUBS, test=test) for test in (without, with_it)]
+    assert confirms_addition(*left) is confirmed

@@ -1,0 +1,35 @@
+"""A second effect that only louder, held-out stretches show is added to a name, on devices that were not built from the
+catalogue's laws."""
+
+import pytest
+
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.search import search
+from study.evaluation.challenge.draw_bank import case_of, draw
+
+SEED, SLOW_SENSOR_AND_HARDENING = 99100, 102
+
+
+@pytest.fixture(scope="module")
+def case():
+    return case_of(draw(SEED, SLOW_SENSOR_AND_HARDENING), "sledge")
+
+
+def names(case):
+    settings = DiagnosisSettings(discovery=False)
+    found = diagnose([case.recording], case.model, settings, map, lambda what, share: None)
+    return found.diagnosis.verdict, {effect.effect for effect in found.diagnosis.effects}, found.remarks
+
+
+def test_it_is_found_in_half_of_the_test_and_confirmed_by_the_other(case):
+    assert {truth.effect for truth in case.truth} == {"sensor_lag", "hardening_stiffness"}
+    verdict, named, remarks = names(case)
+    assert (verdict, named) == ("explained", {"sensor_lag", "hardening_stiffness"})
+    assert search.TEST_HALF_USED in remarks
+
+
+def test_without_that_look_the_first_alone_is_named(case, monkeypatch):
+    monkeypatch.setattr(search, "_find_with_half", lambda *of: None)
+    verdict, named, _ = names(case)
+    assert (verdict, named) == ("partly_explained", {"sensor_lag"})
