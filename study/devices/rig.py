@@ -64,6 +64,27 @@ class Rig(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Halves:
+    """The same driver compiled: a `Rig` that has an attribute `halves` is driven without the interpreter.
+
+    Both do exactly what the rig's own `sense` and `write` do, errors too; the rig's `buttons` is then asked from any
+    thread. See `study.devices.drive.compiled_drive` for the signatures.
+    """
+
+    sense: Callable[..., Any]
+    """sense(calls, cells, samples, reading): fills reading, shape (READING_SIZE,). 0, or a code above it."""
+    write: Callable[..., Any]
+    """write(calls, cells, force_n): force_n, shape (3,). 0, or a code above it."""
+    calls: npt.NDArray[np.int64]
+    """Of `study.devices.native.system_calls`, and behind them the driver's own."""
+    cells: FloatArray
+    samples: FloatArray
+    """Of the accelerometer, shape (rows, columns)."""
+    error: Callable[[int], Exception]
+    """error(code): what the rig's own methods raise; asked for in the thread that got the code."""
+
+
 def no_buttons() -> frozenset[int]:
     return frozenset()
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from equalizer.signals.signal import Signal
 from study.devices.admission import check_commands, check_hardware, check_settings, check_stimulus
-from study.devices.clock import Clock, VirtualClock
+from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
 from study.devices.drive.played import record_commands, record_held_stimulus
 from study.devices.drive.realtime_drive import RealtimeDrive
@@ -226,7 +226,8 @@ class SafeDevice:
         if isinstance(rig, CompiledRig):
             block_ticks = round((VIRTUAL_BLOCK_S if virtual else BLOCK_S) * rig.info.sample_rate_hz)
             return CompiledRunner(rig, self._governor, block_ticks)
-        return SteppedRunner(rig, self._governor, virtual, now_s=None if virtual else self._clock.now_s)
+        now_s, monotonic = None if virtual else self._clock.now_s, type(self._clock) is RealClock
+        return SteppedRunner(rig, self._governor, virtual, now_s, monotonic)
 
     def _drive_of(self, clock: Clock) -> VirtualDrive | RealtimeDrive:
         rate_hz = self._info.sample_rate_hz

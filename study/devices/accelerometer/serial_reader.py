@@ -9,11 +9,9 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.calibration import Calibration
+from study.devices.accelerometer.newest_sample import SENSED, NewestSample
 from study.devices.accelerometer.parser import Counts, PacketParser
 from study.errors import DeviceError
-
-FRESH_S = 0.05
-"""A sample that is older is none: fifty ticks, and longer than a busy computer leaves a thread waiting."""
 
 ZEROING_S = 0.5
 """At rest, when it is opened: gravity, and the drift of the bias since the calibration."""
@@ -41,8 +39,7 @@ class SerialAccelerometer:
     def __init__(self, port: Port, calibration: Calibration, raw_range: tuple[int, int]) -> None:
         self._port, self._calibration, self._range = port, calibration, raw_range
         self._parser = PacketParser()
-        self._newest: tuple[float, FloatArray, bool] | None = None
-        self._rest_mps2 = np.zeros(3)
+        self._samples = NewestSample()
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._read, name="accelerometer", daemon=True)
         self._thread.start()
@@ -57,21 +54,23 @@ class SerialAccelerometer:
         until_s = time.monotonic() + seconds
         while time.monotonic() < until_s:
             time.sleep(seconds / 100)
-            if (newest := self._newest) is not None:
-                readings.append(newest[1])
+            if (newest := self._samples.latest()) is not None:
+                readings.append(newest[SENSED : SENSED + 3])
         if not readings:
             raise DeviceError(
                 "The accelerometer is silent",
                 f"Within {seconds:g} s no whole packet came ({self.counts.spoiled_bytes} bytes that are none).",
                 "Check its cable, the port and the baud rate, and that its firmware runs.",
             )
-        self._rest_mps2 = np.mean(readings, axis=0)
+        self._samples.count_as_none(np.mean(readings, axis=0))
+
+    @property
+    def samples(self) -> FloatArray:
+        """Where compiled code reads what `latest` tells."""
+        return self._samples.rows
 
     def latest(self) -> tuple[FloatArray, bool]:
-        newest = self._newest
-        if newest is None or time.monotonic() - newest[0] > FRESH_S:
-            return np.full(3, np.nan), False
-        return newest[1] - self._rest_mps2, newest[2]
+        return self._samples.fresh(time.monotonic())
 
     def close(self) -> None:
         self._closed.set()
@@ -87,7 +86,7 @@ class SerialAccelerometer:
                 if len(samples):
                     raw = samples.raw[-1]
                     clipped = bool((raw <= self._range[0]).any() or (raw >= self._range[1]).any())
-                    self._newest = time.monotonic(), self._calibration.acceleration(raw.astype(float)), clipped
+                    self._samples.put(time.monotonic(), self._calibration.acceleration(raw.astype(float)), clipped)
 
 
 def open_serial(path: str, baud: int) -> Port:

@@ -5,6 +5,9 @@ it does not, they are counted as missed and the waveform goes on where the time 
 
 The thread watches its callers (the governor's watchdog), and every caller watches the thread (`check`).
 
+A rig with compiled halves is attended by compiled code for as long as nothing else is asked of the thread, so that no
+other thread's hold on the interpreter makes a tick late; `pump` does the same from Python, a tick at a time.
+
 Readings while nothing moves are asked of the same thread: a rig is driven by one thread even then, a stimulus that
 begins meanwhile cannot collide with the reading, and a driver that hangs keeps a caller waiting for at most
 `PATIENCE_S`.
@@ -15,10 +18,26 @@ import math
 import threading
 from collections.abc import Callable
 
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
 from study.devices.clock import Clock
 from study.devices.device import Fault
+from study.devices.drive.compiled_drive import (
+    COURSE_SIZE,
+    DUE_S,
+    GAP,
+    LAST_S,
+    LONGEST_GAP_S,
+    RATE_HZ,
+    RUN,
+    SPIN_S,
+    STARTED_S,
+    WANTED,
+)
 from study.devices.drive.real_time_class import real_time_class
 from study.devices.drive.runner import Runner
+from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import ticks_by
 from study.devices.governor.governor import Governor
 
@@ -76,8 +95,8 @@ STOP_S = 0.005
 JOIN_S = 0.5
 """A driver that hangs must not hang the program as well."""
 
-SPIN_S = 0.00015
-"""Sleep until so long before a real tick, then wait awake: a sleep ends late by more than that on its own."""
+ASK_EVERY_S = 0.01
+"""Who begins a stimulus asks the thread again for its lock: between two ticks it is free for most of a millisecond."""
 
 
 class RealtimeDrive:
@@ -96,13 +115,13 @@ class RealtimeDrive:
         self._runner = runner
         self._governor = governor
         self._clock = clock
-        self._rate_hz = rate_hz
-        self._longest_gap_s = longest_gap_s if runner.catches_up else min(longest_gap_s, LATE_S)
-        self._started_s = self._last_s = 0.0
-        self._run = 0
+        self._attending = runner if isinstance(runner, SteppedRunner) and runner.attends else None
+        self._course: FloatArray = runner.course if isinstance(runner, SteppedRunner) else np.zeros(COURSE_SIZE)
+        self._course[RATE_HZ] = rate_hz
+        self._course[LONGEST_GAP_S] = longest_gap_s if runner.catches_up else min(longest_gap_s, LATE_S)
         self._lock = threading.Lock()
         self._awake = threading.Event()
-        self._glances = Glances(clock, wake=self._awake.set)
+        self._glances = Glances(clock, wake=self._wake)
         self._closing = False
         self._thread = threading.Thread(target=self._attend, name="haptic loop", daemon=True)
         self._thread.start()
@@ -112,22 +131,29 @@ class RealtimeDrive:
 
         False, and nothing begins, where something moves already or nothing may move any more.
         """
-        if not (self._thread.is_alive() and self._lock.acquire(timeout=JOIN_S)):
+        if not (self._thread.is_alive() and self._take_lock()):
             if not self._closing:  # else its thread may have ended already, as it should
                 self._runner.give_up(TimeoutError("its loop hangs"))
             return False
         try:
             if self._runner.moving or self._closing or self._runner.failure is not None:
                 return False
-            self._last_s = math.inf  # a long preparation is no late tick
+            self._course[LAST_S] = math.inf  # a long preparation is no late tick
             begin()
-            self._started_s = self._last_s = self._clock.now_s()
-            self._governor.note_begin(self._started_s)
-            self._run = 0
+            self._course[STARTED_S] = self._course[LAST_S] = now_s = self._clock.now_s()
+            self._governor.note_begin(now_s)
+            self._course[RUN] = 0.0
             self._awake.set()
             return True
         finally:
             self._lock.release()
+
+    def _take_lock(self) -> bool:
+        for _ in range(round(JOIN_S / ASK_EVERY_S)):
+            self._course[WANTED] = 1.0
+            if self._lock.acquire(timeout=ASK_EVERY_S):
+                return True
+        return False
 
     def check(self) -> None:
         """Give up a loop that gives no sign of life while something is played. Cheap."""
@@ -152,8 +178,12 @@ class RealtimeDrive:
 
     def close(self) -> None:
         self._closing = True
-        self._awake.set()
+        self._wake()
         self._thread.join(JOIN_S)
+
+    def _wake(self) -> None:
+        self._course[WANTED] = 1.0
+        self._awake.set()
 
     def pump(self, now_s: float) -> None:
         """Run what is due. After a gap that was not watched (a stopped process, a suspended machine) let go at once."""
@@ -166,31 +196,35 @@ class RealtimeDrive:
                     self._runner.glance()
                     self._glances.mark_taken()
                 return
-            gap_s, self._last_s = now_s - self._last_s, now_s
-            if gap_s > self._longest_gap_s:
+            course, run = self._course, int(self._course[RUN])
+            gap_s, course[LAST_S] = now_s - course[LAST_S], now_s
+            if gap_s > course[LONGEST_GAP_S]:
                 self._runner.drop(Fault.STALLED)
                 return
-            first_s = self._due_s(self._run + 1)
-            due = ticks_by(now_s - self._started_s, self._rate_hz)
-            late = due - self._run - 1
+            first_s = self._due_s(run + 1)
+            due = ticks_by(now_s - course[STARTED_S], course[RATE_HZ])
+            late = due - run - 1
             if late > 0 and not self._runner.catches_up:
                 self._governor.miss(late)
-                self._run += late
-            self._runner.run(due - self._run)
-            self._run = due
+                run += late
+            self._runner.run(due - run)
+            course[RUN] = due
             if not self._runner.catches_up:
-                done_s = self._clock.now_s()
-                self._governor.count_lateness(done_s > self._due_s(due + 1), done_s - first_s)
+                self._count_lateness(due, first_s)
             if self._glances.wanted:  # asked for a moment before this stimulus began
                 self._glances.mark_taken()
 
     def _due_s(self, tick: int) -> float:
-        return self._started_s + tick / self._rate_hz
+        return float(self._course[STARTED_S] + tick / self._course[RATE_HZ])
+
+    def _count_lateness(self, tick: int, first_s: float) -> None:
+        done_s = self._clock.now_s()
+        self._governor.count_lateness(done_s > self._due_s(tick + 1), done_s - first_s)
 
     def _late(self) -> bool:
         if not self._thread.is_alive():
             return True
-        return not self._runner.catches_up and self._clock.now_s() - self._last_s > LATE_S
+        return not self._runner.catches_up and bool(self._clock.now_s() - self._course[LAST_S] > LATE_S)
 
     def _attend(self) -> None:
         with real_time_class() if self._first else contextlib.nullcontext():
@@ -201,6 +235,8 @@ class RealtimeDrive:
             try:
                 self._awake.wait()
                 if self._governor.moving:
+                    if self._attend_compiled():
+                        continue
                     self._wait_for_tick()
                 self.pump(self._clock.now_s())
             except BaseException as error:  # noqa: BLE001 - a dead loop must not leave a force behind
@@ -210,11 +246,25 @@ class RealtimeDrive:
             self._governor.ask_stop()
             self._runner.run(1)
 
+    def _attend_compiled(self) -> bool:
+        """Whether ticks were run. Else the thread is wanted, or Python has to run them: one is run by `pump`, before
+        which the lock is free."""
+        wanted, self._course[WANTED] = self._course[WANTED] != 0.0, 0.0
+        if self._attending is None or wanted:
+            return False
+        with self._lock:
+            code = self._attending.attend()
+            if code == GAP:
+                self._runner.drop(Fault.STALLED)
+            elif code > 0:  # its zero is written by now
+                self._count_lateness(int(self._course[RUN]), float(self._course[DUE_S]))
+        return True
+
     def _wait_for_tick(self) -> None:
         if self._runner.catches_up:
             self._clock.sleep(LEISURELY_S)
             return
-        due_s = self._due_s(self._run + 1)
+        due_s = self._due_s(int(self._course[RUN]) + 1)
         self._clock.sleep(due_s - SPIN_S - self._clock.now_s())
         while self._clock.now_s() < due_s:
             pass

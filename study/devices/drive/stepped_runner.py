@@ -1,4 +1,6 @@
-"""Ticks of a rig that is driven from Python, and what is done when its driver hangs or fails.
+"""Ticks of a rig that moves by itself, and what is done when its driver hangs or fails.
+
+Rigs with compiled halves are driven in compiled code (`compiled_drive`), others tick by tick from Python: one law.
 
 A call into a driver cannot be broken off. So the side that gives up first marks the rig as `gone` and has a thread of
 its own write zero; and the loop, whenever its call returns, writes zero once more: a late write leaves no force.
@@ -6,13 +8,15 @@ its own write zero; and the loop, whenever its call returns, writes zero once mo
 
 import contextlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
 
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import Fault
+from study.devices.drive.compiled_drive import COURSE_SIZE, DECIDING, GONE, OVER, STAMPS, WRITING
+from study.devices.drive.compiled_ticks import CompiledTicks, halves_of
 from study.devices.drive.seen import Seen
 from study.devices.governor import cells, govern
 from study.devices.governor.governor import Governor
@@ -56,10 +60,16 @@ CLOSE_PATIENCE_S = 1.0
 
 
 class SteppedRunner:
-    """now_s: the clock by which readings are stamped, where time passes by itself. Without it, each is a tick apart."""
+    """now_s: the clock by which readings are stamped, where time passes by itself. Without it, each is a tick apart.
+    monotonic: whether that is the system's own, which compiled code reads too."""
 
     def __init__(
-        self, rig: Rig, governor: Governor, catches_up: bool, now_s: Callable[[], float] | None = None
+        self,
+        rig: Rig,
+        governor: Governor,
+        catches_up: bool,
+        now_s: Callable[[], float] | None = None,
+        monotonic: bool = False,
     ) -> None:
         self._rig = rig
         self._governor = governor
@@ -68,25 +78,39 @@ class SteppedRunner:
         self.failure: BaseException | None = None
         self.force_off = True
         self._seen: Seen | None = None
-        self._gone = threading.Event()
+        self.course: FloatArray = np.zeros(COURSE_SIZE)
+        halves = halves_of(rig) if now_s is None or monotonic else None
+        self._compiled = CompiledTicks(halves, governor, self.course) if halves is not None else None
+        self.course[STAMPS] = now_s is not None
         self._closed = self._ended = False
-        self._deciding = self._writing = False
         self._zero = Standby(lambda: rig.write(np.zeros(3)), "force off")
         self._disconnect = Standby(rig.close, "disconnect")
 
     @property
     def moving(self) -> bool:
-        return self._governor.moving or self._deciding
+        return self._governor.moving or bool(self.course[DECIDING])
 
     @property
     def seen(self) -> Seen | None:
-        return None if self._gone.is_set() else self._seen
+        if self._gone:
+            return None
+        reading = self._compiled.seen() if self._compiled is not None else None
+        return self._seen if reading is None else Seen(reading, self._rig.buttons())
+
+    @property
+    def attends(self) -> bool:
+        """Whether `attend` is there: it waits for ticks by itself."""
+        return self._compiled is not None and self._compiled.attends
 
     def prepare(self) -> None:
         """What moves by itself needs no telling."""
 
+    @property
+    def _gone(self) -> bool:
+        return bool(self.course[GONE])
+
     def glance(self) -> None:
-        if self._gone.is_set():
+        if self._gone:
             return
         try:
             self._seen = Seen(self._read(), self._rig.buttons())
@@ -94,38 +118,67 @@ class SteppedRunner:
             self._seen = None
 
     def run(self, ticks: int) -> None:
-        if self._gone.is_set():
+        if self._gone:
             self._governor.abandon(Fault.LOST)
             return
-        try:
+        with self._attended():
+            if self._compiled is not None:
+                self._conclude(self._compiled.run(ticks))
+                return
             for _ in range(ticks):
-                if self._tick() or self._gone.is_set():
+                if self._tick() or self._gone:
                     break
+
+    def attend(self) -> int:
+        """Ticks in real time, in `course`, until something is WANTED: see `compiled_drive.attend`, and only where
+        `attends`. Never raises for a failing rig."""
+        assert self._compiled is not None
+        code = OVER
+        if self._gone:
+            self._governor.abandon(Fault.LOST)
+            return code
+        with self._attended():
+            code = self._compiled.attend()
+            self._conclude(code)
+        return code
+
+    @contextlib.contextmanager
+    def _attended(self) -> Iterator[None]:
+        """Around ticks: what is done where they fail."""
+        try:
+            yield
         except Exception as error:  # noqa: BLE001 - any error of a driver: the force goes off, the next call says why
             self.give_up(error)
         except BaseException:  # Ctrl-C in the middle of a tick
             self._silence(Fault.STALLED)
             raise
         finally:
-            if self._gone.is_set():
+            if self._gone:
                 self._once_more()
+
+    def _conclude(self, code: int) -> None:
+        assert self._compiled is not None
+        if (reading := self._compiled.last_seen()) is not None:
+            self._seen = Seen(reading, self._rig.buttons())
+        if code > 0:
+            raise self._compiled.error(code)
 
     def give_up(self, failure: BaseException) -> None:
         self.failure = self.failure or failure
-        self._gone.set()
+        self.course[GONE] = 1.0
         self._silence(Fault.LOST)
 
     def drop(self, fault: Fault) -> None:
         self._silence(fault)
 
     def cut(self) -> None:
-        self._gone.set()
+        self.course[GONE] = 1.0
         self._silence(Fault.STOPPED)
 
     def disconnect(self) -> None:
         if self._ended:
             return
-        self._gone.set()
+        self.course[GONE] = 1.0
         try:
             self._silence(Fault.LOST if self.moving else Fault.NONE)
         finally:
@@ -138,18 +191,18 @@ class SteppedRunner:
     def _tick(self) -> bool:
         governor = self._governor
         reading = self._read()
-        if self._gone.is_set():
+        if self._gone:
             return True
         if self._now_s is not None:
             governor.state[cells.STAMP_S] = self._now_s()
-        self._deciding = True
+        self.course[DECIDING] = 1.0
         over = govern.tick(governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force)
-        self._writing = True
+        self.course[WRITING] = 1.0
         try:
             self._rig.write(governor.force.copy())
         finally:
-            self._writing = False
-        self._deciding = False
+            self.course[WRITING] = 0.0
+        self.course[DECIDING] = 0.0
         govern.publish(governor.state, governor.settings, governor.ring, reading)
         if not over:
             self._seen = Seen(reading, self._rig.buttons())
@@ -165,14 +218,16 @@ class SteppedRunner:
         """Zero force first, then the governor is still: it must not be said that all is over before it is."""
         written = False
         try:
-            written = self._zero.run(ZERO_PATIENCE_S) and not self._writing  # what still hangs may come after the zero
+            written = (
+                self._zero.run(ZERO_PATIENCE_S) and not self.course[WRITING]
+            )  # what still hangs may come after the zero
         finally:
             self.force_off = written
             if not written:
-                self._gone.set()
+                self.course[GONE] = 1.0
                 self.failure = self.failure or TimeoutError("it took no zero force")
             self._governor.abandon(fault if written else Fault.FORCE_LEFT)
-            self._deciding = False
+            self.course[DECIDING] = 0.0
 
     def _once_more(self) -> None:
         """The caller gave up while this thread was in the driver: what it wrote is taken back."""

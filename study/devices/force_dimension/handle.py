@@ -4,18 +4,18 @@ import contextlib
 from ctypes import byref, c_double, c_int, c_ubyte, c_ushort
 from dataclasses import dataclass
 
-from equalizer.signals.signal import FloatArray
 from study.devices.force_dimension.library import Library, LibraryError
 
-STALE = 1
-"""dhdGetPosition answers so where it repeats an earlier reading."""
-SCALED = 2
-"""dhdSetForce answers so where the device cannot give that force and gives less of it, in the same direction."""
+STALE, SCALED = 1, 2
+"""dhdGetPosition answers STALE where it repeats an earlier reading; dhdSetForce answers SCALED where the device cannot
+give that force and gives less of it, in the same direction."""
 
 WATCHDOG_UNIT_S = 125e-6
 STATUS_SIZE = 32
 """17 in SDK 3.17.5; room for more, since a library writes as many as it knows."""
 
+FORCE_ON_PLACE, OFF_CAUSE_PLACE = 5, 14
+"""Of a status."""
 OFF_CAUSES = {
     1: "a button of the device was pressed",
     2: "the handle moved faster than the device allows",
@@ -30,6 +30,10 @@ TRIES = 3
 """To stop a device whose connection fails."""
 
 
+def why_off(cause: int) -> str:
+    return OFF_CAUSES.get(cause, "the device does not say why")
+
+
 @dataclass(frozen=True, slots=True)
 class Status:
     powered: bool
@@ -41,7 +45,7 @@ class Status:
 
     @property
     def why_off(self) -> str:
-        return OFF_CAUSES.get(self.off_cause, "the device does not say why")
+        return why_off(self.off_cause)
 
 
 class Handle:
@@ -50,17 +54,8 @@ class Handle:
     def __init__(self, library: Library, number: int) -> None:
         self.library = library
         self.number = number
-        self._x, self._y, self._z = c_double(), c_double(), c_double()
-        self._to_xyz = byref(self._x), byref(self._y), byref(self._z), number
-        self._get_position = library.function("dhdGetPosition")
         self._set_force = library.function("dhdSetForce")
         self._open = True
-
-    def read_position(self, into: FloatArray) -> bool:
-        """into (3,), m. Whether it is a repetition of an earlier reading. For one thread at a time."""
-        code = self.library.check_answer("dhdGetPosition", self._get_position(*self._to_xyz))
-        into[0], into[1], into[2] = self._x.value, self._y.value, self._z.value
-        return code == STALE
 
     def velocity_mps(self) -> tuple[float, float, float]:
         """As the library estimates it, over its last 20 ms."""
@@ -78,13 +73,10 @@ class Handle:
         return Status(
             powered=bool(values[0]),
             calibrated=bool(values[3]),
-            force_on=bool(values[5]),
+            force_on=bool(values[FORCE_ON_PLACE]),
             braking=bool(values[6]),
-            off_cause=int(values[14]),
+            off_cause=int(values[OFF_CAUSE_PLACE]),
         )
-
-    def button_mask(self) -> int:
-        return int(self.library.function("dhdGetButtonMask")(self.number))
 
     def system_type(self) -> int:
         return self.library.call("dhdGetSystemType", self.number)

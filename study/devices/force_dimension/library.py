@@ -9,6 +9,10 @@ from ctypes import POINTER, c_byte, c_char_p, c_double, c_int, c_ubyte, c_uint, 
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from study.devices.native import address_of
 from study.errors import DeviceError
 
 OLDEST_SDK = (3, 16, 0)
@@ -75,16 +79,24 @@ class Library:
         return _version_words(self.version)
 
     def function(self, name: str) -> Callable[..., Any]:
-        """Unchecked, for calls at every tick: what it returns is for `checked` to judge."""
+        """Unchecked: what it returns is for `check_answer` to judge."""
         return self._functions[name]
 
     def check_answer(self, name: str, answer: int) -> int:
         """The answer. Raises `LibraryError` where it is below zero; to be asked in the thread of the call."""
         if answer >= 0:
             return answer
+        raise self.last_error(name)
+
+    def last_error(self, name: str) -> LibraryError:
+        """Of this function, whose call just failed in this thread."""
         code = int(self._functions["dhdErrorGetLast"]())
         text = self._functions["dhdErrorGetLastStr"]() or b"no reason given"
-        raise LibraryError(name, code, text.decode("utf-8", "replace"))
+        return LibraryError(name, code, text.decode("utf-8", "replace"))
+
+    def addresses(self, names: tuple[str, ...]) -> npt.NDArray[np.int64]:
+        """For calls from compiled code."""
+        return np.array([address_of(self._functions[name]) for name in names], dtype=np.int64)
 
     def call(self, name: str, *arguments: Any) -> int:
         """Raises `LibraryError`."""

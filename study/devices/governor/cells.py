@@ -25,6 +25,8 @@ LET_GO_TICKS >= 1; VELOCITY_SHARE and ACCELERATION_SHARE: how far a low-pass goe
     PHASE, FAULT, TICK, LAST_SIGN, RELEASED_AT, LET_GO_AT, STIMULUS_GAIN, SPRING_GAIN,
     # What was counted.
     TICKS, MISSED, STIMULUS_CLIPPED, FEEDBACK_CLIPPED, TOTAL_CLIPPED, SLEW_LIMITED, SENSOR_CLIPS, PEAK, RECORDED,
+    # Ticks whose work ended after the next was due, and the longest from when one was due until it was done, s.
+    LATE, LATEST_S,
     # Of the readings: ticks since the one before, that one's tick and time, N of spring and damper together.
     ELAPSED, READ_AT, READ_AT_S, PULL, SHAKING, UNCHANGED,
     # Share of PULL that was taken back from a position that stands still: now, and when the position last changed.
@@ -35,7 +37,7 @@ LET_GO_TICKS >= 1; VELOCITY_SHARE and ACCELERATION_SHARE: how far a low-pass goe
     LAST_STEP, _SY, _SZ, CHANGED, _CY, _CZ, MOVING_FORCE, _MY, _MZ, EXPECTED, _DY, _DZ, EXPECTED_SPEED, _UY, _UZ,
     LEAST, _AY, _AZ, MOST, _BY, _BZ,
     STATE_SIZE,
-) = range(77)  # fmt: skip
+) = range(79)  # fmt: skip
 """Cells of `state`."""
 
 STILL, PLAYING, RELEASING, LETTING_GO = range(4)

@@ -22,7 +22,7 @@ from study.devices.rig import SENSOR_CLIPPED
 # fmt: off
 from study.devices.governor.cells import (
     ELAPSED, EXCITATION, FADE_IN, FADE_OUT, FAULT, FORCE, HELD_TOO_LONG, LAST_POSITION, LAST_SIGN, LEAD, LENGTH,
-    LETTING_GO, LET_GO_ASKED, LET_GO_AT, LET_GO_FROM, LET_GO_TICKS, LONGEST, NOT_A_NUMBER, NO_FAULT, PEAK,
+    LETTING_GO, LET_GO_ASKED, LET_GO_AT, LET_GO_FROM, LET_GO_TICKS, LONGEST, MISSED, NOT_A_NUMBER, NO_FAULT, PEAK,
     PHASE, PLAYING, RAISED_COSINE, READ_AT, READ_AT_S, RECORDED, RECORD_FROM, RELEASED_AT, RELEASE_ASKED,
     RELEASING, SENSOR_CLIPS, SIGN_OF_LIFE, SLEW_LIMITED, SLEW_STEP, SPRING_GAIN, SPRING_RAMP, STALLED, STAMP_S,
     START, STILL, STIMULUS_CAP, STIMULUS_CLIPPED, STIMULUS_GAIN, STOPPED, STOP_ASKED, TICK, TICKS, TICK_S,
@@ -40,6 +40,7 @@ LEAST_ELAPSED = 1e-3
 VECTOR, ROWS = types.float64[::1], types.float64[:, ::1]
 TICK_SIGNATURE = types.boolean(VECTOR, VECTOR, ROWS, ROWS, VECTOR, VECTOR)
 PUBLISH_SIGNATURE = types.void(VECTOR, VECTOR, ROWS, VECTOR)
+MISS_SIGNATURE = types.void(VECTOR, ROWS, VECTOR, types.int64)
 
 
 @part
@@ -193,11 +194,15 @@ def _publishing(sources: int) -> Any:
 
 
 def _entry_points(sources: int) -> tuple[Any, Any]:
-    @njit(types.void(VECTOR, ROWS, VECTOR), cache=True, nogil=True, error_model="numpy")
-    def record(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
-        """One row into a ring: the last rows stay."""
+    @njit(MISS_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def miss(state: FloatArray, buffer: FloatArray, nothing: FloatArray, ticks: int) -> None:
+        """So many ticks went by unattended: their rows hold the last force, and `nothing` as their reading."""
         _ = sources
-        _record(state, buffer, reading)
+        for _k in range(ticks):
+            _record(state, buffer, nothing)
+            state[TICK] += 1.0
+            state[TICKS] += 1.0
+            state[MISSED] += 1.0
 
     @njit(TICK_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def tick(
@@ -231,9 +236,9 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
         state[TICK] += 1
         return bool(state[PHASE] == STILL)
 
-    return tick, record
+    return tick, miss
 
 
 _SOURCES = fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
-tick, record = _entry_points(_SOURCES)
+tick, miss = _entry_points(_SOURCES)
 publish = _publishing(_SOURCES)

@@ -36,11 +36,12 @@ class Governor:
         self._keep_s = settings.keep_s
         self.settings = pack_settings(info, settings)
         self.state = np.zeros(cells.STATE_SIZE)
-        self._late_ticks, self._latest_s = 0, 0.0
         self.loop: FloatArray = np.zeros((1, 3))
         self.buffer: FloatArray = np.zeros((1, cells.ROW_SIZE))
         self.ring: FloatArray = np.zeros((1, cells.RING_WIDTH)) if ring is None else ring
         self.force = np.zeros(3)
+        self.nothing: FloatArray = np.full(READING_SIZE, np.nan)
+        """The reading of a tick that was missed."""
 
     @property
     def moving(self) -> bool:
@@ -121,15 +122,12 @@ class Governor:
 
     def miss(self, ticks: int) -> None:
         """So many ticks went by unattended: the device held its last force, and its sensors were not read."""
-        nothing = np.full(READING_SIZE, np.nan)
-        for _ in range(ticks):
-            govern.record(self.state, self.buffer, nothing)
-            self.state[[cells.TICK, cells.TICKS, cells.MISSED]] += 1.0
+        govern.miss(self.state, self.buffer, self.nothing, ticks)
 
     def count_lateness(self, late: bool, after_s: float) -> None:
         """Of the tick that was just run: whether it ended late, and how long after it was due."""
-        self._late_ticks += late
-        self._latest_s = max(self._latest_s, after_s)
+        self.state[cells.LATE] += late
+        self.state[cells.LATEST_S] = max(self.state[cells.LATEST_S], after_s)
 
     def health(self) -> Health:
         state = self.state
@@ -143,8 +141,8 @@ class Governor:
             slew_limited=int(state[cells.SLEW_LIMITED]),
             sensor_clipped=int(state[cells.SENSOR_CLIPS]),
             peak_command_n=float(state[cells.PEAK]),
-            late_ticks=self._late_ticks,
-            latest_s=self._latest_s,
+            late_ticks=int(state[cells.LATE]),
+            latest_s=float(state[cells.LATEST_S]),
         )
 
     def rows(self) -> FloatArray:
@@ -161,7 +159,6 @@ class Governor:
     def _begin(self, played: FloatArray, rows: int) -> None:
         self.loop = np.array(played, order="C")
         self.buffer = np.full((max(rows, 1), cells.ROW_SIZE), np.nan)
-        self._late_ticks, self._latest_s = 0, 0.0
         # Never clear the stop, not even for a moment: another thread may be asking for it just now.
         self.state[cells.STOP_ASKED + 1 :] = 0.0
         self.state[cells.LAST_POSITION : cells.LAST_POSITION + 3] = np.nan

@@ -27,9 +27,20 @@ NAMED_IN = {
         "study/devices/force_dimension/findings.py",  # zero only
         "study/devices/force_dimension/watchdog_proof.py",  # zero only
     },
-    "dhdSetForce": {"study/devices/force_dimension/handle.py", "study/devices/force_dimension/library.py"},
+    "dhdSetForce": {
+        "study/devices/force_dimension/handle.py",
+        "study/devices/force_dimension/halves.py",
+        "study/devices/force_dimension/library.py",
+    },
     "CompiledRunner": {"study/devices/safe.py"},
-    "SteppedRunner": {"study/devices/safe.py"},
+    "SteppedRunner": {
+        "study/devices/safe.py",
+        "study/devices/drive/realtime_drive.py",  # which asks it for ticks
+    },
+    "CompiledTicks": {"study/devices/drive/stepped_runner.py"},
+    "write_once": {"study/devices/force_dimension/rig.py"},
+    "send_once": {"study/devices/force_dimension/rig.py"},  # zero only
+    "_send": set(),
     "Standby": set(),
     "run_block": set(),
 }
@@ -39,6 +50,7 @@ CALLED_IN = {
     "CompiledRig": {"study/devices/simulated/omega3.py", "study/devices/replay/replay_rig.py"},
     "advance": {"study/devices/drive/runner.py"},
     "write": {
+        "study/devices/drive/compiled_drive.py",
         "study/devices/drive/stepped_runner.py",
         "study/devices/onset_line.py",  # to a serial line, no rig
     },

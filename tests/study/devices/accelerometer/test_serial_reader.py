@@ -12,8 +12,9 @@ import pytest
 from pydantic import TypeAdapter
 
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP, Calibration
+from study.devices.accelerometer.newest_sample import FRESH_S
 from study.devices.accelerometer.parser import SIZE, encode_packets
-from study.devices.accelerometer.serial_reader import FRESH_S, SerialAccelerometer, open_serial
+from study.devices.accelerometer.serial_reader import SerialAccelerometer, open_serial
 from study.devices.accelerometer.six_positions import calibrate_on_table
 from study.devices.force_dimension.lab import SensorSettings
 from study.errors import DeviceError

@@ -3,14 +3,15 @@
 import contextlib
 import threading
 import time
+from ctypes import byref, c_double
 
 import numpy as np
 import pytest
 
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
+from study.devices.force_dimension.halves import SCALED_FOR, STALE_FOR
 from study.devices.force_dimension.library import LibraryError
-from study.devices.force_dimension.rig import SCALED_FOR, STALE_FOR
 from study.devices.rig import ACCELERATION, POSITION, SENSOR_CLIPPED, TRUE_ACCELERATION
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
@@ -162,6 +163,7 @@ def test_the_error_is_that_of_the_thread_whose_call_failed(stub):
     handle = stub.opened()
     texts: dict[str, str] = {}
     barrier = threading.Barrier(2)
+    to_xyz = [byref(c_double()) for _ in range(3)]
 
     def fail(name: str, call) -> None:
         barrier.wait()
@@ -174,7 +176,7 @@ def test_the_error_is_that_of_the_thread_whose_call_failed(stub):
     stub.set("write_fails", 12)
     for _ in range(200):
         threads = [
-            threading.Thread(target=fail, args=("read", lambda: handle.read_position(np.zeros(3)))),
+            threading.Thread(target=fail, args=("read", lambda: handle.library.call("dhdGetPosition", *to_xyz, 0))),
             threading.Thread(target=fail, args=("write", lambda: handle.set_force(0.0, 0.0, 0.0))),
         ]
         for thread in threads:

@@ -1,0 +1,76 @@
+"""`compiled_drive` with its arguments: the rig's halves, the governor's arrays, and where the readings are seen."""
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.drive.compiled_drive import MISS, PUBLISH, SEEN, SEEN_ROWS, SENSE, TICK, WRITE, attend, run_due
+from study.devices.drive.runner import Part
+from study.devices.governor import govern
+from study.devices.governor.governor import Governor
+from study.devices.native import SLEEP
+from study.devices.rig import READING_SIZE, Halves, Rig
+
+
+def halves_of(rig: Rig) -> Halves | None:
+    halves = getattr(rig, "halves", None)
+    return halves if isinstance(halves, Halves) else None
+
+
+TICK_PARTS = Part(govern.tick, TICK), Part(govern.publish, PUBLISH)
+MISSED = Part(govern.miss, MISS)
+
+
+class CompiledTicks:
+    def __init__(self, halves: Halves, governor: Governor, course: FloatArray) -> None:
+        self._halves = halves
+        self._governor = governor
+        self._parts = Part(halves.sense, SENSE), Part(halves.write, WRITE), *TICK_PARTS
+        self._rig = halves.calls, halves.cells, halves.samples
+        self._seen: FloatArray = np.zeros((SEEN_ROWS, READING_SIZE))
+        self._course = course, np.zeros(READING_SIZE), self._seen
+        self._flags = course
+        self._running = False
+        self.error = halves.error
+        self.run(0)  # compiled now, not when a stimulus is due
+
+    @property
+    def attends(self) -> bool:
+        return bool(self._halves.calls[SLEEP] != 0)
+
+    def run(self, ticks: int) -> int:
+        self._flags[SEEN], self._running = 0.0, True
+        try:
+            return int(run_due(*self._parts, self._rig, self._arrays(), self._course, ticks))
+        finally:
+            self._running = False
+
+    def attend(self) -> int:
+        self._flags[SEEN], self._running = 0.0, True
+        try:
+            return int(attend(*self._parts, MISSED, self._rig, self._arrays(), self._course))
+        finally:
+            self._running = False
+
+    def seen(self) -> FloatArray | None:
+        """The newest reading of a call that is under way. None where there is none."""
+        return self.last_seen() if self._running else None
+
+    def last_seen(self) -> FloatArray | None:
+        """That of the last call, or of the one under way."""
+        while count := int(self._flags[SEEN]):
+            reading: FloatArray = self._seen[(count - 1) % SEEN_ROWS].copy()
+            if self._flags[SEEN] - count < SEEN_ROWS - 1:
+                return reading
+        return None
+
+    def _arrays(self) -> tuple[FloatArray, ...]:
+        governor = self._governor
+        return (
+            governor.state,
+            governor.settings,
+            governor.loop,
+            governor.buffer,
+            governor.force,
+            governor.ring,
+            governor.nothing,
+        )

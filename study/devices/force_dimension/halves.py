@@ -1,0 +1,265 @@
+"""Both halves of a tick of a device of the vendor, compiled: the reading, and the force.
+
+They are the law for every caller: the loop calls them without the interpreter, the rig's own methods call them from
+Python. An answer of 0 is fine; any other is one of the codes below, `FAILED` keeps the first, and no force follows it.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from equalizer.signals.signal import FloatArray
+from study.devices.accelerometer.newest_sample import CLIPPED, COUNT, FRESH_S, REST, ROWS, SENSED, TAKEN_S
+from study.devices.drive.compiled_drive import SENSE_SIGNATURE, WRITE_SIGNATURE
+from study.devices.force_dimension.handle import FORCE_ON_PLACE, OFF_CAUSE_PLACE, SCALED, STALE, WATCHDOG_CAUSE
+from study.devices.governor.compiling import fingerprint, part
+from study.devices.native import SYSTEM_SIZE, Addresses, acquire, call_int, now_s, release, room_for_16, word
+from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
+
+LOOK_EVERY = 10
+"""Readings: how often status and buttons are asked for. 100 times a second: a person cannot press faster."""
+
+STALE_FOR, STALE_SHARE = 50, 0.5
+"""Readings that only repeat an earlier one: so many in a row, or as many beyond this share of all readings, end the
+force. At 1 kHz half of what counts as a lost loop."""
+
+SCALED_FOR, SCALED_SHARE = 5, 0.02
+"""The same of forces that the device cannot give in full: what a participant feels is then not what is written down.
+A force whose peaks alone are scaled is so only for some milliseconds in a row, again and again."""
+
+ROUNDING = 1 + 1e-9
+LOCK_S = 0.002
+"""A write lasts a tenth of that: what waits longer waits for a call that hangs."""
+
+POSITION, FORCE, STATUS, BUTTONS, BRAKES, ENABLE, CALLS_SIZE = range(SYSTEM_SIZE, SYSTEM_SIZE + 7)
+"""Behind the places of `native`: addresses of the library's functions, `LIBRARY`."""
+LIBRARY = ("dhdGetPosition", "dhdSetForce", "dhdGetStatus", "dhdGetButtonMask", "dhdSetBrakes", "dhdEnableForce")
+
+(
+    NUMBER, CAP_N, DROPS_AFTER_S, READS, REPEATED, TOO_STRONG, PRESSED, SENT_S, SENT_ZERO, WITHHELD_UNTIL_S, CLOSED,
+    LET_GO, FAILED, OFF_CAUSE, REFUSED_N, CELLS_SIZE,
+) = range(16)  # fmt: skip
+"""Cells of the driver. REPEATED, TOO_STRONG: readings and forces beyond their share, as `_beyond` counts; PRESSED: mask
+of buttons; OFF_CAUSE, REFUSED_N: for the words about a failure."""
+
+OF_LIBRARY = 1
+"""The code of the first function of LIBRARY: a call of it failed. The others follow."""
+(REPEATS, RELEASED, REFUSED, LOCKED, IS_CLOSED, WEAK, FAILED_BEFORE, SAID) = range(OF_LIBRARY + len(LIBRARY), 15)
+"""SAID: it failed elsewhere, and the words are there."""
+
+
+@part
+def _failed(cells: FloatArray, code: int) -> int:
+    """The first failure stays."""
+    if cells[FAILED] == 0.0:
+        cells[FAILED] = code
+    return code
+
+
+@part
+def _of_library(cells: FloatArray, function: int) -> int:
+    return _failed(cells, OF_LIBRARY + function - SYSTEM_SIZE)
+
+
+@part
+def _beyond(count: float, happened: bool, share: float) -> float:
+    """How often something happened beyond this share of all times. A hair below the sum of its steps."""
+    return max(0.0, count + (1.0 if happened else 0.0) - share + 1e-12)
+
+
+@part
+def _number_at(status: int, place: int) -> int:
+    """The int at a place of a status: two are in a word."""
+    return int((word(status, place // 2) >> (32 * (place % 2))) & 0xFFFFFFFF)
+
+
+@part
+def _check_on(calls: Addresses, cells: FloatArray) -> int:
+    """Whether it takes forces, or is silent as its watchdog has it after a zero. Else OFF_CAUSE says why not."""
+    status = room_for_16()
+    if call_int(calls[STATUS], (status, np.int32(cells[NUMBER]))) < 0:
+        return _of_library(cells, STATUS)
+    if _number_at(status, FORCE_ON_PLACE) != 0:
+        return 0
+    cause = _number_at(status, OFF_CAUSE_PLACE)
+    if cells[SENT_ZERO] != 0.0 and cause == WATCHDOG_CAUSE:
+        return -1
+    if cells[FAILED] == 0.0:
+        cells[OFF_CAUSE] = cause
+    return _failed(cells, RELEASED)
+
+
+@part
+def _look(calls: Addresses, cells: FloatArray) -> int:
+    cells[PRESSED] = call_int(calls[BUTTONS], (np.int32(cells[NUMBER]),)) & 0xFFFFFFFF
+    return max(0, _check_on(calls, cells))
+
+
+@part
+def _sense_acceleration(samples: FloatArray, now: float, reading: FloatArray) -> None:
+    """As `study.devices.accelerometer.newest_sample.NewestSample.fresh`."""
+    count = samples[0, COUNT]
+    while count > 0.0:
+        row = 1 + int(count - 1.0) % ROWS
+        fresh = not now - samples[row, TAKEN_S] > FRESH_S
+        for i in range(3):
+            value = samples[row, SENSED + i] - samples[0, REST + i]
+            reading[ACCELERATION.start + i] = value if fresh else math.nan
+        reading[SENSOR_CLIPPED] = 1.0 if fresh and samples[row, CLIPPED] != 0.0 else 0.0
+        newer = samples[0, COUNT]
+        if newer - count < ROWS - 1:
+            break
+        count = newer
+
+
+@part
+def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
+    if cells[FAILED] != 0.0:
+        return FAILED_BEFORE
+    for i in range(READING_SIZE):
+        reading[i] = math.nan
+    place = reading.ctypes.data
+    asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
+    answer = call_int(calls[POSITION], asked)
+    if answer < 0:
+        return _of_library(cells, POSITION)
+    if cells[READS] % LOOK_EVERY == 0.0:
+        code = _look(calls, cells)
+        if code != 0:
+            return code
+    cells[READS] += 1.0
+    cells[REPEATED] = _beyond(cells[REPEATED], answer == STALE, STALE_SHARE)
+    if cells[REPEATED] >= STALE_FOR * (1.0 - STALE_SHARE):
+        return _failed(cells, REPEATS)
+    reading[SENSOR_CLIPPED] = 0.0
+    if samples.shape[0] > 1:
+        _sense_acceleration(samples, now_s(calls), reading)
+    return 0
+
+
+@part
+def _is_silent(calls: Addresses, cells: FloatArray) -> bool:
+    """For longer than the device holds a force by itself."""
+    return bool(now_s(calls) - cells[SENT_S] > cells[DROPS_AFTER_S] > 0.0)
+
+
+@part
+def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float) -> int:
+    return int(call_int(calls[FORCE], (x, y, z, np.int32(cells[NUMBER]))))
+
+
+@part
+def _wake(calls: Addresses, cells: FloatArray) -> int:
+    """After a silence that was longer than the watchdog. In the middle of a force that is an end; with none it is
+    not: the computer was asleep, or nothing was played."""
+    code = _check_on(calls, cells)
+    if code >= 0:
+        return code
+    number = np.int32(cells[NUMBER])
+    if call_int(calls[BRAKES], (np.int32(0), number)) < 0:
+        return _of_library(cells, BRAKES)
+    if call_int(calls[ENABLE], (np.int32(1), number)) < 0:
+        return _of_library(cells, ENABLE)
+    return 0 if _set_force(calls, cells, 0.0, 0.0, 0.0) >= 0 else _of_library(cells, FORCE)
+
+
+@part
+def _send(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+    """Only with the lock."""
+    if _is_silent(calls, cells):
+        code = _wake(calls, cells)
+        if code != 0:
+            return code
+    x, y, z = force[0], force[1], force[2]
+    answer = _set_force(calls, cells, x, y, z)
+    if answer < 0:
+        return _of_library(cells, FORCE)
+    cells[SENT_S] = now_s(calls)
+    cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
+    cells[TOO_STRONG] = _beyond(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
+    if cells[TOO_STRONG] >= SCALED_FOR * (1.0 - SCALED_SHARE):
+        return _failed(cells, WEAK)
+    return 0
+
+
+@part
+def _zero(calls: Addresses, cells: FloatArray) -> int:
+    if _set_force(calls, cells, 0.0, 0.0, 0.0) < 0:
+        return _of_library(cells, FORCE)
+    if cells[SENT_ZERO] == 0.0 and _is_silent(calls, cells):
+        # A force was cut off: its call may hang still, and must find a device that takes none.
+        code = _check_on(calls, cells)
+        if code != 0 and code != RELEASED:
+            return code
+    cells[SENT_ZERO], cells[TOO_STRONG] = 1.0, 0.0
+    if not _is_silent(calls, cells):
+        cells[SENT_S] = now_s(calls)
+    return 0
+
+
+@part
+def _write_zero(calls: Addresses, cells: FloatArray) -> int:
+    """Past everything: neither a lock nor an earlier failure may hold up a zero. It wakes no sleeping device."""
+    if cells[LET_GO] != 0.0:
+        return 0
+    got = acquire(calls, LOCK_S)
+    code = _zero(calls, cells)
+    if got:
+        release(calls)
+    return code
+
+
+@part
+def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+    if now_s(calls) < cells[WITHHELD_UNTIL_S]:
+        return 0
+    norm = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+    if norm == 0.0:
+        return _write_zero(calls, cells)
+    if not norm <= cells[CAP_N] * ROUNDING:
+        code = _write_zero(calls, cells)
+        if cells[FAILED] == 0.0:
+            cells[REFUSED_N] = norm
+        return code if code != 0 else _failed(cells, REFUSED)
+    if cells[FAILED] != 0.0:
+        return FAILED_BEFORE
+    if not acquire(calls, LOCK_S):
+        return _failed(cells, LOCKED)
+    code = _send(calls, cells, force) if cells[CLOSED] == 0.0 else _failed(cells, IS_CLOSED)
+    release(calls)
+    return code
+
+
+def _entry_points(sources: int) -> tuple[Any, Any, Any]:
+    @njit(SENSE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def sense_once(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
+        _ = sources
+        return _sense(calls, cells, samples, reading)
+
+    @njit(WRITE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def write_once(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+        _ = sources
+        return _write(calls, cells, force)
+
+    @njit(WRITE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def send_once(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+        _ = sources
+        return _send(calls, cells, force)
+
+    return sense_once, write_once, send_once
+
+
+_DEVICES = Path(__file__).parents[1]
+sense_once, write_once, send_once = _entry_points(
+    fingerprint(
+        Path(__file__).parent,
+        *(
+            _DEVICES / name
+            for name in ("rig.py", "native.py", "accelerometer/newest_sample.py", "governor/compiling.py")
+        ),
+    )
+)
+"""The first two as `study.devices.rig.Halves` wants them; `send_once`: what `write_once` does with the lock."""

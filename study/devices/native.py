@@ -1,0 +1,170 @@
+"""Functions of the system and of C libraries, called from compiled code that holds no interpreter lock.
+
+A function is an address in an array of int64. Arguments are int32, int64 (addresses too) and float64: on every
+computer of 64 bits they go where C expects char, int, pointers and double.
+"""
+
+import ctypes
+import sys
+import time
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from study.devices.governor.compiling import part
+
+Addresses = npt.NDArray[np.int64]
+
+CLOCK, SLEEP, MONOTONIC, ACQUIRE, RELEASE, LOCK, SYSTEM_SIZE = range(7)
+"""Places of `system_calls`. CLOCK and SLEEP are 0 where this system's are not used."""
+
+_intrinsic: Any = intrinsic
+_cgutils: Any = cgutils
+
+_CLOCK_MONOTONIC, _TIMER_ABSTIME, _INTERRUPTED = 1, 1, 4
+"""Of Linux."""
+
+
+def _caller(result: Any) -> Any:
+    @_intrinsic
+    def call(context: Any, address: Any, arguments: Any) -> Any:
+        def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            given = _cgutils.unpack_tuple(builder, values[1])
+            kind = ir.FunctionType(_context.get_value_type(result), [each.type for each in given])
+            return builder.call(builder.inttoptr(values[0], kind.as_pointer()), given)
+
+        return result(types.int64, arguments), code
+
+    return call
+
+
+call_int = _caller(types.int32)
+"""call_int(address, arguments): the C function's answer, an int."""
+call_float = _caller(types.float64)
+
+
+def _room(words: int) -> Any:
+    @_intrinsic
+    def room(context: Any) -> Any:
+        def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            place = _cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), words), zfill=True)
+            return builder.ptrtoint(place, ir.IntType(64))
+
+        return types.int64(), code
+
+    return room
+
+
+room_for_2, room_for_16 = _room(2), _room(16)
+"""The address of so many words of 8 bytes on the stack of the function that asks: zero at its start, and gone at its
+end."""
+
+
+@_intrinsic
+def word(context: Any, address: Any, place: Any) -> Any:
+    """The word of 8 bytes at this place behind the address."""
+
+    def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        start = builder.inttoptr(values[0], ir.IntType(64).as_pointer())
+        return builder.load(builder.gep(start, [values[1]]))
+
+    return types.int64(types.int64, types.int64), code
+
+
+@_intrinsic
+def set_word(context: Any, address: Any, place: Any, value: Any) -> Any:
+    def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        start = builder.inttoptr(values[0], ir.IntType(64).as_pointer())
+        builder.store(values[2], builder.gep(start, [values[1]]))
+        return _context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64), code
+
+
+@part
+def now_s(system: Addresses) -> float:
+    """As `time.monotonic`, to the last bit."""
+    if system[CLOCK] == 0:
+        return float(call_float(system[MONOTONIC], ()))
+    time_now = room_for_2()
+    call_int(system[CLOCK], (np.int32(_CLOCK_MONOTONIC), time_now))
+    seconds, beyond_ns = word(time_now, 0), word(time_now, 1)
+    if beyond_ns == 0:
+        return float(seconds)
+    return float(seconds * 1_000_000_000 + beyond_ns) / 1e9
+
+
+@part
+def sleep_until(system: Addresses, until_s: float) -> None:
+    """Only where `system[SLEEP]` is not 0."""
+    until = room_for_2()
+    whole_s = int(until_s)
+    set_word(until, 0, whole_s)
+    set_word(until, 1, int((until_s - whole_s) * 1e9))
+    asked = (np.int32(_CLOCK_MONOTONIC), np.int32(_TIMER_ABSTIME), until, np.int64(0))
+    while call_int(system[SLEEP], asked) == _INTERRUPTED:
+        pass
+
+
+@part
+def acquire(system: Addresses, patience_s: float) -> bool:
+    """The lock of this system. False where it was not free within that time."""
+    asked = (system[LOCK], np.int64(patience_s * 1e6), np.int32(0))
+    return bool(call_int(system[ACQUIRE], asked) == 1)
+
+
+@part
+def release(system: Addresses) -> None:
+    call_int(system[RELEASE], (system[LOCK],))
+
+
+class SharedLock:
+    """A lock that compiled code can take too: the interpreter's own, by its stable C interface, which needs no
+    interpreter lock. It is never freed: a call that hangs may still want it."""
+
+    def __init__(self) -> None:
+        interpreter = ctypes.pythonapi
+        interpreter.PyThread_allocate_lock.restype = ctypes.c_void_p
+        self.address = int(interpreter.PyThread_allocate_lock())
+        # As functions that let go of the interpreter while they wait, unlike those of `pythonapi`.
+        take = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_longlong, ctypes.c_int)
+        self._acquire = take(address_of(interpreter.PyThread_acquire_lock_timed))
+        self._release = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address_of(interpreter.PyThread_release_lock))
+
+    def acquire(self, patience_s: float) -> bool:
+        return bool(self._acquire(self.address, int(patience_s * 1e6), 0) == 1)
+
+    def release(self) -> None:
+        self._release(self.address)
+
+    def __enter__(self) -> None:
+        self._acquire(self.address, -1, 0)
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+_monotonic = ctypes.CFUNCTYPE(ctypes.c_double)(time.monotonic)
+"""For systems whose own clock is not read here: it takes the interpreter lock."""
+
+
+def address_of(function: Any) -> int:
+    """Of a function of a loaded library."""
+    return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
+
+
+def system_calls(lock: SharedLock) -> Addresses:
+    calls = np.zeros(SYSTEM_SIZE, dtype=np.int64)
+    calls[MONOTONIC] = address_of(_monotonic)
+    if sys.platform == "linux" and time.get_clock_info("monotonic").implementation == "clock_gettime(CLOCK_MONOTONIC)":
+        system = ctypes.CDLL(None)
+        calls[CLOCK], calls[SLEEP] = address_of(system.clock_gettime), address_of(system.clock_nanosleep)
+    calls[ACQUIRE] = address_of(ctypes.pythonapi.PyThread_acquire_lock_timed)
+    calls[RELEASE] = address_of(ctypes.pythonapi.PyThread_release_lock)
+    calls[LOCK] = lock.address
+    return calls
