@@ -5,6 +5,7 @@ import ctypes
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from importlib.util import find_spec
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from study.devices.accelerometer.newest_sample import NewestSample
 from study.devices.device import DeviceInfo
 from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
 from study.devices.force_dimension.connect import make_ready
@@ -51,14 +53,13 @@ class Stub:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.noise_mps2, self.random = 0.0, np.random.default_rng(0)
-        """Rms of white noise on each reading of the accelerometer, and what draws it."""
+        self.seed = 0
+        """Of the noise on the accelerometer's readings."""
         self._library = ctypes.CDLL(str(path))
         self._library.stub_set.argtypes = [ctypes.c_char_p, ctypes.c_double]
         self._library.stub_get.argtypes, self._library.stub_get.restype = [ctypes.c_char_p], ctypes.c_double
         self._library.stub_peek.argtypes, self._library.stub_peek.restype = [ctypes.c_char_p], ctypes.c_double
-        self.read = self._library.stub_get
-        """As `get`, for names in bytes, at each tick."""
+        self._library.stub_sensor.argtypes = [ctypes.c_void_p, ctypes.c_int]
         self._library.stub_advance.argtypes = [ctypes.c_double]
         self._library.stub_move.argtypes = [ctypes.c_double] * 3
 
@@ -79,6 +80,11 @@ class Stub:
 
     def move(self, x_m: float, y_m: float, z_m: float) -> None:
         self._library.stub_move(x_m, y_m, z_m)
+
+    def sense_into(self, rows: FloatArray) -> None:
+        """From now on, a sample at each reading."""
+        self._sensed_into = rows  # which must outlive every reading
+        self._library.stub_sensor(rows.ctypes.data, self.seed)
 
     @property
     def applied_n(self) -> FloatArray:
@@ -114,17 +120,16 @@ def accept(
 
 
 class TrueSensor:
-    _NAMES = (b"ax", b"ay", b"az")
+    """What the stub knows, in memory that a loop reads."""
 
     def __init__(self, stub: Stub) -> None:
-        self._stub = stub
+        self._newest = NewestSample()
+        self.samples = self._newest.rows
         self.closed = False
-        for name in self._NAMES:
-            stub.get(name.decode())  # which it knows: asked for at each tick
+        stub.sense_into(self.samples)
 
     def latest(self) -> tuple[FloatArray, bool]:
-        true_mps2 = np.array([self._stub.read(name) for name in self._NAMES])
-        return true_mps2 + self._stub.noise_mps2 * self._stub.random.standard_normal(3), False
+        return self._newest.fresh(time.monotonic())
 
     def close(self) -> None:
         self.closed = True

@@ -37,6 +37,7 @@
   /* What a test may ask for. */                                                                                       \
   X(force_on, 0) X(brake, 1) X(cause, 0) X(fx, 0) X(fy, 0) X(fz, 0) X(peak_n, 0) X(writes, 0) X(opened, 0)             \
   X(stops, 0) X(closes, 0) X(reads, 0) X(watchdog, 0) X(cap_n, -1) X(effector, 0) X(gravity, 1) X(guard, 1)            \
+  X(noise, 0) /* rms of each reading of the sensor, m/s^2 */                                                           \
   X(expert, 0) X(resetting, 0) X(now, 0) X(ax, 0) X(ay, 0) X(az, 0) X(enables, 0) X(last_write, 0)
 
 #define AS_ENUM(name, value) name,
@@ -188,7 +189,28 @@ static int begin(void) { lock(); catch_up(); return answer(); }
 static int end(int code) { unlock(); return code; }
 #define PLAIN(...) do { int code = begin(); if (!code) { __VA_ARGS__; } return end(code); } while (0)
 
+/* An accelerometer at the handle: newest_sample.py says what stands in its rows. Its clock is `time.monotonic`. */
+static double *samples;
+static unsigned long long drawn;
+static double evenly(void) { /* -0.5 to 0.5; Marsaglia, Xorshift RNGs, 2003 */
+  drawn ^= drawn << 13, drawn ^= drawn >> 7, drawn ^= drawn << 17;
+  return (double)drawn / 18446744073709551616.0 - 0.5;
+}
+static void sample(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  double *row = samples + 5 * (1 + (long)samples[0] % 16);
+  row[0] = (double)t.tv_sec + 1e-9 * (double)t.tv_nsec, row[4] = 0;
+  for (int i = 0; i < 3; i++) {
+    double sum = 0;
+    for (int k = 0; k < 12; k++) sum += evenly();
+    row[1 + i] = p[ax + i] + p[noise] * sum;
+  }
+  samples[0]++;
+}
+
 /* For tests. */
+EXPORT void stub_sensor(double *rows, int seed) { lock(), samples = rows, drawn = 88172645463325252ULL + (unsigned)seed, unlock(); }
 EXPORT void stub_set(const char *name, double value) {
   lock(), start();
   int i = find(name, strlen(name));
@@ -261,6 +283,7 @@ EXPORT int dhdGetPosition(double *px, double *py, double *pz, char id) {
   (void)id;
   int code = begin();
   double count = ++p[reads];
+  if (samples) sample();
   if (!code && p[read_fails]) code = fail((int)p[read_fails]);
   if (!code) {
     int stale = p[stale_every] > 0 && fmod(count, p[stale_every]) == 0;

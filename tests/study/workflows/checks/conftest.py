@@ -4,7 +4,6 @@ import contextlib
 import shutil
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from protocols.definition.recording_segments import MultisineSegment
@@ -43,7 +42,8 @@ def device_like(stepped_stub):
         state = AS_NEW | changed
         for name in ("friction", "damping", "mode_hz", "gain"):
             stepped_stub.set(name, state.get(name, 1.0))
-        stepped_stub.noise_mps2, stepped_stub.random = state["noise"], np.random.default_rng(seed)
+        stepped_stub.set("noise", state["noise"])
+        stepped_stub.seed = seed
         rig = stepped_stub.rig()
         plan = RecordingPlan(short(), "omega3", (0.0, 0.0, 0.0), 1, device_folder() / f"{seed}.h5")
         stepped_stub.move(0.0, 0.0, 0.0)
