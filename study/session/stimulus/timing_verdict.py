@@ -19,9 +19,6 @@ MS_PER_S = 1000.0
 LATE_TICKS = 1.0
 """99 % of the wake-ups must be less than this many ticks late: 1 ms at 1 kHz."""
 
-MISSED_SHARE = 0.001
-"""Allowed fraction of missed ticks: a twentieth of what makes a trial void by default."""
-
 LATE_SHARE = 0.002
 """Allowed fraction of late ticks, missed ones included: what a loop with real-time priority keeps on an idle
 computer."""
@@ -37,7 +34,7 @@ ADVICE = "Close other programs, switch power saving off, and measure again."
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """Lateness of this program, which tried to wake up at every tick."""
+    """Of a real device's own loop, or of this program, which tried to wake up at every tick."""
 
     median_ms: float
     p99_ms: float
@@ -82,23 +79,31 @@ def judge_lateness(lateness: Lateness, simulated: bool) -> DeviceFinding:
     return DeviceFinding("Lateness", value, fine=False, advice=ADVICE, warning=simulated)
 
 
-def judge_missed(missed_ticks: int, ticks: int, simulated: bool) -> DeviceFinding:
-    share = missed_ticks / max(ticks, 1)
-    fine = share <= MISSED_SHARE
+def judge_missed(missed_ticks: int, ticks: int, simulated: bool, load_per_processor: float | None) -> DeviceFinding:
+    """They are late ticks too, and have no limit of their own."""
+    share, limit = missed_ticks / max(ticks, 1), _late_limit(load_per_processor)
+    fine = share <= limit
     value = f"{missed_ticks} of {ticks} ({share:.2%})"
     if simulated:
         value += "; a simulated device's loop catches up, so it misses none"
     elif not fine:
-        value += f"; at most {MISSED_SHARE:.1%} are fine"
+        value += f"; at most {limit:.1%} are fine"
     return DeviceFinding("Missed ticks", value, fine, "" if fine else ADVICE)
+
+
+def _is_busy(load_per_processor: float | None) -> bool:
+    return load_per_processor is not None and load_per_processor >= ALL_BUSY
+
+
+def _late_limit(load_per_processor: float | None) -> float:
+    return BUSY_LATE_SHARE if _is_busy(load_per_processor) else LATE_SHARE
 
 
 def judge_late(late_ticks: int, latest_ms: float, ticks: int, load_per_processor: float | None) -> DeviceFinding:
     """Verdict for a real device. late_ticks: ticks whose work ended after the next was due, missed ones included.
     load_per_processor: None if unknown; then the limit is that of a quiet computer."""
     share = late_ticks / max(ticks, 1)
-    busy = load_per_processor is not None and load_per_processor >= ALL_BUSY
-    limit = BUSY_LATE_SHARE if busy else LATE_SHARE
+    busy, limit = _is_busy(load_per_processor), _late_limit(load_per_processor)
     fine = share <= limit
     value = f"{late_ticks} of {ticks} ({share:.2%}) ended after the next was due, missed ones among them"
     value += f"; the latest {latest_ms:.1f} ms after its time"

@@ -1,18 +1,15 @@
 """Measure how well this computer keeps 1 kHz: hold a stimulus of zero force in real time and count late ticks."""
 
-import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from queue import SimpleQueue
 
 import numpy as np
 
-from equalizer.signals.signal import Signal
+from equalizer.signals.signal import FloatArray, Signal
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault, Health
-from study.devices.opening import before_others, loop_priority
+from study.devices.opening import loop_priority, telemetry_of
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.timing_verdict import (
     Lateness,
@@ -61,12 +58,11 @@ def check_timing(
     zeros = Signal(np.zeros((round(LOOP_S * rate_hz), 3)), rate_hz, "force", "N", ("fx", "fy", "fz"))
     device.hold(HeldStimulus(zeros, FADE_S, FADE_S, "linear"))
     try:
-        late_s = _wake_as_its_loop(device, clock, seconds, partial(_attend, device, on_progress))
+        late_s = _lateness_s(device, clock, seconds, partial(_attend, device, on_progress))
     finally:
         health = device.release().health
-    lateness = lateness_of(np.array(late_s), rate_hz)
-    late = judge_late(health.late_ticks + health.missed_ticks, 1000 * health.latest_s, health.ticks, load_per_processor)
-    return Timing(seconds, health, lateness, _findings(device, seconds, health, lateness, late))
+    lateness = lateness_of(late_s, rate_hz)
+    return Timing(seconds, health, lateness, _findings(device, seconds, health, lateness, load_per_processor))
 
 
 def check_computer(
@@ -92,33 +88,20 @@ def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Call
     return late_s
 
 
-def _wake_as_its_loop(device: Device, clock: Clock, seconds: float, go_on: Callable[[float], bool]) -> list[float]:
-    """In a thread of real-time priority if the device's loop has one. `go_on` is called in this one: what it asks the
-    device takes longer than a tick on a busy computer, and is no lateness."""
+def _lateness_s(device: Device, clock: Clock, seconds: float, go_on: Callable[[float], bool]) -> FloatArray:
+    """Of the readings of a real device's own loop, as its telemetry stamps them, behind the earliest of them; of this
+    program's wake-ups where there is no such loop."""
     rate_hz = device.info.sample_rate_hz
-    if device.info.simulated or clock.virtual:
-        return wake_at_every_tick(clock, rate_hz, seconds, go_on)
-    left, due = threading.Event(), SimpleQueue[float | None]()
-
-    def tell(done_s: float) -> bool:
-        due.put(done_s)
-        return not left.is_set()
-
-    def wake() -> list[float]:
-        try:
-            with before_others():
-                return wake_at_every_tick(clock, rate_hz, seconds, tell)
-        finally:
-            due.put(None)
-
-    with ThreadPoolExecutor(1, "timing") as pool:
-        woken = pool.submit(wake)
-        try:
-            while (done_s := due.get()) is not None and go_on(done_s):
-                pass
-        finally:
-            left.set()
-        return woken.result()
+    if device.info.simulated or not device.telemetry:
+        return np.array(wake_at_every_tick(clock, rate_hz, seconds, go_on))
+    reader, after_due_s = telemetry_of(device.telemetry), []
+    started_s = clock.now_s()
+    while go_on(done_s := clock.now_s() - started_s) and done_s < seconds:
+        clock.sleep(SIGN_OF_LIFE_EVERY / rate_hz)
+        ticks = reader.read()
+        after_due_s.append(ticks.time_s - ticks.tick / rate_hz)
+    found = np.concatenate(after_due_s or [np.zeros(0)])
+    return found - found.min() if len(found) else np.array([seconds])  # it never turned
 
 
 def _attend(device: Device, on_progress: Callable[[float], None], done_s: float) -> bool:
@@ -128,12 +111,13 @@ def _attend(device: Device, on_progress: Callable[[float], None], done_s: float)
 
 
 def _findings(
-    device: Device, seconds: float, health: Health, lateness: Lateness, late: DeviceFinding
+    device: Device, seconds: float, health: Health, lateness: Lateness, load_per_processor: float | None
 ) -> tuple[DeviceFinding, ...]:
-    simulated = device.info.simulated
+    simulated, late_ticks = device.info.simulated, health.late_ticks + health.missed_ticks
+    late = judge_late(late_ticks, 1000 * health.latest_s, health.ticks, load_per_processor)
     return (
         _loop(seconds, health),
-        judge_missed(health.missed_ticks, health.ticks, simulated),
+        judge_missed(health.missed_ticks, health.ticks, simulated, load_per_processor),
         *(() if simulated else (late,)),
         judge_lateness(lateness, simulated),
         DeviceFinding("Force", f"{health.peak_command_n:g} N commanded", fine=health.peak_command_n == 0.0),

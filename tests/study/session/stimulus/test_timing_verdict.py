@@ -57,9 +57,13 @@ def test_load_is_a_warning_and_never_more():
     assert busy.value == "336% of what its processors can do, over the last minute; above 75% trials may be cut short"
 
 
-def test_missed_ticks_of_a_real_loop():
-    assert judge_missed(1, 1000, simulated=False).fine
-    assert judge_missed(2, 1000, simulated=False).wrong
+@pytest.mark.parametrize("load", [None, 0.3, 1.0, 3.0])
+@pytest.mark.parametrize("missed", [0, 19, 20, 21, 99, 100, 101])
+def test_missed_ticks_are_late_ticks_and_judged_as_these(missed, load):
+    """Else one line said fine of what the other calls wrong."""
+    found = judge_missed(missed, 10_000, simulated=False, load_per_processor=load)
+    assert found.fine is judge_late(missed, 2.0, 10_000, load).fine
+    assert ("at most" in found.value) is not found.fine
 
 
 @pytest.mark.parametrize("load", [None, 0.0, 0.99, float("nan")])

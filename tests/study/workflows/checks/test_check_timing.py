@@ -11,6 +11,7 @@ from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
 from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
+from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
 from study.workflows.checks import examine_setup
@@ -138,24 +139,25 @@ def test_before_a_sitting_the_computer_is_measured_for_a_second_without_the_devi
 
 @pytest.mark.real_time
 @pytest.mark.parametrize("real", [True, False])
-def test_wake_ups_are_measured_as_the_loop_of_that_device_has_them(rigs, settings, monkeypatch, real):
-    first: list[str] = []
-
-    @contextlib.contextmanager
-    def noted():
-        first.append(threading.current_thread().name)
-        yield
-
-    monkeypatch.setattr("study.workflows.checks.check_timing.before_others", noted)
+def test_what_is_asked_of_the_device_meanwhile_is_asked_by_the_caller(rigs, settings, real):
     rig = rigs.HeldForceRig() if real else rigs.compiled_rig()
     attended: list[threading.Thread] = []
-    with contextlib.closing(SafeDevice(rig, settings, RealClock())) as device:
+    with contextlib.closing(SafeDevice(rig, settings, RealClock(), Ring())) as device:
         timing = check_timing(device, RealClock(), 0.2, lambda done: attended.append(threading.current_thread()))
-    found = {finding.name for finding in timing.findings}
-    assert [name.startswith("timing") for name in first] == ([True] if real else [])
-    # What is asked of the device meanwhile must not make the wake-ups late.
     assert set(attended) == {threading.current_thread()}
-    assert ("Late ticks" in found) == real
+    assert ("Late ticks" in {finding.name for finding in timing.findings}) == real
+
+
+@pytest.mark.real_time
+def test_the_lateness_of_a_real_device_is_that_of_its_own_loop(rigs, settings):
+    """Every fourth reading lasts 3 ms; the program that asks is on time."""
+    rig = rigs.HeldForceRig()
+    rig.before_sensing = lambda: time.sleep(0.003 if rig.sensed % 4 == 0 else 0.0)
+    with contextlib.closing(SafeDevice(rig, settings, RealClock(), Ring())) as device:
+        timing = check_timing(device, RealClock(), 0.5, lambda done: None)
+    assert timing.lateness.too_late and timing.lateness.missing_a_tick > 0.1
+    assert timing.lateness.longest_ms > 2.5
+    assert 1000 * timing.health.latest_s > timing.lateness.longest_ms - 1.0
 
 
 @pytest.mark.parametrize(("load", "fine"), [(1.3, True), (0.3, False), (None, False)])
