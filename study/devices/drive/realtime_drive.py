@@ -152,6 +152,7 @@ class RealtimeDrive:
         for _ in range(round(JOIN_S / ASK_EVERY_S)):
             self._course[WANTED] = 1.0
             if self._lock.acquire(timeout=ASK_EVERY_S):
+                self._course[WANTED] = float(self._glances.wanted)  # the first tick is compiled too
                 return True
         return False
 
