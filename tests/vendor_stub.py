@@ -116,7 +116,7 @@ def accept(
 ) -> None:
     """As an operator would have, today or on that day."""
     today = datetime.now(UTC).date().isoformat()
-    write_acceptance(Acceptance(device, details, "the tests", on or today, 0.5, 0.03, *baseline))
+    write_acceptance(Acceptance(device, details, "the tests", on or today, 0.5, 0.03, 1.0, 0.5, *baseline))
 
 
 class TrueSensor:

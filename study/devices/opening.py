@@ -177,24 +177,31 @@ def proof_force_n() -> float:
 def accept_device(
     name: str, settings: DeviceSettings, clock: Clock, operator: str, baseline: tuple[str, str] = ("", "")
 ) -> str:
-    """Hold a small force with no hand on the handle, stop the loop on purpose, and sign that the device let go.
+    """With no hand on the handle: ask for more than the cap, hold a small force, stop the loop on purpose, and sign
+    that the device got no more than the cap and let go.
 
     What was written, in a sentence. Raises `DeviceError`. What else is to be fine, the caller has found fine before.
     baseline: name and SHA-256 of the recording that the daily check is to compare with.
     """
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
-    from study.devices.force_dimension.force_proof import FORCE_N, prove_force_goes
+    from study.devices.force_dimension.force_proof import ASKED_SHARE, FORCE_N, prove_cap_holds, prove_force_goes
     from study.devices.rigs_by_name import RIGS_BY_NAME
     from study.devices.safe import SafeDevice
 
-    rig: Any = RIGS_BY_NAME[name](replace(settings, hand_on_handle=False), 0)
+    limits = replace(settings.limits, stimulus_cap_n=FORCE_N, total_cap_n=FORCE_N)
+    settings = replace(settings, hand_on_handle=False, limits=limits)
+    rig: Any = RIGS_BY_NAME[name](settings, 0)
     try:
-        device = SafeDevice(rig, replace(settings, hand_on_handle=False), clock)
+        device = SafeDevice(rig, settings, clock)
         with contextlib.closing(device):
+            most_given_n = prove_cap_holds(device, rig)
             gone_after_s = prove_force_goes(device, rig)
     finally:
         rig.close()
-    today = clock.utc()[:10]
-    info = device.info
-    path = write_acceptance(Acceptance(info.name, info.details, operator, today, FORCE_N, gone_after_s, *baseline))
-    return f"{info.name}: a force of {FORCE_N:g} N was gone {1000 * gone_after_s:.0f} ms after the loop; {path}"
+    today, info = clock.utc()[:10], device.info
+    tried = FORCE_N, gone_after_s, ASKED_SHARE * FORCE_N, most_given_n
+    path = write_acceptance(Acceptance(info.name, info.details, operator, today, *tried, *baseline))
+    return (
+        f"{info.name}: of {ASKED_SHARE * FORCE_N:g} N that were asked for with a cap of {FORCE_N:g} N it gave "
+        f"{most_given_n:.2g} N; a force of {FORCE_N:g} N was gone {1000 * gone_after_s:.0f} ms after the loop; {path}"
+    )

@@ -49,6 +49,7 @@ class SafeDevice:
         self._info = rig.info
         self._simulated_hand = rig.simulate_hand if isinstance(rig, CompiledRig) else no_hand
         self._limits = settings.limits
+        self._hand_on_handle = settings.hand_on_handle
         self._clock = clock
         self._ring = ring
         rows = ring.rows(rig.info.sample_rate_hz) if ring is not None else None
@@ -72,6 +73,15 @@ class SafeDevice:
     def hold(self, stimulus: HeldStimulus) -> None:
         self._must_be_idle()
         check_stimulus(stimulus, self._limits, self._info.sample_rate_hz)
+        self._start(lambda: self._governor.begin_hold(stimulus))
+        self._held = stimulus
+
+    def hold_unchecked(self, stimulus: HeldStimulus) -> None:
+        """As `hold`, for a stimulus that it refuses, of the right shape: to show with no hand on the handle that the
+        caps of each tick hold."""
+        if self._hand_on_handle:
+            raise _refusal("A hand is on the handle.", "Open it without.")
+        self._must_be_idle()
         self._start(lambda: self._governor.begin_hold(stimulus))
         self._held = stimulus
 

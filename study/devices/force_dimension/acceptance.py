@@ -30,6 +30,10 @@ class Acceptance:
     """That was held when the loop was stopped on purpose."""
     gone_after_s: float
     """Until the device said that it was off."""
+    asked_n: float = 0.0
+    """Of each layer, with a cap of `force_n`; 0 where that was not tried yet, as before November 2026."""
+    most_given_n: float = 0.0
+    """Then, as the device said."""
     baseline: str = ""
     """Name of the recording beside this file with which the daily check compares; empty where none was made."""
     baseline_sha256: str = ""

@@ -1,5 +1,5 @@
-"""Part of the acceptance: a small force is held through the safety layer, the loop stops on purpose, and the force must
-be gone in time. With no hand on the handle."""
+"""Part of the acceptance, with no hand on the handle: more than the cap is asked for, and the device must say that it
+gets no more than the cap; then a small force is held, the loop stops on purpose, and the force must be gone in time."""
 
 import time
 from typing import Protocol
@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from equalizer.signals.signal import Signal
-from study.devices.device import Device, Fault
+from study.devices.device import Device, DeviceInfo, Fault, Played
 from study.devices.force_dimension.watchdog_proof import MARGIN_S
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
@@ -21,6 +21,38 @@ REACHED = 0.8
 WITHHELD_S = 0.2
 """Then the zero is sent even so."""
 
+ASKED_SHARE = 2.0
+"""Times the cap, FORCE_N here, that are asked for: what a cap that does not work lets through is still small."""
+SHAKEN_HZ, SHAKEN_S = 12.5, 0.24
+"""To and fro, three times: a free handle moves by less than 1 mm, and stands still at the end."""
+EXACT = 1.05
+"""Times the cap that the device may say: its motors have steps."""
+
+
+class Capped(Protocol):
+    """The safety layer itself."""
+
+    @property
+    def info(self) -> DeviceInfo: ...
+
+    def hold(self, stimulus: HeldStimulus) -> None: ...
+
+    def hold_unchecked(self, stimulus: HeldStimulus) -> None: ...
+
+    def keep_alive(self) -> None: ...
+
+    def fault(self) -> Fault: ...
+
+    def release(self) -> Played: ...
+
+
+class Telling(Protocol):
+    """The driver behind the safety layer, which knows what the device gives."""
+
+    def given_n(self) -> float: ...
+
+    def given_past_this_n(self, asked_n: float) -> float: ...
+
 
 class Silenced(Protocol):
     """The driver behind the safety layer, which can be told to send nothing."""
@@ -30,6 +62,48 @@ class Silenced(Protocol):
     def withhold(self, seconds: float) -> float: ...
 
     def force_on(self) -> bool: ...
+
+
+def prove_cap_holds(device: Capped, rig: Telling) -> float:
+    """The most that the device said it gave, N, when `ASKED_SHARE` times FORCE_N were asked of each layer in turn.
+
+    device: opened without a spring and with caps of FORCE_N. Raises `DeviceError` where more came, or where so little
+    came that nothing is proved.
+    """
+    shaking = _shaking(device.info.sample_rate_hz)
+    try:
+        device.hold(shaking)
+    except DeviceError:
+        pass
+    else:
+        device.release()
+        raise _not_accepted_error("A stimulus above its cap was not refused.")
+    device.hold_unchecked(shaking)
+    of_ticks_n = _most_given_n(device, rig)
+    device.release()
+    if device.fault() is not Fault.NONE:
+        raise _not_accepted_error(f"The force did not last: {device.fault().value}.")
+    _check_given("at each tick", of_ticks_n)
+    of_library_n = rig.given_past_this_n(ASKED_SHARE * FORCE_N)
+    _check_given("of the library", of_library_n)
+    return max(of_ticks_n, of_library_n)
+
+
+def _most_given_n(device: Capped, rig: Telling) -> float:
+    most_n, until_s = 0.0, time.monotonic() + SHAKEN_S
+    while time.monotonic() < until_s:
+        most_n = max(most_n, rig.given_n())
+        device.keep_alive()
+        time.sleep(EVERY_S)
+    return most_n
+
+
+def _check_given(which: str, given_n: float) -> None:
+    asked = f"{ASKED_SHARE * FORCE_N:g} N were asked for, and the device gave {given_n:.2f} N"
+    if not given_n <= EXACT * FORCE_N:
+        raise _not_accepted_error(f"The cap {which} does not hold: {asked}, where {FORCE_N:g} N are allowed.")
+    if given_n < REACHED * FORCE_N:
+        raise _not_accepted_error(f"The cap {which} could not be tried: {asked}.")
 
 
 def prove_force_goes(device: Device, rig: Silenced) -> float:
@@ -59,6 +133,13 @@ def prove_force_goes(device: Device, rig: Silenced) -> float:
 def _push(rate_hz: float) -> HeldStimulus:
     """Along x, towards the operator."""
     samples = np.tile([[FORCE_N, 0.0, 0.0]], (round(0.05 * rate_hz), 1))
+    return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
+
+
+def _shaking(rate_hz: float) -> HeldStimulus:
+    """Along x, too strong."""
+    phase = 2 * np.pi * np.arange(round(rate_hz / SHAKEN_HZ)) * SHAKEN_HZ / rate_hz
+    samples = ASKED_SHARE * FORCE_N * np.sin(phase)[:, None] * [1.0, 0.0, 0.0]
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
 
 

@@ -67,6 +67,12 @@ class Handle:
         """Whether the device gives less than that. From any thread."""
         return self.library.check_answer("dhdSetForce", self._set_force(x_n, y_n, z_n, self.number)) == SCALED
 
+    def force_n(self) -> tuple[float, float, float]:
+        """What the device says that it gives now."""
+        x, y, z = c_double(), c_double(), c_double()
+        self.library.call("dhdGetForce", byref(x), byref(y), byref(z), self.number)
+        return x.value, y.value, z.value
+
     def status(self) -> Status:
         values = (c_int * STATUS_SIZE)()
         self.library.call("dhdGetStatus", values, self.number)

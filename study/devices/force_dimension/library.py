@@ -41,6 +41,7 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdSetBrakes": (c_int, (c_int, _ID)),
     "dhdGetPosition": (c_int, _THREE),
     "dhdGetLinearVelocity": (c_int, _THREE),
+    "dhdGetForce": (c_int, _THREE),
     "dhdSetForce": (c_int, (_NUMBER, _NUMBER, _NUMBER, _ID)),
     "dhdGetButtonMask": (c_uint, (_ID,)),
     "dhdSetGravityCompensation": (c_int, (c_int, _ID)),

@@ -4,6 +4,8 @@ Beyond what the safety layer does, a force above the cap or no number is never s
 the cap as well. Anything odd ends in an error: the safety layer then writes zero, and the watchdog sees to the rest.
 """
 
+import contextlib
+import math
 import threading
 import time
 from typing import Protocol
@@ -102,6 +104,28 @@ class ForceDimensionRig:
             return self._handle.status().force_on
         except LibraryError as error:
             raise self._fail(f"The library says: {error}") from error
+
+    def given_n(self) -> float:
+        """The horizontal force that the device says it gives just now: the vertical one may hold up its weight. Raises
+        `DeviceError`."""
+        try:
+            x, y, _ = self._handle.force_n()
+        except LibraryError as error:
+            raise self._fail(f"The library says: {error}") from error
+        return math.hypot(x, y)
+
+    def given_past_this_n(self, asked_n: float) -> float:
+        """For the acceptance, with no hand on the handle: of so much along x, told to the library past the cap of this
+        file, what the device gives before the zero that follows at once. Raises `DeviceError`."""
+        with self._sending:
+            try:
+                self._handle.set_force(asked_n, 0.0, 0.0)
+                return self.given_n()
+            except LibraryError as error:
+                raise self._fail(f"The library says: {error}") from error
+            finally:
+                with contextlib.suppress(LibraryError):
+                    self._handle.set_force(0.0, 0.0, 0.0)
 
     def close(self) -> None:
         self._cells[halves.WITHHELD_UNTIL_S] = 0.0

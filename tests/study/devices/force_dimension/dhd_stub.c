@@ -31,7 +31,7 @@
   X(late_every, 0) X(late_s, 0) X(write_fails, 0) X(read_fails, 0) X(stop_fails, 0) X(buttons, 0)                      \
   X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
   /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
-  X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0)                                                                \
+  X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                                                                \
   /* What wears: Coulomb friction in N, amplifiers, a mass that swings on the handle. */                               \
   X(friction, 0) X(gain, 1) X(mode_hz, 0) X(mode_kg, 0.02)                                                             \
   /* What a test may ask for. */                                                                                       \
@@ -307,7 +307,7 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
   if (!code) {
     double asked = sqrt(x_n * x_n + y_n * y_n + z_n * z_n), most = p[max_n];
     if (is_due(p[writes], p[scaled_every])) most = fmin(most, p[scaled_from_n]);
-    if (p[cap_n] >= 0) most = fmin(most, p[cap_n]);
+    if (p[cap_n] >= 0 && p[cap_works]) most = fmin(most, p[cap_n]);
     double share = asked > most * (1 + 1e-9) ? most / asked : 1;
     command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
     p[writes]++, p[last_write] = asked, last_command_s = p[now];
@@ -323,7 +323,7 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
 }
 EXPORT int dhdGetForce(double *x_n, double *y_n, double *z_n, char id) {
   (void)id;
-  PLAIN(*x_n = p[fx]; *y_n = p[fy]; *z_n = p[fz]);
+  PLAIN(*x_n = p[gain_told] * p[fx]; *y_n = p[gain_told] * p[fy]; *z_n = p[gain_told] * p[fz]);
 }
 EXPORT double dhdGetComFreq(char id) { (void)id; return 1.0; }
 EXPORT unsigned int dhdGetButtonMask(char id) { (void)id; return (unsigned int)p[buttons]; }

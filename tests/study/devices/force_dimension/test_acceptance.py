@@ -9,8 +9,9 @@ import pytest
 
 from study.cli.main import main
 from study.devices.clock import RealClock
-from study.devices.force_dimension import force_proof, watchdog_proof
+from study.devices.force_dimension import force_proof, halves, watchdog_proof
 from study.devices.force_dimension.acceptance import VALID_FOR, acceptance_file
+from study.devices.governor import cells
 from study.devices.opening import accept_device, open_device
 from study.errors import DeviceError
 from study.workflows.checks import examine_setup
@@ -93,9 +94,51 @@ def test_a_device_that_lets_go_under_force_is_accepted_and_then_opens(locked, pa
     document = json.loads(acceptance_file().read_text())
     assert (document["operator"], document["device"], document["force_n"]) == ("Ada", "omega.3", 0.5)
     assert 0.25 < document["gone_after_s"] < 2.0
-    assert 0.4 < locked.get("peak_n") < 1.0
+    assert (document["asked_n"], document["most_given_n"]) == (1.0, pytest.approx(0.5))
+    assert 0.4 < locked.get("peak_n") <= 0.5 * (1 + 1e-9)
     assert locked.safe
     open_for_a_hand(rigs)
+
+
+def cap_opened_at_each_tick(device, rig, stub) -> None:
+    device._governor.settings[[cells.STIMULUS_CAP, cells.TOTAL_CAP]] = 3.0
+    rig._cells[halves.CAP_N] = 3.0
+    stub.set("cap_works", 0)
+
+
+CAPS = {
+    "The cap at each tick does not hold: 1 N were asked for, and the device gave": cap_opened_at_each_tick,
+    "The cap of the library does not hold: 1 N were asked for, and the device gave 1.00 N":
+        lambda device, rig, stub: stub.set("cap_works", 0),
+    "The cap at each tick could not be tried": lambda device, rig, stub: stub.set("gain_told", 0.1),
+    "A stimulus above its cap was not refused":
+        lambda device, rig, stub: setattr(device, "_limits", replace(device._limits, stimulus_cap_n=3.0)),
+}  # fmt: skip
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("said", CAPS)
+def test_a_device_that_gets_more_than_its_cap_is_not_accepted(locked, patient, rigs, monkeypatch, said):
+    """Each layer by itself; and one that tells of no force proves nothing."""
+    prove = force_proof.prove_cap_holds
+
+    def broken(device, rig) -> float:
+        CAPS[said](device, rig, locked)
+        return prove(device, rig)
+
+    monkeypatch.setattr(force_proof, "prove_cap_holds", broken)
+    with pytest.raises(DeviceError, match="was not accepted") as no:
+        accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
+    assert said in no.value.happened
+    assert not acceptance_file().exists()
+    assert locked.safe and locked.get("peak_n") <= 1.0
+
+
+def test_what_admission_refuses_is_never_held_with_a_hand_on_the_handle(stub, rigs):
+    with contextlib.closing(open_device("omega3", rigs.SETTINGS, RealClock(), 1, own_process=False)) as device:
+        with pytest.raises(DeviceError, match="A hand is on the handle"):
+            device.hold_unchecked(rigs.push(0.1))
+        assert stub.get("peak_n") == 0.0
 
 
 @pytest.mark.real_time

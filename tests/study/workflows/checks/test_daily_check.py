@@ -159,7 +159,9 @@ def test_from_the_acceptance_to_the_first_day_at_the_command_line(device_like, m
         return contexts[-1].__enter__()[0]  # closed by its user
 
     def sign(name, settings, clock, operator, baseline) -> str:
-        write_acceptance(Acceptance("omega.3", INFO.details, operator, clock.utc()[:10], 0.5, 0.03, *baseline))
+        write_acceptance(
+            Acceptance("omega.3", INFO.details, operator, clock.utc()[:10], 0.5, 0.03, 1.0, 0.5, *baseline)
+        )
         return "signed"
 
     monkeypatch.setattr(examine_setup, "examine_setup", fine_setup)
