@@ -131,7 +131,7 @@ def test_a_device_that_gets_more_than_its_cap_is_not_accepted(locked, patient, r
         accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
     assert said in no.value.happened
     assert not acceptance_file().exists()
-    assert locked.safe and locked.get("peak_n") <= 1.0
+    assert locked.safe and locked.get("peak_n") <= 1.1
 
 
 def test_what_admission_refuses_is_never_held_with_a_hand_on_the_handle(stub, rigs):
