@@ -38,9 +38,13 @@ NAMED_IN = {
         "study/devices/drive/realtime_drive.py",  # which asks it for ticks
     },
     "CompiledTicks": {"study/devices/drive/stepped_runner.py"},
-    "write_once": {"study/devices/force_dimension/rig.py"},
-    "send_once": {"study/devices/force_dimension/rig.py"},  # zero only
-    "_send": set(),
+    "write_once": {"study/devices/force_dimension/halves.py", "study/devices/force_dimension/rig.py"},
+    "send_once": {
+        "study/devices/force_dimension/halves.py",
+        "study/devices/force_dimension/rig.py",  # zero only
+    },
+    "hold_unchecked": {"study/devices/force_dimension/force_proof.py"},
+    "given_past_this_n": {"study/devices/force_dimension/force_proof.py"},
     "Standby": set(),
     "run_block": set(),
 }
