@@ -126,6 +126,9 @@ class TrueSensor:
         true_mps2 = np.array([self._stub.read(name) for name in self._NAMES])
         return true_mps2 + self._stub.noise_mps2 * self._stub.random.standard_normal(3), False
 
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> None:
+        """It is read at each tick."""
+
     def close(self) -> None:
         self.closed = True
 

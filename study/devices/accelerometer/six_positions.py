@@ -7,8 +7,8 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, Calibration, calibrate
-from study.devices.accelerometer.parser import PacketParser
-from study.devices.accelerometer.serial_reader import AT_ONCE, Port, open_serial
+from study.devices.accelerometer.samples import Source
+from study.devices.accelerometer.serial_reader import open_serial
 from study.errors import DeviceError
 
 REST_S = 2.0
@@ -16,6 +16,9 @@ REST_S = 2.0
 
 SETTLE_S = 0.3
 """What comes sooner may be of the position before."""
+
+MANY, DRAIN_S = 200, 2.0
+"""Samples that come at once are old ones, which are let go by for so long at the most."""
 
 RANGE_G = 3.0
 """What the ADXL335 promises to measure; beyond, a channel counts as clipped."""
@@ -26,13 +29,15 @@ def calibrate_on_table(path: str, baud: int, before_each: Callable[[str], None],
 
     Raises `DeviceError` where nothing comes, or the positions do not fit a sensor.
     """
-    port = open_serial(path, baud)
+    source = open_serial(path, baud)
     try:
-        calibration = calibrate(tuple(_record_position(port, position, before_each, rest_s) for position in POSITIONS))
+        calibration = calibrate(
+            tuple(_record_position(source, position, before_each, rest_s) for position in POSITIONS)
+        )
     except ValueError as error:
         raise DeviceError("The accelerometer was not calibrated", f"{error}.", "Do it again.") from error
     finally:
-        port.close()
+        source.close()
     return calibration_toml(calibration, path, baud)
 
 
@@ -55,21 +60,24 @@ def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
     )
 
 
-def _record_position(port: Port, position: str, before_each: Callable[[str], None], rest_s: float) -> FloatArray:
+def _record_position(source: Source, position: str, before_each: Callable[[str], None], rest_s: float) -> FloatArray:
     """Raw samples (n, 3)."""
     before_each(position)
     settled_s = time.monotonic() + SETTLE_S
-    while len(port.read(AT_ONCE)) == AT_ONCE or time.monotonic() < settled_s:
-        pass  # of before: the line holds some, and the board waits with more where that is full
-    parser, found = PacketParser(), [np.zeros((0, 3))]
+    now_s, came = time.monotonic(), 0
+    # Of before: the line holds some, and the board waits with more where that is full.
+    while now_s < settled_s or (came > MANY and now_s < settled_s + DRAIN_S):
+        samples_of_before, now_s = source.read()
+        came = len(samples_of_before)
+    spoiled, found = source.counts.spoiled_bytes, [np.zeros((0, 3))]
     until_s = time.monotonic() + rest_s
     while time.monotonic() < until_s:
-        found.append(parser.feed(port.read(AT_ONCE)).raw.astype(float))
+        found.append(source.read()[0].raw.astype(float))
     samples = np.concatenate(found)
     if len(samples) < 2:
         raise DeviceError(
             "The accelerometer is silent",
-            f"Within {rest_s:g} s no whole packet came ({parser.counts.spoiled_bytes} bytes that are none).",
+            f"Within {rest_s:g} s no whole packet came ({source.counts.spoiled_bytes - spoiled} bytes that are none).",
             "Check its cable, the port and the baud rate, and that its firmware runs.",
         )
     return samples

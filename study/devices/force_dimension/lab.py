@@ -10,7 +10,8 @@ from pydantic.dataclasses import dataclass
 
 from protocols.definition.staircase_rule import STRICT
 from study.devices.accelerometer.calibration import Calibration
-from study.devices.accelerometer.serial_reader import SerialAccelerometer, open_serial
+from study.devices.accelerometer.sensor import Accelerometer
+from study.devices.accelerometer.serial_reader import open_serial
 from study.devices.onset_line import PulseSettings
 from study.errors import DeviceError
 
@@ -33,10 +34,10 @@ class SensorSettings:
     """Lowest and highest raw value that are no clipping."""
     baud: int = Field(default=2_000_000, gt=0)
 
-    def open_sensor(self) -> SerialAccelerometer:
+    def open_sensor(self) -> Accelerometer:
         """Zeroed, so at rest. Raises `DeviceError`."""
         calibration = Calibration(np.array(self.bias), np.array(self.sensitivity), np.zeros(3), 0.0)
-        sensor = SerialAccelerometer(open_serial(self.port, self.baud), calibration, self.raw_range)
+        sensor = Accelerometer(open_serial(self.port, self.baud), calibration, self.raw_range)
         try:
             sensor.zero()
         except BaseException:

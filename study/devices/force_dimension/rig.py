@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
 from study.devices.force_dimension.handle import WATCHDOG_CAUSE, Handle
 from study.devices.force_dimension.library import LibraryError
-from study.devices.rig import ACCELERATION, POSITION, READING_SIZE, SENSOR_CLIPPED
+from study.devices.rig import ACCELERATION, POSITION, READING_SIZE, SENSOR_CLIPPED, Sensed
 from study.errors import DeviceError
 
 LOOK_EVERY = 10
@@ -42,6 +42,10 @@ class Accelerometer(Protocol):
 
     def latest(self) -> tuple[FloatArray, bool]:
         """Acceleration (3,), m/s², NaN where there is none of now; whether a channel is at its limit. Cheap."""
+        ...
+
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
+        """As `study.devices.rig.SensesApart`."""
         ...
 
     def close(self) -> None:
@@ -122,6 +126,9 @@ class ForceDimensionRig:
             self._send(x, y, z)
         finally:
             self._sending.release()
+
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
+        return None if self._accelerometer is None else self._accelerometer.sensed(since_s, tick_s, rate_hz)
 
     def withhold(self, seconds: float) -> float:
         """As if the loop had stopped: for so long nothing is sent, zeros neither. When the last force was sent, s."""

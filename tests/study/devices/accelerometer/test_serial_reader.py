@@ -2,8 +2,6 @@
 
 import contextlib
 import os
-import threading
-import time
 import tomllib
 import tty
 
@@ -11,58 +9,16 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP, Calibration
-from study.devices.accelerometer.parser import SIZE, encode_packets
-from study.devices.accelerometer.serial_reader import FRESH_S, SerialAccelerometer, open_serial
+from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP
+from study.devices.accelerometer.parser import SIZE
+from study.devices.accelerometer.sensor import FRESH_S, Accelerometer
+from study.devices.accelerometer.serial_reader import open_serial
 from study.devices.accelerometer.six_positions import calibrate_on_table
 from study.devices.force_dimension.lab import SensorSettings
 from study.errors import DeviceError
+from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, SCALE, Board, within
 
 pytestmark = pytest.mark.real_time
-
-SCALE = 600.0
-IDEAL = Calibration(np.full(3, 32_768.0), SCALE * np.eye(3), np.zeros(3), 0.0)
-AT_REST = np.array([0.0, 0.0, 9.81])
-
-
-class Board:
-    """Sends packets as long as it is on. `spoil` changes the bytes of a block before they go."""
-
-    def __init__(self, rate_hz: float) -> None:
-        self.master, self.slave = os.openpty()
-        tty.setraw(self.slave)
-        self.path = os.ttyname(self.slave)
-        self.acceleration = AT_REST
-        self.rate_hz, self.sent, self.on = rate_hz, 0, True
-        self.spoil = lambda block: block
-        self._thread = threading.Thread(target=self._send, daemon=True)
-        self._thread.start()
-
-    def _send(self) -> None:
-        started_s = time.monotonic()
-        while self.on:
-            due = int((time.monotonic() - started_s) * self.rate_hz)
-            if due > self.sent:
-                numbers = np.arange(self.sent, due)
-                raw = np.tile(np.clip(32_768 + SCALE * self.acceleration, 0, 65_535), (len(numbers), 1))
-                with contextlib.suppress(OSError):
-                    os.write(self.master, self.spoil(encode_packets(numbers, 1e6 * numbers / self.rate_hz, raw)))
-                self.sent = due
-            time.sleep(0.002)
-
-    def close(self) -> None:
-        self.on = False
-        self._thread.join(5.0)
-        for end in (self.master, self.slave):
-            with contextlib.suppress(OSError):
-                os.close(end)
-
-
-def within(seconds: float, condition) -> bool:
-    until_s = time.monotonic() + seconds
-    while not condition() and time.monotonic() < until_s:
-        time.sleep(0.005)
-    return condition()
 
 
 @pytest.fixture
@@ -73,7 +29,7 @@ def board():
 
 @pytest.fixture
 def sensor(board):
-    with contextlib.closing(SerialAccelerometer(open_serial(board.path, 115_200), IDEAL, (10, 65_525))) as one:
+    with contextlib.closing(Accelerometer(open_serial(board.path, 115_200), IDEAL, RAW_RANGE)) as one:
         one.zero(0.2)
         yield one
 
@@ -106,7 +62,7 @@ def test_every_rate_is_followed_and_what_is_lost_is_counted(rate_hz):
             return block if at is None else block[:at] + block[at + 1 :]
 
         board.spoil = losing
-        with contextlib.closing(SerialAccelerometer(open_serial(board.path, 115_200), IDEAL, (10, 65_525))) as sensor:
+        with contextlib.closing(Accelerometer(open_serial(board.path, 115_200), IDEAL, RAW_RANGE)) as sensor:
             assert within(20.0, lambda: sensor.counts.packets > rate_hz / 2)
             counts = sensor.counts
         assert 0 < counts.lost < 0.2 * counts.packets
@@ -117,7 +73,7 @@ def test_every_rate_is_followed_and_what_is_lost_is_counted(rate_hz):
 def test_a_silent_serial_line_is_an_error():
     master, slave = os.openpty()
     tty.setraw(slave)
-    with contextlib.closing(SerialAccelerometer(open_serial(os.ttyname(slave), 115_200), IDEAL, (0, 65_535))) as sensor:
+    with contextlib.closing(Accelerometer(open_serial(os.ttyname(slave), 115_200), IDEAL, (0, 65_535))) as sensor:
         os.write(master, b"no packet at all")
         with pytest.raises(DeviceError, match="The accelerometer is silent"):
             sensor.zero(0.1)
