@@ -63,6 +63,9 @@ _TABLE = _table()
 LONGEST_SILENCE_US = 10_000_000
 """Between two packets of one clock. After a longer silence the host's clock is fitted anew, as after a restart."""
 
+SHORTEST_PERIOD_US = 50
+"""No board sends more often: what looks like many lost packets in too short a time is another clock."""
+
 MOST_DOUBTFUL = 8
 """Packets in a row that follow neither the last one that counts nor each other: more than chance ever makes."""
 
@@ -154,7 +157,7 @@ def _steps(last: Packets, packets: Packets) -> tuple[npt.NDArray[np.int64], npt.
 def _follows(last: Packets, packets: Packets) -> npt.NDArray[np.bool_]:
     """(n,): whether each packet may be of the same clock as the one before and later."""
     steps, times = _steps(last, packets)
-    return (steps > 0) & (steps < 2**15) & (times > 0) & (times < LONGEST_SILENCE_US)
+    return (steps > 0) & (steps < 2**15) & (times >= SHORTEST_PERIOD_US * steps) & (times < LONGEST_SILENCE_US)
 
 
 def _in_order(last: Packets, starts: Indices, packets: Packets) -> bool:

@@ -67,6 +67,15 @@ class Board:
                 os.close(end)
 
 
+def table_of(board: Board) -> str:
+    """Of the lab's file, as the calibration prints it."""
+    rows = ", ".join(f"[{', '.join(str(SCALE * (row == column)) for column in range(3))}]" for row in range(3))
+    return (
+        f'[accelerometer]\nport = "{board.path}"\nbaud = 115200\nbias = [32768.0, 32768.0, 32768.0]\n'
+        f"sensitivity = [{rows}]\nraw_range = {list(RAW_RANGE)}\n"
+    )
+
+
 def within(seconds: float, condition: Callable[[], bool]) -> bool:
     until_s = time.monotonic() + seconds
     while not condition() and time.monotonic() < until_s:

@@ -72,6 +72,23 @@ def test_a_firmware_restart_is_counted_and_time_continues():
     assert (np.diff(np.concatenate((first.time_us, second.time_us))) > 0).all()
 
 
+@pytest.mark.parametrize(
+    ("first", "times_us"),
+    [
+        (60_000, 9e8 + 250 * np.arange(50)),  # the new numbers look like 5536 lost packets: the time tells
+        (100, 9e8 + 250 * np.arange(50)),
+        (60_000, 2**32 - 12_500 + 250 * np.arange(50)),  # the time looks right, but not for 5536 lost packets
+    ],
+)
+def test_a_clock_that_began_anew_is_told_apart(first, times_us):
+    before = encode_packets(first + np.arange(50), times_us, np.zeros((50, 3)))
+    parser = PacketParser()
+    samples = parser.feed(before + stream(50)[0])
+    assert samples.restarts.tolist() == [0] * 50 + [1] * 50
+    assert (parser.counts.restarts, parser.counts.lost, parser.counts.packets) == (1, 0, 100)
+    assert (np.diff(samples.sequence) == 1).all() and (np.diff(samples.time_us) > 0).all()
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_among_a_million_garbled_bytes_every_good_packet_is_found(seed):
     """Packets between stretches of noise that is full of sync bytes; some packets lose bytes, some have one changed."""

@@ -16,7 +16,7 @@ from study.devices.accelerometer.serial_reader import open_serial
 from study.devices.accelerometer.six_positions import calibrate_on_table
 from study.devices.force_dimension.lab import SensorSettings
 from study.errors import DeviceError
-from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, SCALE, Board, within
+from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, SCALE, Board, table_of, within
 
 pytestmark = pytest.mark.real_time
 
@@ -92,11 +92,7 @@ def test_the_driver_opens_it_as_the_lab_s_file_says(board, stub, rigs, tmp_path,
     from study.devices.opening import open_device
 
     monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "device.toml"))
-    rows = "[[600.0, 0.0, 0.0], [0.0, 600.0, 0.0], [0.0, 0.0, 600.0]]"
-    (tmp_path / "device.toml").write_text(
-        f'[accelerometer]\nport = "{board.path}"\nbaud = 115200\nbias = [32768.0, 32768.0, 32768.0]\n'
-        f"sensitivity = {rows}\nraw_range = [10, 65525]\n"
-    )
+    (tmp_path / "device.toml").write_text(table_of(board))
     with contextlib.closing(open_device("omega3", rigs.SETTINGS, RealClock(), 1)) as device:
         board.acceleration = AT_REST + [1.0, 2.0, 3.0]
 

@@ -10,12 +10,12 @@ from equalizer.signals.lockin import phasors
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.serial_reader import open_serial
 from study.devices.rig import SensesApart
-from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, Board, within
+from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, Board, table_of, within
 
 pytestmark = pytest.mark.real_time
 
 TONE_HZ, AMPLITUDE = 45.0, 8.0
-WORST_S = 6e-4
+WORST_S = 5e-4
 """8 degrees at 45 Hz: the least delay of an arrival, which nothing tells, on a computer that others use."""
 
 
@@ -51,8 +51,7 @@ def test_a_tone_comes_out_with_its_phase_on_the_ticks(rate_hz, drift_ppm):
     assert isinstance(sensor, SensesApart) and np.isfinite(newest).all()
     health = sensed.health
     assert (health.ticks, health.unplaced_ticks, health.lost, health.restarts) == (1500, 0, 0, 0)
-    assert health.packets == pytest.approx(1.5 * rate_hz, rel=0.2)
-    print("LATE", late_s(sensed.acceleration_mps2, tick_s), sensed.health)
+    assert health.packets == pytest.approx(1.5 * rate_hz, rel=0.4)
     assert -1e-4 < late_s(sensed.acceleration_mps2, tick_s) < WORST_S
     amplitude = np.abs(phasors(sensed.acceleration_mps2, 1000.0, TONE_HZ)[0])
     np.testing.assert_allclose(amplitude, [AMPLITUDE, AMPLITUDE / 2, 0.0], atol=0.03)
@@ -82,7 +81,6 @@ def test_lost_torn_and_garbled_packets_are_counted_and_leave_the_phase_as_it_is(
             sensed.health.unplaced_ticks / sensed.health.ticks,
         )
     )
-    print("LATE", late_s(sensed.acceleration_mps2, tick_s), sensed.health)
     assert -1e-4 < late_s(sensed.acceleration_mps2, tick_s) < WORST_S
 
 
@@ -112,3 +110,28 @@ def test_a_board_that_falls_silent_leaves_the_ticks_without_a_value():
         sensed = sensor.sensed(tick_s[0], tick_s, 1000.0)
     assert np.isnan(sensed.acceleration_mps2).all()
     assert (sensed.health.unplaced_ticks, sensed.health.missing) == (200, 1.0)
+
+
+def test_a_trial_on_the_driver_is_recorded_on_its_ticks_missed_ones_too(stub, rigs, tmp_path, monkeypatch):
+    from study.devices.clock import RealClock
+    from study.devices.opening import open_device
+
+    monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "device.toml"))
+    with contextlib.closing(Board(4000.0, 60.0)) as board:
+        (tmp_path / "device.toml").write_text(table_of(board))
+        with contextlib.closing(open_device("omega3", rigs.SETTINGS, RealClock(), 1, own_process=False)) as device:
+            board.signal = tone
+            device.hold(rigs.sine(0.5))
+            until_s = time.monotonic() + 1.7
+            while time.monotonic() < until_s:
+                device.keep_alive()
+                time.sleep(0.02)
+            played = device.release()
+            due_s = device._governor.row_due_s()
+    assert played.recording is not None and played.health.sensor is not None
+    health = played.health.sensor
+    assert (health.ticks, health.unplaced_ticks, health.lost) == (len(played.recording.response), 0, 0)
+    response = played.recording.response.samples
+    assert np.isfinite(response).all()
+    assert -1e-4 < late_s(response, due_s[-len(response) :]) < WORST_S
+    assert stub.safe
