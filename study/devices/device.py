@@ -11,6 +11,7 @@ from typing import Protocol
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
+from study.session.facts.sensor_facts import SensorFacts
 from study.session.facts.void_reasons import PROGRAM_STALLED
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.limits import Limits
@@ -72,34 +73,6 @@ class Fault(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class SensorHealth:
-    """What came from an accelerometer with a clock of its own, since `hold` or `play`."""
-
-    packets: int
-    """Whole ones."""
-    lost: int
-    """Missing between those, by their numbers: torn and garbled ones are among them."""
-    spoiled_bytes: int
-    """That belonged to no whole packet."""
-    restarts: int
-    """How often its board began anew."""
-    ticks: int = 0
-    """Of the recording; 0 where there is none."""
-    unplaced_ticks: int = 0
-    """Those of them at which the acceleration is not known."""
-    drift_ppm: float | None = None
-    """Of its clock beside the computer's, > 0: it is slow. None where it was not fitted."""
-    longest_delay_s: float | None = None
-    """Of an arrival, beyond the least, in the minutes to which the clock was fitted."""
-
-    @property
-    def missing(self) -> float:
-        """Share of what should be there: of packets or of ticks, the larger one. 1 where nothing came."""
-        packets = self.lost / (self.packets + self.lost) if self.packets else 1.0
-        return max(packets, self.unplaced_ticks / max(self.ticks, 1))
-
-
-@dataclass(frozen=True, slots=True)
 class Health:
     """What the safety layer counted since `hold` or `play`, in ticks."""
 
@@ -119,7 +92,7 @@ class Health:
     """Of a loop that does not wait: run, but their work ended after the next was due. Missed ones come on top."""
     latest_s: float = 0.0
     """The longest from when a tick was due until its work, or that of the one that came in its place, was done."""
-    sensor: SensorHealth | None = None
+    sensor: SensorFacts | None = None
     """Known when it is over. None where the acceleration is read with each tick, as in a simulation, or not at all."""
 
 

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from equalizer.signals.signal import FloatArray
-from study.devices.device import DeviceInfo, SensorHealth
+from study.devices.device import DeviceInfo
+from study.session.facts.sensor_facts import SensorFacts
 
 POSITION = slice(0, 3)
 """Where a reading holds the encoders' position of the handle, m."""
@@ -70,7 +71,7 @@ class Sensed:
 
     acceleration_mps2: FloatArray
     """(k, 3), as in `ACCELERATION`, at the ticks that were asked for; NaN where it is not known."""
-    health: SensorHealth
+    health: SensorFacts
 
 
 @runtime_checkable

@@ -13,9 +13,9 @@ from study.devices.accelerometer.clock_fit import ClockFit
 from study.devices.accelerometer.history import History
 from study.devices.accelerometer.placement import HALF_PERIODS, Placed, place
 from study.devices.accelerometer.samples import Counts, Source
-from study.devices.device import SensorHealth
 from study.devices.rig import Sensed
 from study.errors import DeviceError
+from study.session.facts.sensor_facts import SensorFacts
 
 FRESH_S = 0.05
 """A sample that is older is none: fifty ticks, and longer than a busy computer leaves a thread waiting."""
@@ -53,11 +53,7 @@ class Accelerometer:
         time.sleep(seconds)
         raw = self._history.stretch(since_s, time.monotonic()).raw
         if not len(raw):
-            raise DeviceError(
-                "The accelerometer is silent",
-                f"Within {seconds:g} s no whole packet came ({self.counts.spoiled_bytes} bytes that are none).",
-                "Check its cable, the port and the baud rate, and that its firmware runs.",
-            )
+            raise silent(seconds, self.counts.spoiled_bytes)
         self._rest_mps2 = self._calibration.acceleration(raw.mean(axis=0))
 
     def latest(self) -> tuple[FloatArray, bool]:
@@ -74,7 +70,7 @@ class Accelerometer:
         counts = self._history.counted(since_s)
         return Sensed(placed.values, _health(counts, placed.values, placed.fit))
 
-    def rest(self, seconds: float) -> tuple[SensorHealth, FloatArray, float]:
+    def rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
         """Of the last seconds, at rest: what came, the standard deviation of each axis, m/s², samples per second."""
         now_s = time.monotonic()
         stretch = self._history.stretch(now_s - seconds, now_s)
@@ -105,8 +101,19 @@ class Accelerometer:
                     self._history.add(samples, arrived_s, self._source.counts)
 
 
-def _health(counts: Counts, placed: FloatArray, fit: ClockFit | None) -> SensorHealth:
-    return SensorHealth(
+def silent(seconds: float, spoiled_bytes: int) -> DeviceError:
+    """No whole packet came for so long, but so many other bytes."""
+    return DeviceError(
+        "The accelerometer is silent",
+        f"Within {seconds:g} s no whole packet came ({spoiled_bytes} bytes that are none).",
+        "Another device or another firmware sends there, or the baud rate is wrong: check the port, flash the board."
+        if spoiled_bytes
+        else "Check its cable and the port, and that the board runs its firmware (docs/hardware.md).",
+    )
+
+
+def _health(counts: Counts, placed: FloatArray, fit: ClockFit | None) -> SensorFacts:
+    return SensorFacts(
         packets=counts.packets,
         lost=counts.lost,
         spoiled_bytes=counts.spoiled_bytes,

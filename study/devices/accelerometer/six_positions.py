@@ -8,6 +8,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, Calibration, calibrate
 from study.devices.accelerometer.samples import Source
+from study.devices.accelerometer.sensor import silent
 from study.devices.accelerometer.serial_reader import open_serial
 from study.errors import DeviceError
 
@@ -75,11 +76,7 @@ def _record_position(source: Source, position: str, before_each: Callable[[str],
         found.append(source.read()[0].raw.astype(float))
     samples = np.concatenate(found)
     if len(samples) < 2:
-        raise DeviceError(
-            "The accelerometer is silent",
-            f"Within {rest_s:g} s no whole packet came ({source.counts.spoiled_bytes - spoiled} bytes that are none).",
-            "Check its cable, the port and the baud rate, and that its firmware runs.",
-        )
+        raise silent(rest_s, source.counts.spoiled_bytes - spoiled)
     return samples
 
 

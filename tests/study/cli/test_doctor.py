@@ -1,5 +1,6 @@
 """`hapteq doctor` as an experimenter before a study day and as a script uses it."""
 
+import contextlib
 import json
 from importlib.metadata import packages_distributions
 from pathlib import Path
@@ -18,6 +19,7 @@ from study.session.views.views import DeviceFinding, DeviceReport
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.check_timing import Timing
 from study.workflows.checks.examine_setup import Examination
+from tests.study.devices.accelerometer.pty_board import Board, table_of
 
 HEALTH = Health(Fault.NONE, 2000, 0, 0, 0, 0, 0, 0.0)
 
@@ -133,6 +135,17 @@ def test_a_sensor_that_is_not_plugged_in_is_a_line_of_its_own_and_all_else_is_ch
     assert {"Answers", "Handle", "Rate", "Late ticks"} <= set(found)
     assert "\nTiming\n" in out
     assert stub.safe
+
+
+@pytest.mark.real_time
+def test_a_sensor_that_is_there_is_told_with_rate_losses_clock_and_noise(run, stub, tmp_path):
+    with contextlib.closing(Board(4000.0)) as board:
+        (tmp_path / "none.toml").write_text(table_of(board))
+        _, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0)
+    found = verdicts(out)
+    assert {"Sensor rate", "Sensor losses", "Sensor clock"} <= set(found)
+    assert (found["Sensor losses"], found["Sensor noise"]) == ("fine", "WARN")  # the same value again and again
+    assert "samples per second" in out and "ppm" in out
 
 
 def test_a_real_device_is_found_with_library_firmware_calibration_and_watchdog(run, stub, tmp_path):
