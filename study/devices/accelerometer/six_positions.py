@@ -12,6 +12,10 @@ from study.devices.accelerometer.sensor import silent
 from study.devices.accelerometer.serial_reader import open_serial
 from study.errors import DeviceError
 
+BeforeEach = Callable[[str, tuple[float, float, float] | None], None]
+"""before_each(position, heard): returns when the sensor lies there. heard: the mean raw values in the position before,
+None for the first."""
+
 REST_S = 2.0
 """In each position: at 2 kHz the mean of 4000 samples, 1 mg of noise away from the truth at the most."""
 
@@ -25,16 +29,14 @@ RANGE_G = 3.0
 """What the ADXL335 promises to measure; beyond, a channel counts as clipped."""
 
 
-def calibrate_on_table(path: str, baud: int, before_each: Callable[[str], None], rest_s: float = REST_S) -> str:
-    """`before_each(position)` returns when the sensor lies there. The table of the lab's file, TOML.
+def calibrate_on_table(path: str, baud: int, before_each: BeforeEach, rest_s: float | None = None) -> str:
+    """The table of the lab's file, TOML. rest_s: `REST_S`.
 
     Raises `DeviceError` where nothing comes, or the positions do not fit a sensor.
     """
     source = open_serial(path, baud)
     try:
-        calibration = calibrate(
-            tuple(_record_position(source, position, before_each, rest_s) for position in POSITIONS)
-        )
+        calibration = calibrate(_record_positions(source, before_each, REST_S if rest_s is None else rest_s))
     except ValueError as error:
         raise DeviceError("The accelerometer was not calibrated", f"{error}.", "Do it again.") from error
     finally:
@@ -61,9 +63,18 @@ def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
     )
 
 
-def _record_position(source: Source, position: str, before_each: Callable[[str], None], rest_s: float) -> FloatArray:
+def _record_positions(source: Source, before_each: BeforeEach, rest_s: float) -> tuple[FloatArray, ...]:
+    """Raw samples, (n, 3) each."""
+    found: list[FloatArray] = []
+    for position in POSITIONS:
+        x, y, z = found[-1].mean(axis=0).tolist() if found else (0.0, 0.0, 0.0)
+        before_each(position, (x, y, z) if found else None)
+        found.append(_record_position(source, rest_s))
+    return tuple(found)
+
+
+def _record_position(source: Source, rest_s: float) -> FloatArray:
     """Raw samples (n, 3)."""
-    before_each(position)
     settled_s = time.monotonic() + SETTLE_S
     now_s, came = time.monotonic(), 0
     # Of before: the line holds some, and the board waits with more where that is full.

@@ -107,7 +107,8 @@ def test_the_driver_opens_it_as_the_lab_s_file_says(board, stub, rigs, tmp_path,
 def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
     laid: list[str] = []
 
-    def lay_down(position: str) -> None:
+    def lay_down(position: str, heard: tuple[float, float, float] | None) -> None:
+        assert (heard is None) is (not laid)
         board.acceleration = GRAVITY_MPS2 * UP[len(laid)]
         laid.append(position)
 
@@ -122,4 +123,4 @@ def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
 
 def test_a_sensor_that_was_never_turned_is_not_calibrated(board):
     with pytest.raises(DeviceError, match="was not calibrated"):
-        calibrate_on_table(board.path, 115_200, lambda position: None, rest_s=0.1)
+        calibrate_on_table(board.path, 115_200, lambda position, heard: None, rest_s=0.1)
