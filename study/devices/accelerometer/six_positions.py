@@ -9,7 +9,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, Calibration, calibrate
 from study.devices.accelerometer.samples import Source
 from study.devices.accelerometer.sensor import silent
-from study.devices.accelerometer.serial_reader import open_serial
+from study.devices.accelerometer.sources import is_volts, open_source
 from study.errors import DeviceError
 
 BeforeEach = Callable[[str, tuple[float, float, float] | None], None]
@@ -34,7 +34,7 @@ def calibrate_on_table(path: str, baud: int, before_each: BeforeEach, rest_s: fl
 
     Raises `DeviceError` where nothing comes, or the positions do not fit a sensor.
     """
-    source = open_serial(path, baud)
+    source = open_source(path, baud)
     try:
         calibration = calibrate(_record_positions(source, before_each, REST_S if rest_s is None else rest_s))
     except ValueError as error:
@@ -47,6 +47,8 @@ def calibrate_on_table(path: str, baud: int, before_each: BeforeEach, rest_s: fl
 def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
     reach = np.abs(calibration.sensitivity).sum(axis=1) * RANGE_G * GRAVITY_MPS2
     lowest, highest = float((calibration.bias - reach).min()), float((calibration.bias + reach).max())
+    within = f"[{max(0, round(lowest))}, {min(65_535, round(highest))}]"
+    raw_range = _numbers(np.array([lowest, highest])) if is_volts(path) else within
     rows = ", ".join(_numbers(row) for row in calibration.sensitivity)
     noise = ", ".join(f"{value:.3f}" for value in calibration.noise_mps2)
     return "\n".join(
@@ -58,7 +60,7 @@ def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
             f"baud = {baud}",
             f"bias = {_numbers(calibration.bias)}",
             f"sensitivity = [{rows}]",
-            f"raw_range = [{max(0, round(lowest))}, {min(65_535, round(highest))}]",
+            f"raw_range = {raw_range}",
         )
     )
 
@@ -92,4 +94,5 @@ def _record_position(source: Source, rest_s: float) -> FloatArray:
 
 
 def _numbers(row: FloatArray) -> str:
-    return f"[{', '.join(f'{value:.4f}' for value in row)}]"
+    """Volts have few digits before the point, counts of 16 bits many."""
+    return f"[{', '.join(f'{value:.4f}' if abs(value) >= 100 else f'{value:.7f}' for value in row)}]"

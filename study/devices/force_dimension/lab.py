@@ -12,7 +12,7 @@ from pydantic.dataclasses import dataclass
 from protocols.definition.staircase_rule import STRICT
 from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.sensor import Accelerometer
-from study.devices.accelerometer.serial_reader import open_serial
+from study.devices.accelerometer.sources import open_source
 from study.devices.onset_line import PulseSettings
 from study.errors import DeviceError
 
@@ -26,22 +26,22 @@ FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"
 
 @dataclass(frozen=True, config=STRICT)
 class SensorSettings:
-    """An accelerometer on a serial line, with what its calibration found."""
+    """An accelerometer, with what its calibration found."""
 
     port: str
-    """As the system calls it: /dev/ttyACM0, COM3."""
+    """As the system calls it: /dev/ttyACM0, COM3; or a data-acquisition device, as `sources` says."""
     bias: Triple
     """Raw value of each channel at no acceleration."""
     sensitivity: tuple[Triple, Triple, Triple]
     """Raw per m/s²; a row is a channel, a column an axis of the device."""
-    raw_range: tuple[int, int]
+    raw_range: tuple[float, float]
     """Lowest and highest raw value that are no clipping."""
     baud: int = Field(default=2_000_000, gt=0)
 
     def open_sensor(self) -> Accelerometer:
         """Zeroed, so at rest. Raises `DeviceError`."""
         calibration = Calibration(np.array(self.bias), np.array(self.sensitivity), np.zeros(3), 0.0)
-        sensor = Accelerometer(open_serial(self.port, self.baud), calibration, self.raw_range)
+        sensor = Accelerometer(open_source(self.port, self.baud), calibration, self.raw_range)
         try:
             sensor.zero()
         except BaseException:
