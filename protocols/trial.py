@@ -46,6 +46,8 @@ class VoidCause(Enum):
     """The device or its safety layer ended the stimulus."""
     MISSED_TICKS = "missed_ticks"
     """Too many ticks of the control loop were missed."""
+    NO_ACCELERATION = "no_acceleration"
+    """The protocol needs the accelerometer, and too much of what it sent was lost."""
     SCREEN_LATE = "screen_late"
     """The program or its screen gave no sign of life in time."""
     PROGRAM_ENDED = "program_ended"
@@ -100,6 +102,13 @@ class Trial:
     """Amplitude of the acceleration at 2 to 5 times the frequency, all axes together. None where none was measured."""
     nominal_n: float | None = None
     """Level of the staircase, where `level_n`, which was played, was drawn around it. None where nothing is roved."""
+    lost_packets: int | None = None
+    """Of the accelerometer's, those that arrived torn or garbled among them. None, with the next two, where it is read
+    with each tick or there is none."""
+    garbled_bytes: int | None = None
+    """From the accelerometer, that belonged to no whole packet."""
+    acceleration_missing: float | None = None
+    """Share of its packets, or of the recorded ticks if that is more, without which the acceleration was measured."""
 
     @property
     def staircase_n(self) -> float:

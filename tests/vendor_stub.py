@@ -131,6 +131,9 @@ class TrueSensor:
     def latest(self) -> tuple[FloatArray, bool]:
         return self._newest.fresh(time.monotonic())
 
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> None:
+        """It is read at each tick."""
+
     def close(self) -> None:
         self.closed = True
 

@@ -9,6 +9,7 @@ from protocols.definition.apparatus import SafetySettings, SpringSettings, TestD
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.definition.field_types import Name, Source, StimulusFrequency, Title
+from protocols.definition.measurement import MeasurementSettings
 from protocols.definition.preparation import (
     ConsentSettings,
     DebriefQuestion,
@@ -199,50 +200,6 @@ class RestSettings:
         float,
         Field(ge=0, le=3600, description="Shortest rest within a run. Default 30; idle while after_trials is 0."),
     ] = 30.0
-
-
-@dataclass(frozen=True, config=STRICT)
-class MeasurementSettings:
-    """What is kept of every trial, and when a trial is void because of the device."""
-
-    keep_s: Annotated[
-        float,
-        Field(
-            gt=0,
-            le=60,
-            description="The last whole periods of the steady part, this long at the most, are kept as a recording. "
-            "Default 1: five periods at 5 Hz.",
-        ),
-    ] = 1.0
-    missed_ticks_limit: Annotated[
-        float,
-        Field(
-            ge=0,
-            le=1,
-            description="A trial with a larger share of missed 1 kHz ticks is void and comes again. Default 0.02: "
-            "fewer cannot be felt.",
-        ),
-    ] = 0.02
-    late_ticks_limit: Annotated[
-        float,
-        Field(
-            ge=0,
-            le=1,
-            description="A trial in which, until the answer, a larger share of ticks was late (their work ended after "
-            "the next was due) or missed is void and comes again: 0.02, say. Default 1: no limit. Devices that wait "
-            "for the computer are never late.",
-        ),
-    ] = 1.0
-    longest_late_ms: Annotated[
-        float,
-        Field(
-            gt=0,
-            le=1000,
-            description="A trial is void and comes again where, until the answer, a tick's work ended later than this "
-            "after it was due, so that the device held its last force: 10, say, a quarter of a period at 25 Hz. "
-            "Default 1000: no limit, for a loop that stands still for 100 ms is lost.",
-        ),
-    ] = 1000.0
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -44,6 +44,11 @@ ROVE_SINCE: dict[str, Untouched] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0
 
 TIMING_SINCE: dict[str, Untouched] = {"measurement.late_ticks_limit": 1.0, "measurement.longest_late_ms": 1000.0}
 
+SENSOR_SINCE: dict[str, Untouched] = {
+    "measurement.lost_packets_limit": 0.05,
+    "measurement.accelerometer_needed": False,
+}
+
 SETUP_SINCE: dict[str, Untouched] = {"setup.daily_check_needed": False}
 
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
@@ -53,6 +58,7 @@ FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
         **ROVE_SINCE,
         **SAFETY_SINCE,
         **TIMING_SINCE,
+        **SENSOR_SINCE,
         **SETUP_SINCE,
     },
     "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},

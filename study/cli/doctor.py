@@ -47,6 +47,9 @@ SensorOption = Annotated[
     str | None,
     typer.Option(metavar="PORT", help="Only this: lay the accelerometer on this serial line down in six positions."),
 ]
+KeepOption = Annotated[
+    bool, typer.Option("--keep", help="Put what --calibrate-sensor finds into the lab's file, not only on the screen.")
+]
 BaudOption = Annotated[int, typer.Option(min=1, help="Of the accelerometer's serial line.")]
 
 
@@ -59,6 +62,7 @@ def doctor(
     daily: DailyOption = False,
     calibrate_sensor: SensorOption = None,
     baud: BaudOption = 2_000_000,
+    keep: KeepOption = False,
     hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -71,7 +75,7 @@ def doctor(
     from study.workflows.checks.examine_setup import examine_setup
 
     if calibrate_sensor is not None:
-        _calibrate_sensor(calibrate_sensor, baud)
+        _calibrate_sensor(calibrate_sensor, baud, keep)
         return
     _prepare(device, calibrate, daily, daily or accept is not None, hands_off)
     with bar("Timing the loop (s)", total=timing) if timing else nullcontext(lambda done: None) as show:
@@ -147,16 +151,21 @@ def _calibrate(device: str) -> None:
     calibrate_device(device, CALIBRATION_S)
 
 
-def _calibrate_sensor(port: str, baud: int) -> None:
-    from study.devices.opening import calibrate_accelerometer
+def _calibrate_sensor(port: str, baud: int, keep: bool) -> None:
+    from study.devices.opening import calibrate_accelerometer, keep_accelerometer
 
-    def lay_down(position: str) -> None:
+    def lay_down(position: str, heard: tuple[float, float, float] | None) -> None:
+        if heard is not None:
+            typer.echo(f"  read {', '.join(f'{value:.0f}' for value in heard)}", err=True)
         typer.echo(f"Lay the sensor down with {position}, let go of it, and press Enter. ", err=True, nl=False)
         if not sys.stdin.readline():
             raise KeyboardInterrupt
 
     table = calibrate_accelerometer(port, baud, lay_down)
-    typer.echo("Put this into the device's file (docs/hardware.md):", err=True)
+    if keep:
+        typer.echo(f"Written into {keep_accelerometer(table)}:", err=True)
+    else:
+        typer.echo("Put this into the device's file (docs/hardware.md), or do it again with --keep:", err=True)
     typer.echo(table)
 
 

@@ -11,6 +11,7 @@ from typing import Protocol
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
+from study.session.facts.sensor_facts import SensorFacts
 from study.session.facts.void_reasons import PROGRAM_STALLED
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.limits import Limits
@@ -91,6 +92,8 @@ class Health:
     """Of a loop that does not wait: run, but their work ended after the next was due. Missed ones come on top."""
     latest_s: float = 0.0
     """The longest from when a tick was due until its work, or that of the one that came in its place, was done."""
+    sensor: SensorFacts | None = None
+    """Known when it is over. None where the acceleration is read with each tick, as in a simulation, or not at all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -140,21 +140,32 @@ def calibrate_device(name: str, patience_s: float) -> None:
     calibrate(name, patience_s)
 
 
-def calibrate_accelerometer(port: str, baud: int, before_each: Callable[[str], None]) -> str:
-    """Six positions under gravity; `before_each(position)` returns when the sensor lies there. TOML for the lab's file.
-
-    Raises `DeviceError`.
-    """
+def calibrate_accelerometer(
+    port: str, baud: int, before_each: Callable[[str, tuple[float, float, float] | None], None]
+) -> str:
+    """Six positions under gravity, as `six_positions.calibrate_on_table`. TOML for the lab's file. Raises
+    `DeviceError`."""
     from study.devices.accelerometer.six_positions import calibrate_on_table
 
     return calibrate_on_table(port, baud, before_each)
 
 
-def device_folder() -> Path:
-    """Where this computer keeps what it knows of its device: settings, acceptance, baseline and daily checks."""
+def keep_accelerometer(table: str) -> Path:
+    """Put the table of a calibration into the lab's file. Raises `DeviceError`; then nothing was changed."""
+    from study.devices.force_dimension.lab import keep_sensor
+
+    return keep_sensor(table)
+
+
+def lab_file_path() -> Path:
     from study.devices.force_dimension.lab import lab_file
 
-    return lab_file().parent
+    return lab_file()
+
+
+def device_folder() -> Path:
+    """Where this computer keeps what it knows of its device: settings, acceptance, baseline and daily checks."""
+    return lab_file_path().parent
 
 
 def accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:

@@ -8,13 +8,14 @@ code kept on disk does not: after a change of them, delete the compiled files (`
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
+from study.session.facts.sensor_facts import SensorFacts
 
 POSITION = slice(0, 3)
 """Where a reading holds the encoders' position of the handle, m."""
@@ -83,6 +84,26 @@ class Halves:
     """Of the accelerometer, shape (rows, columns)."""
     error: Callable[[int], Exception]
     """error(code): what the rig's own methods raise; asked for in the thread that got the code."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensed:
+    """What an accelerometer measured that is read apart from the ticks."""
+
+    acceleration_mps2: FloatArray
+    """(k, 3), as in `ACCELERATION`, at the ticks that were asked for; NaN where it is not known."""
+    health: SensorFacts
+
+
+@runtime_checkable
+class SensesApart(Protocol):
+    """A rig whose accelerometer has a clock of its own. Its newest value stands in each reading; what belongs to a
+    tick is known only later."""
+
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
+        """tick_s (k,): when the ticks were due, 1 / rate_hz apart, by the clock of the loop; since_s: from when on is
+        counted. None without such a sensor. In any thread, while nothing moves; may take 0.1 s."""
+        ...
 
 
 def no_buttons() -> frozenset[int]:

@@ -22,7 +22,7 @@ from study.devices.drive.seen import look_of
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import VirtualDrive
 from study.devices.governor.governor import SETTLE_S, Governor
-from study.devices.rig import CompiledRig, Rig, no_hand
+from study.devices.rig import CompiledRig, Rig, SensesApart, no_hand
 from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
@@ -48,6 +48,7 @@ class SafeDevice:
             check_hardware(rig.drops_force_after_s, rig.info, settings)
         self._info = rig.info
         self._simulated_hand = rig.simulate_hand if isinstance(rig, CompiledRig) else no_hand
+        self._apart = rig if isinstance(rig, SensesApart) else None
         self._limits = settings.limits
         self._hand_on_handle = settings.hand_on_handle
         self._clock = clock
@@ -104,7 +105,7 @@ class SafeDevice:
         self._governor.ask_release()
         self._wait_until_still(stimulus.fade_out_s)
         self._held = None
-        return record_held_stimulus(self._governor, self._info)
+        return record_held_stimulus(self._governor, self._info, self._apart)
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
         self._must_be_idle()
@@ -117,7 +118,7 @@ class SafeDevice:
             raise
         self._wait_until_still(0.0)
         self._must_be_there()
-        return record_commands(self._governor, self._info)
+        return record_commands(self._governor, self._info, self._apart)
 
     def look(self) -> Look:
         self._drive.check()

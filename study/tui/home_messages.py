@@ -75,5 +75,32 @@ class DiagnoseWanted(Message):
 
 
 @dataclass(eq=False)
+class CalibrateWanted(Message):
+    """Lay the accelerometer on this serial line down in six positions."""
+
+    port: str
+    baud: int
+
+
+@dataclass(eq=False)
+class LaidDown(Message):
+    """It lies as the engine asked."""
+
+    number: int
+
+
+@dataclass(eq=False)
+class KeepWanted(Message):
+    """Put the table of a calibration into the lab's file."""
+
+    table: str
+
+
+@dataclass(eq=False)
+class CalibrationStopped(Message):
+    """End it; nothing is written."""
+
+
+@dataclass(eq=False)
 class HomeWanted(Message):
     """Back to the start screen, with its list read anew."""

@@ -1,7 +1,8 @@
 """From bytes as they come, torn, lost or garbled, to samples: every packet whose check sum is right, in order.
 
-A packet is looked for at every byte, so a garbled one hides none of its neighbours. Where two candidates overlap (a
-check sum is right by chance once in 65 536 times), the one whose number follows its neighbour's is taken.
+A packet is looked for at every byte, so a garbled one hides none of its neighbours. A check sum is right by chance once
+in 65 536 times; so a packet counts when its number and time follow those of the one before, or, where the
+microcontroller began anew, when the next packet follows it.
 
 A packet is 16 bytes, the low byte first (`docs/firmware/packet.h` makes the same): offset and length of
 
@@ -12,10 +13,10 @@ A packet is 16 bytes, the low byte first (`docs/firmware/packet.h` makes the sam
 14  2  CRC-16/CCITT-FALSE (polynomial 1021, from FFFF) of bytes 2 to 13
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
+
+from study.devices.accelerometer.samples import Counts, Samples
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -59,77 +60,109 @@ def _table() -> npt.NDArray[np.uint16]:
 _TABLE = _table()
 
 
+LONGEST_SILENCE_US = 10_000_000
+"""Between two packets of one clock. After a longer silence the host's clock is fitted anew, as after a restart."""
+
+SHORTEST_PERIOD_US = 50
+"""No board sends more often: what looks like many lost packets in too short a time is another clock."""
+
+MOST_DOUBTFUL = 8
+"""Packets in a row that follow neither the last one that counts nor each other: more than chance ever makes."""
+
 Indices = npt.NDArray[np.intp]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Samples:
-    sequence: npt.NDArray[np.int64]
-    """(n,), counted on where the 16 bits of a packet begin anew."""
-    time_us: npt.NDArray[np.int64]
-    """(n,), counted on likewise."""
-    raw: npt.NDArray[np.uint16]
-    """(n, 3)."""
-
-    def __len__(self) -> int:
-        return len(self.sequence)
-
-
-@dataclass(frozen=True, slots=True)
-class Counts:
-    """Since the beginning."""
-
-    packets: int = 0
-    lost: int = 0
-    """By the gaps in the sequence numbers."""
-    spoiled_bytes: int = 0
-    """That belonged to no whole packet."""
-    restarts: int = 0
-    """How often the microcontroller began anew."""
+Packets = npt.NDArray[np.void]
+"""Of `LAYOUT`."""
 
 
 class PacketParser:
     def __init__(self) -> None:
         self._rest: Bytes = np.zeros(0, dtype=np.uint8)
-        self._last: tuple[int, int] | None = None
+        self._last: Packets | None = None
+        """The newest packet that counts, shape (1,)."""
+        self._doubtful: list[Packets] = []
+        """Those after it that do not follow it, each (1,): the next packet tells."""
+        self._sequence, self._time_us = 0, 0
+        """Of the newest packet, counted on."""
+        self._received = 0
         self.counts = Counts()
 
     def feed(self, data: bytes) -> Samples:
         """The samples that became whole with these bytes."""
+        self._received += len(data)
         stream = np.concatenate((self._rest, np.frombuffer(data, dtype=np.uint8)))
         starts = _whole_packets(stream)
-        starts = starts[_without_overlaps(starts, _packets_at(stream, starts))]
-        used = int(starts[-1]) + SIZE if len(starts) else 0
-        # What may still be the beginning of a packet waits for its end.
-        keep_from = max(used, len(stream) - (SIZE - 1))
-        self._rest = stream[keep_from:].copy()
         packets = _packets_at(stream, starts)
-        spoiled = keep_from - SIZE * len(starts)
-        return self._unwrap_counters(packets, spoiled)
+        last = self._last
+        if last is not None and not self._doubtful and _in_order(last, starts, packets):
+            anew = np.zeros(len(packets), dtype=np.int64)
+            used = int(starts[-1]) + SIZE if len(starts) else 0
+        else:
+            packets, anew, used = self._choose(starts, packets)
+        self._last = packets[-1:].copy() if len(packets) else last
+        # What may still be the beginning of a packet waits for its end.
+        self._rest = stream[max(used, len(stream) - (SIZE - 1)) :].copy()
+        return self._count_on(last, packets, anew)
 
-    def _unwrap_counters(self, packets: npt.NDArray[np.void], spoiled: int) -> Samples:
-        sequence = packets["sequence"].astype(np.int64)
-        time_us = packets["time_us"].astype(np.int64)
-        before = self._last if self._last is not None or not len(packets) else (int(sequence[0]) - 1, int(time_us[0]))
-        if before is None:
-            self.counts = Counts(spoiled_bytes=self.counts.spoiled_bytes + spoiled)
-            return Samples(sequence, time_us, packets["raw"])
-        steps = np.diff(sequence, prepend=before[0]) % 2**16
-        forward = (steps > 0) & (steps < 2**15)
-        # Backwards: the firmware began anew. What was lost meanwhile is not known; time and number go on by a step.
-        steps = np.where(forward, steps, 1)
-        times = np.where(forward, np.diff(time_us, prepend=before[1]) % 2**32, 1)
-        sequence, time_us = before[0] + np.cumsum(steps), before[1] + np.cumsum(times)
-        if len(packets):
-            self._last = int(sequence[-1]), int(time_us[-1])
+    def _choose(self, starts: Indices, packets: Packets) -> tuple[Packets, npt.NDArray[np.int64], int]:
+        """Those that count, (n,); (n,), 1 where the firmware began anew with it, else 0; how many bytes are used up.
+        Those of a doubtful packet are not: one that counts may begin among them."""
+        chosen, anew, used, last = [packets[:0]], [0] * 0, 0, self._last
+        for k, start in enumerate(starts.tolist()):
+            packet = packets[k : k + 1]
+            if start < used:
+                continue
+            if last is not None and _follows(last, packet).all():
+                chosen.append(packet)
+                anew.append(0)
+            elif followed := [other for other in self._doubtful if _follows(other, packet).all()]:
+                chosen += [followed[-1], packet]
+                anew += [int(last is not None), 0]
+            else:
+                self._doubtful, used = [*self._doubtful[1 - MOST_DOUBTFUL :], packet.copy()], start + 1
+                continue
+            last, self._doubtful, used = packet, [], start + SIZE
+        return np.concatenate(chosen), np.array(anew, dtype=np.int64), used
+
+    def _count_on(self, last: Packets | None, packets: Packets, anew: npt.NDArray[np.int64]) -> Samples:
+        """last: the packet before these, (1,). Where the firmware began anew number and time go on by a step: what
+        was lost meanwhile is not known."""
         was = self.counts
+        if last is None and len(packets):
+            last = packets[:1]
+            self._sequence, self._time_us = int(last["sequence"][0]) - 1, int(last["time_us"][0]) - 1
+            steps, times = _steps(last, packets)
+            steps[0] = times[0] = 1
+        else:
+            steps, times = _steps(last, packets) if last is not None else (np.zeros(0, np.int64),) * 2
+        steps, times = np.where(anew, 1, steps), np.where(anew, 1, times)
+        sequence, time_us = self._sequence + np.cumsum(steps), self._time_us + np.cumsum(times)
+        if len(packets):
+            self._sequence, self._time_us = int(sequence[-1]), int(time_us[-1])
         self.counts = Counts(
             packets=was.packets + len(packets),
             lost=was.lost + int((steps - 1).sum()),
-            spoiled_bytes=was.spoiled_bytes + spoiled,
-            restarts=was.restarts + int((~forward).sum()),
+            spoiled_bytes=self._received - len(self._rest) - SIZE * (was.packets + len(packets)),
+            restarts=was.restarts + int(anew.sum()),
         )
-        return Samples(sequence, time_us, packets["raw"])
+        return Samples(sequence, time_us, packets["raw"], was.restarts + np.cumsum(anew))
+
+
+def _steps(last: Packets, packets: Packets) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """(n,) each: how far number and time of each packet, µs, are beyond those of the one before."""
+    both = np.concatenate((last, packets))
+    numbers, times = both["sequence"].astype(np.int64), both["time_us"].astype(np.int64)
+    return np.diff(numbers) % 2**16, np.diff(times) % 2**32
+
+
+def _follows(last: Packets, packets: Packets) -> npt.NDArray[np.bool_]:
+    """(n,): whether each packet may be of the same clock as the one before and later."""
+    steps, times = _steps(last, packets)
+    return (steps > 0) & (steps < 2**15) & (times >= SHORTEST_PERIOD_US * steps) & (times < LONGEST_SILENCE_US)
+
+
+def _in_order(last: Packets, starts: Indices, packets: Packets) -> bool:
+    """Whether there is nothing to choose."""
+    return bool((np.diff(starts) >= SIZE).all() and _follows(last, packets).all())
 
 
 def _whole_packets(stream: Bytes) -> Indices:
@@ -144,30 +177,6 @@ def _whole_packets(stream: Bytes) -> Indices:
     return right
 
 
-def _packets_at(stream: Bytes, starts: Indices) -> npt.NDArray[np.void]:
-    packets: npt.NDArray[np.void] = stream[starts[:, None] + np.arange(SIZE)].reshape(-1).view(LAYOUT)
+def _packets_at(stream: Bytes, starts: Indices) -> Packets:
+    packets: Packets = stream[starts[:, None] + np.arange(SIZE)].reshape(-1).view(LAYOUT)
     return packets
-
-
-def _without_overlaps(starts: Indices, packets: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
-    """Which of them to keep, (n,)."""
-    kept = np.ones(len(starts), dtype=bool)
-    if (np.diff(starts) >= SIZE).all():
-        return kept
-    sequence = dict(zip(starts.tolist(), packets["sequence"].tolist(), strict=True))
-    last = 0
-    for k in range(1, len(starts)):
-        if starts[k] - starts[last] < SIZE:
-            better = _neighbours(int(starts[k]), sequence) > _neighbours(int(starts[last]), sequence)
-            kept[last if better else k] = False
-            last = k if better else last
-        else:
-            last = k
-    return kept
-
-
-def _neighbours(start: int, sequence: dict[int, int]) -> int:
-    """How many packets right before and right after it have the number before and after its own."""
-    own = sequence[start]
-    before, after = sequence.get(start - SIZE), sequence.get(start + SIZE)
-    return (before == (own - 1) % 2**16) + (after == (own + 1) % 2**16)

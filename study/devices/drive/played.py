@@ -1,37 +1,56 @@
-"""From the rows of the compiled loop to what was played: a recording and its health."""
+"""From the rows of the compiled loop to what was played: a recording and its health. The samples of an accelerometer
+with a clock of its own come in here."""
+
+from dataclasses import replace
 
 import numpy as np
 
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
-from study.devices.device import DeviceInfo, Fault, Played
+from study.devices.device import DeviceInfo, Fault, Health, Played
 from study.devices.governor.cells import ROW_SIZE
 from study.devices.governor.governor import Governor
+from study.devices.rig import SensesApart
 
 COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) for start in range(0, ROW_SIZE, 3))
 
 
-def record_held_stimulus(governor: Governor, info: DeviceInfo) -> Played:
+def record_held_stimulus(governor: Governor, info: DeviceInfo, apart: SensesApart | None = None) -> Played:
     """Of a held stimulus: the last of its steady part, whole loops unless the loop is longer than the ring."""
     rows, loop = governor.rows(), governor.steady
     whole = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
     kept = len(rows) // whole * whole
+    rows, health = _with_acceleration(rows[len(rows) - kept :], governor, info, apart)
     if not kept:
-        return Played(recording=None, health=governor.health())
+        return Played(recording=None, health=health)
     amplitude_n = float(np.linalg.norm(loop, axis=1).max())
     segment = Segment(start=0, stop=kept, kind="sine", amplitude=amplitude_n, period=len(loop))
-    return _make_played(rows[-kept:], governor, info, (segment,))
+    return _make_played(rows, health, info, (segment,))
 
 
-def record_commands(governor: Governor, info: DeviceInfo) -> Played:
+def record_commands(governor: Governor, info: DeviceInfo, apart: SensesApart | None = None) -> Played:
     """Of commands played once through; which segments they are, the caller knows."""
-    health = governor.health()
-    if health.fault is not Fault.NONE or len(governor.rows()) < len(governor.loop):
-        return Played(recording=None, health=health)
-    return _make_played(governor.rows(), governor, info, ())
+    rows = governor.rows()
+    if governor.fault is not Fault.NONE or len(rows) < len(governor.loop):
+        return Played(recording=None, health=_with_acceleration(rows[:0], governor, info, apart)[1])
+    return _make_played(*_with_acceleration(rows, governor, info, apart), info, ())
 
 
-def _make_played(rows: FloatArray, governor: Governor, info: DeviceInfo, segments: tuple[Segment, ...]) -> Played:
+def _with_acceleration(
+    rows: FloatArray, governor: Governor, info: DeviceInfo, apart: SensesApart | None
+) -> tuple[FloatArray, Health]:
+    """rows: the last ones. With the acceleration that belongs to each, of missed ticks too."""
+    due_s = governor.row_due_s()
+    due_s = due_s[len(due_s) - len(rows) :]
+    sensed = apart.sensed(governor.began_s, due_s, info.sample_rate_hz) if apart is not None else None
+    if sensed is None:
+        return rows, governor.health()
+    rows = rows.copy()
+    rows[:, ACCELERATION] = sensed.acceleration_mps2
+    return rows, replace(governor.health(), sensor=sensed.health)
+
+
+def _make_played(rows: FloatArray, health: Health, info: DeviceInfo, segments: tuple[Segment, ...]) -> Played:
     rate_hz = info.sample_rate_hz
     acceleration = ("acceleration", "m/s^2", ("ax", "ay", "az"))
     force = ("force", "N", ("fx", "fy", "fz"))
@@ -45,6 +64,6 @@ def _make_played(rows: FloatArray, governor: Governor, info: DeviceInfo, segment
             excitation=Signal(rows[:, EXCITATION], rate_hz, *force),
             segments=segments,
         ),
-        health=governor.health(),
+        health=health,
         truth=Signal(truth, rate_hz, *acceleration) if info.simulated else None,
     )

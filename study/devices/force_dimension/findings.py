@@ -1,7 +1,9 @@
 """What a check before a study day finds of a device: library, connection, power, calibration, watchdog. Zero force."""
 
+import contextlib
 import time
 
+from study.devices.accelerometer.sensor_findings import sensor_findings
 from study.devices.drive.real_time_class import real_time_finding
 from study.devices.force_dimension.connect import CALIBRATE, load_library, make_ready, open_model
 from study.devices.force_dimension.handle import Handle
@@ -27,8 +29,8 @@ SENSOR = "Accelerometer"
 
 
 def examine(name: str) -> tuple[DeviceFinding, ...]:
-    """Up to the first thing that hinders all others; what needs no library is told in any case. A sensor that can be
-    read is no finding here. Raises nothing; the device is left braked."""
+    """Up to the first thing that hinders all others; what needs no library is told in any case. Raises nothing; the
+    device is left braked."""
     try:
         lab = read_lab()
     except DeviceError as error:
@@ -93,7 +95,7 @@ def _unplugged() -> list[DeviceFinding]:
 
 
 def _sensor(lab: LabSettings) -> list[DeviceFinding]:
-    """Opened, read, and closed again for the loop's process, which opens it anew."""
+    """Opened, listened to, and closed again for the loop's process, which opens it anew."""
     if lab.accelerometer is None:
         advice = (
             "Without one no acceleration is measured. To add one: calibrate it with `hapteq doctor --calibrate-sensor "
@@ -102,10 +104,10 @@ def _sensor(lab: LabSettings) -> list[DeviceFinding]:
         )
         return [DeviceFinding(SENSOR, f"none is configured in {lab_file()}", fine=False, advice=advice, warning=True)]
     try:
-        lab.accelerometer.open_sensor().close()
+        with contextlib.closing(lab.accelerometer.open_sensor()) as sensor:
+            return list(sensor_findings(sensor))
     except DeviceError as error:
         return [_wrong(SENSOR, error)]
-    return []
 
 
 def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:

@@ -1,6 +1,7 @@
 """What a lab knows of its device beyond the vendor's library: a small TOML file, of which every key may be left out."""
 
 import os
+import re
 import tomllib
 from pathlib import Path
 
@@ -10,33 +11,37 @@ from pydantic.dataclasses import dataclass
 
 from protocols.definition.staircase_rule import STRICT
 from study.devices.accelerometer.calibration import Calibration
-from study.devices.accelerometer.serial_reader import SerialAccelerometer, open_serial
+from study.devices.accelerometer.sensor import Accelerometer
+from study.devices.accelerometer.sources import open_source
 from study.devices.onset_line import PulseSettings
 from study.errors import DeviceError
 
 Triple = tuple[float, float, float]
+
+HEADER = re.compile(r"\s*\[\[?[\w.\"-]+\]\]?\s*(#.*)?")
+"""Of a table in TOML; a row of numbers is none."""
 
 FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"
 
 
 @dataclass(frozen=True, config=STRICT)
 class SensorSettings:
-    """An accelerometer on a serial line, with what its calibration found."""
+    """An accelerometer, with what its calibration found."""
 
     port: str
-    """As the system calls it: /dev/ttyACM0, COM3."""
+    """As the system calls it: /dev/ttyACM0, COM3; or a data-acquisition device, as `sources` says."""
     bias: Triple
     """Raw value of each channel at no acceleration."""
     sensitivity: tuple[Triple, Triple, Triple]
     """Raw per m/s²; a row is a channel, a column an axis of the device."""
-    raw_range: tuple[int, int]
+    raw_range: tuple[float, float]
     """Lowest and highest raw value that are no clipping."""
     baud: int = Field(default=2_000_000, gt=0)
 
-    def open_sensor(self) -> SerialAccelerometer:
+    def open_sensor(self) -> Accelerometer:
         """Zeroed, so at rest. Raises `DeviceError`."""
         calibration = Calibration(np.array(self.bias), np.array(self.sensitivity), np.zeros(3), 0.0)
-        sensor = SerialAccelerometer(open_serial(self.port, self.baud), calibration, self.raw_range)
+        sensor = Accelerometer(open_source(self.port, self.baud), calibration, self.raw_range)
         try:
             sensor.zero()
         except BaseException:
@@ -77,6 +82,41 @@ def read_lab() -> LabSettings:
     except ValidationError as error:
         first = error.errors()[0]
         raise _wrong(path, f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+
+def keep_sensor(table: str) -> Path:
+    """Put an [accelerometer] table into the lab's file, in the place of an older one. What the file said before stays
+    beside it. Raises `DeviceError`; then nothing was changed."""
+    read_lab()
+    path = lab_file()
+    try:
+        before = path.read_text("utf-8") if path.exists() else ""
+        text = _with_sensor(before, table)
+        TypeAdapter(LabSettings).validate_python(tomllib.loads(text))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        written = path.with_name(f"{path.name}.new")
+        written.write_text(text, "utf-8")
+        if before:
+            path.replace(path.with_name(f"{path.name}.before"))
+        written.replace(path)
+    except (OSError, ValueError) as error:
+        raise DeviceError(
+            "The calibration was not kept",
+            f"{path} could not be written: {error}.",
+            "Put the table into that file by hand (docs/hardware.md).",
+        ) from error
+    return path
+
+
+def _with_sensor(text: str, table: str) -> str:
+    lines, kept, skipping = text.splitlines(), [], False
+    for line in lines:
+        if HEADER.fullmatch(line):
+            skipping = line.split("#")[0].strip() == "[accelerometer]"
+        if not skipping:
+            kept.append(line)
+    above = "\n".join(kept).rstrip()
+    return f"{above}\n\n{table.rstrip()}\n" if above else f"{table.rstrip()}\n"
 
 
 def _wrong(path: Path, happened: str) -> DeviceError:

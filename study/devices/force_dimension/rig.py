@@ -19,7 +19,7 @@ from study.devices.force_dimension.halves import LOCK_S
 from study.devices.force_dimension.handle import Handle, why_off
 from study.devices.force_dimension.library import LibraryError
 from study.devices.native import SharedLock, system_calls
-from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, Halves
+from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, Halves, Sensed
 from study.errors import DeviceError
 
 REST_SHARE = 0.25
@@ -31,6 +31,10 @@ class Accelerometer(Protocol):
 
     def latest(self) -> tuple[FloatArray, bool]:
         """Acceleration (3,), m/s², NaN where there is none of now; whether a channel is at its limit. Cheap."""
+        ...
+
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
+        """As `study.devices.rig.SensesApart`."""
         ...
 
     def close(self) -> None:
@@ -91,6 +95,9 @@ class ForceDimensionRig:
 
     def write(self, force_n: FloatArray) -> None:
         self._raise_for(halves.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
+
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
+        return None if self._accelerometer is None else self._accelerometer.sensed(since_s, tick_s, rate_hz)
 
     def withhold(self, seconds: float) -> float:
         """As if the loop had stopped: for so long nothing is sent, zeros neither. When the last force was sent, s."""

@@ -4,7 +4,7 @@ import time
 from dataclasses import replace
 from datetime import UTC, datetime
 
-from study.devices.accelerometer.serial_reader import SerialAccelerometer
+from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.force_dimension.acceptance import check_accepted
 from study.devices.force_dimension.connect import device_error, load_library, make_ready, open_model
@@ -35,7 +35,7 @@ def _rig(
     library: Library,
     model: DeviceModel,
     lab: LabSettings,
-    sensor: SerialAccelerometer | None,
+    sensor: Accelerometer | None,
     settings: DeviceSettings,
 ) -> ForceDimensionRig:
     handle = open_model(library, model)

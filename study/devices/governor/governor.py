@@ -151,6 +151,18 @@ class Governor:
         kept = min(recorded, size)
         return self.buffer[np.arange(recorded - kept, recorded) % size]
 
+    def row_due_s(self) -> FloatArray:
+        """When the ticks of `rows` were due, (n,), by the clock of `note_begin`."""
+        state, kept = self.state, len(self.rows())
+        last = state[cells.RECORD_FROM] + state[cells.RECORDED] - 1.0
+        ticks = last - np.arange(kept)[::-1]
+        due_s: FloatArray = state[cells.BEGAN_S] + (ticks - state[cells.START] + 1.0) * self.settings[cells.TICK_S]
+        return due_s
+
+    @property
+    def began_s(self) -> float:
+        return float(self.state[cells.BEGAN_S])
+
     @property
     def steady(self) -> FloatArray:
         """(n, 3): what is repeated, without what leads into it."""

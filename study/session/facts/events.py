@@ -28,6 +28,7 @@ from study.session.facts.fact_types import (
     UtcTime,
 )
 from study.session.facts.level_scale import EqualizedFacts
+from study.session.facts.sensor_facts import SensorFacts
 from study.session.facts.sitting_events import (
     FACT,
     DemoFinished,
@@ -89,6 +90,7 @@ FIELDS_SINCE: dict[str, object] = {
     "latest_s": None,
     "harmonics_mps2": None,
     "nominal_n": None,
+    "sensor": None,
 }
 """Fields that came after the first logs, as they are where a line does not say them: then they are not written."""
 
@@ -177,6 +179,8 @@ class TrialMeasured:
     """How long the hand was shaken, fades included: for the vibration dose."""
     offset_mm: Magnitude | None = None
     """Farthest the handle was from its place while recorded: a lean on the spring."""
+    sensor: SensorFacts | None = None
+    """Null where the acceleration is read with each tick, and in logs of older versions."""
     monotonic_s: Seconds | None = None
     event: Literal["trial_measured"] = "trial_measured"
 
@@ -197,6 +201,7 @@ class TrialSpoiled:
     monotonic_s: Seconds | None = None
     cause: VoidCause | None = None
     """Null in logs of before there were causes."""
+    sensor: SensorFacts | None = None
     event: Literal["trial_spoiled"] = "trial_spoiled"
 
 

@@ -9,6 +9,9 @@ TICKS_LATE = "of the 1 kHz ticks were late or missed"
 TICK_HELD = "late was the latest 1 kHz tick"
 """Ends of the reason, after the figure."""
 
+ACCELERATION_MISSING = "of the acceleration is missing"
+"""End of the reason, after the figure: packets of the accelerometer were lost, torn or garbled."""
+
 LOAD_PER_PROCESSOR = 0.75
 """Load average per processor above which tasks often have to wait for a processor."""
 
@@ -38,6 +41,8 @@ def void_for_participant(reason: str) -> str:
             "The screen did not react for a moment: it was stopped, or the computer was too busy. The force was taken "
             f"away. {_NOT_YOU}"
         )
+    if reason.endswith(ACCELERATION_MISSING):
+        return f"The sensor at the handle was not heard well enough in this trial. {_NOT_YOU}"
     return f"It is void: {reason}."
 
 

@@ -15,6 +15,7 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.facts.log_time import seconds_between
+from study.session.facts.sensor_facts import SensorFacts
 from study.session.facts.void_reasons import computer_too_busy
 from study.session.state.draw_check import LogContradiction, check_draw, place_of
 from study.session.state.sitting_state import (
@@ -91,7 +92,7 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
         raise LogContradiction(f"{place_of(event)} measured before it was answered")
     stepped = _step(state, presented, correct=state.answered.answer == presented.direction)
     row = replace(
-        state.trials[-1],
+        _with_sensor(state.trials[-1], event.sensor),
         reversal=stepped.staircase.reversals > state.staircase.reversals,
         delivered_mps2=event.delivered_mps2,
         off_axis_mps2=event.off_axis_mps2,
@@ -123,7 +124,7 @@ def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
     if event.cause is VoidCause.ASKED and repeats_left(state) == 0:
         raise LogContradiction(f"{place_of(event)} was asked for again, where no repeat of this run was left")
     row = replace(
-        state.trials[-1],
+        _with_sensor(state.trials[-1], event.sensor),
         missed_ticks=event.missed_ticks,
         late_ticks=event.late_ticks,
         latest_s=event.latest_s,
@@ -139,6 +140,13 @@ def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
         attempt=state.attempt + 1,
         trials=(*state.trials[:-1], row),
     )
+
+
+def _with_sensor(row: Trial, sensor: SensorFacts | None) -> Trial:
+    if sensor is None:
+        return row
+    missing, garbled_bytes = sensor.missing, sensor.spoiled_bytes
+    return replace(row, lost_packets=sensor.lost, garbled_bytes=garbled_bytes, acceleration_missing=missing)
 
 
 def _open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialSpoiled) -> TrialPresented:

@@ -29,4 +29,7 @@ TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "onset_s": ("Wall-clock time right before the device moved, since the session was opened", "s"),
     "harmonics_mps2": ("Measured amplitude of the acceleration at 2 to 5 times the frequency, all axes", "m/s^2"),
     "nominal_n": ("Level of the staircase, around which level_n was drawn; empty where nothing is roved", "N"),
+    "lost_packets": ("Packets of the accelerometer that were lost, torn and garbled ones among them", ""),
+    "garbled_bytes": ("Bytes from the accelerometer that belonged to no whole packet", ""),
+    "acceleration_missing": ("Share of the packets, or of the recorded ticks, without an acceleration", ""),
 }

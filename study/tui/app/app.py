@@ -110,6 +110,7 @@ class HapteqApp(App[None]):
                 self._end_sitting(outcomes.completion_outcome(said), said)
             case Failed() if self._sitting is None:
                 self._archive.end_diagnosing()
+                self._archive.end_calibrating()
                 self._panel(outcomes.failure_outcome(said, at_home=True), said.path)
             case Failed():
                 self._end_sitting(outcomes.failure_outcome(said, at_home=False), said)
@@ -235,6 +236,10 @@ class HapteqApp(App[None]):
     @on(home_messages.DiagnosisWanted)
     @on(home_messages.AnalyzeWanted)
     @on(home_messages.WithdrawWanted)
+    @on(home_messages.CalibrateWanted)
+    @on(home_messages.LaidDown)
+    @on(home_messages.KeepWanted)
+    @on(home_messages.CalibrationStopped)
     def _archive_wanted(self, wanted: ArchiveWanted) -> None:
         self._engine.send(command_for(wanted))
 

@@ -15,6 +15,7 @@ TWINS = {
     "decide('resume')": "hapteq resume SESSION",
     "analyze": "hapteq analyze SESSION",
     "diagnose": "hapteq diagnose REC.h5 --model MODEL.toml --out DIR",
+    "sensor": "hapteq doctor --calibrate-sensor PORT --keep",
     "withdraw": "hapteq withdraw SESSION",
     "watch": "hapteq watch SESSION",
     "past": "hapteq sessions",

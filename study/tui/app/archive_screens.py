@@ -10,10 +10,13 @@ from textual.app import App
 from study.session.views.archive_views import DiagnosisView, SessionView
 from study.tui.app.app_start import AppStart
 from study.tui.engine.from_engine import (
+    Calibrated,
     Diagnosis,
     FromEngine,
     Home,
+    LayDown,
     Preparing,
+    SensorKept,
     Session,
     Trouble,
     Withdrawn,
@@ -21,28 +24,42 @@ from study.tui.engine.from_engine import (
 )
 from study.tui.engine.to_engine import (
     Analyze,
-    Command,
+    CalibrateSensor,
     Diagnose,
+    KeepSensor,
     LetGo,
+    Reply,
     ShowDiagnosis,
     ShowHome,
     ShowSession,
     ToEngine,
     Withdraw,
 )
-from study.tui.home_messages import AnalyzeWanted, DiagnoseWanted, DiagnosisWanted, SessionWanted, WithdrawWanted
+from study.tui.home_messages import (
+    AnalyzeWanted,
+    CalibrateWanted,
+    CalibrationStopped,
+    DiagnoseWanted,
+    DiagnosisWanted,
+    KeepWanted,
+    LaidDown,
+    SessionWanted,
+    WithdrawWanted,
+)
 
 if TYPE_CHECKING:
     from study.tui.screens.diagnosing import DiagnosingScreen
     from study.tui.screens.home import HomeScreen
+    from study.tui.screens.sensor import SensorScreen
     from study.tui.screens.session import SessionScreen
 
 
-ArchiveWanted = SessionWanted | DiagnosisWanted | AnalyzeWanted | WithdrawWanted
+SensorWanted = CalibrateWanted | LaidDown | KeepWanted | CalibrationStopped
+ArchiveWanted = SessionWanted | DiagnosisWanted | AnalyzeWanted | WithdrawWanted | SensorWanted
 """Requests of these screens, besides sittings."""
 
 
-def command_for(wanted: ArchiveWanted) -> Command:
+def command_for(wanted: ArchiveWanted) -> ToEngine:
     match wanted:
         case SessionWanted(path=path):
             return ShowSession(path)
@@ -52,6 +69,14 @@ def command_for(wanted: ArchiveWanted) -> Command:
             return Analyze(path)
         case WithdrawWanted(path=path):
             return Withdraw(path)
+        case CalibrateWanted(port=port, baud=baud):
+            return CalibrateSensor(port, baud)
+        case LaidDown(number=number):
+            return Reply(number, True)
+        case KeepWanted(table=table):
+            return KeepSensor(table)
+        case CalibrationStopped():
+            return LetGo()
 
 
 class ArchiveScreens:
@@ -91,6 +116,9 @@ class ArchiveScreens:
             case Diagnosis(view=view):
                 self.end_diagnosing()
                 await self._show_diagnosis(view)
+            case LayDown() | Calibrated() | SensorKept():
+                if (screen := self._sensor_screen()) is not None:
+                    screen.hear(message)
             case Withdrawn(sessions=sessions):
                 self._app.notify(f"Everything of the participant was erased: {', '.join(sessions)}.", markup=False)
                 await self.home()
@@ -115,6 +143,16 @@ class ArchiveScreens:
         diagnosing, self._diagnosing = self._diagnosing, None
         while diagnosing is not None and diagnosing in self._app.screen_stack:
             self._app.pop_screen()
+
+    def end_calibrating(self) -> None:
+        """After an error."""
+        if (screen := self._sensor_screen()) is not None:
+            screen.begin_again()
+
+    def _sensor_screen(self) -> SensorScreen | None:
+        from study.tui.screens.sensor import SensorScreen
+
+        return next((screen for screen in self._app.screen_stack if isinstance(screen, SensorScreen)), None)
 
     async def _show_session(self, view: SessionView) -> None:
         from study.tui.screens.confirm_view import confirm_view

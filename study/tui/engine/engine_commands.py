@@ -2,6 +2,7 @@
 another."""
 
 import contextlib
+import itertools
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
@@ -9,18 +10,22 @@ from pathlib import Path
 
 from study.devices.clock import RealClock
 from study.devices.device import Device
-from study.errors import WrongUseError
+from study.devices.opening import calibrate_accelerometer, keep_accelerometer, lab_file_path
+from study.errors import StudyError, WrongUseError
 from study.local_clock import machine_zone
 from study.session.views.archive_views import HomeView
 from study.store.disk.privacy import data_folder_warning
 from study.store.sessions.archive import SessionFolder, find_session
 from study.tui.engine.from_engine import (
+    Calibrated,
     Diagnosis,
     Finished,
     Home,
+    LayDown,
     Opened,
     Preparing,
     Results,
+    SensorKept,
     Session,
     Trouble,
     Withdrawn,
@@ -32,8 +37,10 @@ from study.tui.engine.to_engine import (
     Analyze,
     AskBeside,
     Begin,
+    CalibrateSensor,
     Command,
     Diagnose,
+    KeepSensor,
     Resume,
     SessionOrder,
     ShowDiagnosis,
@@ -52,6 +59,11 @@ from study.workflows.trial.display import PersonsHand
 from study.workflows.views.ask_session import ask_session
 from study.workflows.views.list_sessions import home_view, model_words, protocol_line
 from study.workflows.views.view_session import session_view
+
+REPLY_S = 0.5
+"""A wait for a reply, which an interruption ends in between."""
+
+CALIBRATION_STOPPED = StudyError("The calibration was stopped", "", "Begin it again.", "Nothing was written.")
 
 OPENING = "Preparing the device: some ten seconds the first time."
 
@@ -85,6 +97,8 @@ class EngineCommands:
                 self._withdraw(SessionFolder(Path(session)))
             case Diagnose():
                 self._diagnose(command)
+            case CalibrateSensor() | KeepSensor():
+                self._calibrate(command)
             case AskBeside(session=session, request=request):
                 ask_session(SessionFolder(Path(session)), request, self._clock)
 
@@ -160,6 +174,27 @@ class EngineCommands:
         plan = DiagnosePlan(sources, out, model, clean=clean)
         written = diagnose_at_screen(plan, lambda what, share: self._link.send(Working(what, share)))
         self._link.send(_diagnosis(written))
+
+    def _calibrate(self, wanted: CalibrateSensor | KeepSensor) -> None:
+        if isinstance(wanted, KeepSensor):
+            self._link.send(SensorKept(str(keep_accelerometer(wanted.table))))
+            return
+        number = itertools.count(1)
+        self._link.forget_replies()
+
+        def lay_down(position: str, heard: tuple[float, float, float] | None) -> None:
+            asked = LayDown(next(number), position, heard)
+            self._link.send(asked)
+            while (reply := self._link.reply(REPLY_S)) is None or reply.number != asked.number:
+                pass
+
+        try:
+            table = calibrate_accelerometer(wanted.port, wanted.baud, lay_down)
+        except KeyboardInterrupt:
+            if self._link.ended:
+                raise
+            raise CALIBRATION_STOPPED from None
+        self._link.send(Calibrated(table, str(lab_file_path())))
 
 
 def _read_view(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Session | Diagnosis:

@@ -92,6 +92,31 @@ class Working:
 
 
 @dataclass(frozen=True, slots=True)
+class LayDown:
+    """Lay the accelerometer down like this and send a `Reply`."""
+
+    number: int
+    """From 1."""
+    position: str
+    heard: tuple[float, float, float] | None
+    """Mean raw values in the position before."""
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrated:
+    """All six positions are known."""
+
+    table: str
+    """Of the lab's file, TOML."""
+    file: str
+
+
+@dataclass(frozen=True, slots=True)
+class SensorKept:
+    file: str
+
+
+@dataclass(frozen=True, slots=True)
 class Opened:
     """The session's log has its first line, and is locked."""
 
@@ -160,6 +185,9 @@ FromEngine = (
     | Diagnosis
     | Preparing
     | Working
+    | LayDown
+    | Calibrated
+    | SensorKept
     | Opened
     | Finished
     | Withdrawn

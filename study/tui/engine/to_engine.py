@@ -82,6 +82,21 @@ class Diagnose:
 
 
 @dataclass(frozen=True, slots=True)
+class CalibrateSensor:
+    """Six positions of the accelerometer: the engine asks for each by `LayDown`. `LetGo` stops it."""
+
+    port: str
+    baud: int
+
+
+@dataclass(frozen=True, slots=True)
+class KeepSensor:
+    """Put the table of a calibration into the lab's file."""
+
+    table: str
+
+
+@dataclass(frozen=True, slots=True)
 class AskBeside:
     """Ask a session that runs in another program."""
 
@@ -108,13 +123,25 @@ class Heartbeat:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """To the `Ask` of the same number. A number that is over is ignored."""
+    """To the `Ask` or `LayDown` of the same number. A number that is over is ignored."""
 
     number: int
     value: Any
 
 
-Command = ShowHome | ShowSession | ShowDiagnosis | Begin | Resume | Analyze | Withdraw | Diagnose | AskBeside
+Command = (
+    ShowHome
+    | ShowSession
+    | ShowDiagnosis
+    | Begin
+    | Resume
+    | Analyze
+    | Withdraw
+    | Diagnose
+    | CalibrateSensor
+    | KeepSensor
+    | AskBeside
+)
 """What the engine performs, one after another."""
 
 ToEngine = Command | Relay | LetGo | Heartbeat | Reply

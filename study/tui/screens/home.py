@@ -13,6 +13,7 @@ from study.session.views.archive_views import HomeView
 from study.tui.home_messages import HomeWanted
 from study.tui.screens.browse import BrowseScreen
 from study.tui.screens.diagnose_form import DiagnoseForm
+from study.tui.screens.sensor import SensorScreen
 from study.tui.standing_words import describe
 from study.tui.widgets.new_session_form import NewSessionForm
 from study.tui.widgets.session_table import SessionTable
@@ -76,7 +77,7 @@ accelerations asks for a model of the device too: one that lies with the data (`
 | ! unreadable | its log cannot be used; opening it says why |
 
 **F4** opens a diagnosis or a session from anywhere. **F8** diagnoses recordings: what does a model of the device lack?
-**F6** looks again. **Tab** goes from field to field.
+**F7** calibrates the accelerometer of a real device. **F6** looks again. **Tab** goes from field to field.
 
 In a terminal: `hapteq study --subject P01`, `hapteq sessions`, `hapteq show SESSION`, `hapteq resume SESSION`.
 """
@@ -107,6 +108,7 @@ class HomeScreen(Screen[None]):
         Binding("f3", "past", "Sessions"),
         Binding("f4", "browse", "File"),
         Binding("f8", "diagnose", "Diagnose"),
+        Binding("f7", "sensor", "Sensor"),
         Binding("f6", "look_again", "Refresh", show=False),
     ]
 
@@ -174,6 +176,9 @@ class HomeScreen(Screen[None]):
 
     def action_diagnose(self) -> None:
         self.app.push_screen(DiagnoseForm())
+
+    def action_sensor(self) -> None:
+        self.app.push_screen(SensorScreen())
 
     def action_look_again(self) -> None:
         self.query_one("#detail", Static).update(LOOKING)

@@ -1,9 +1,11 @@
 """Metadata of each piece of a recording and its feedback, and warnings about it."""
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 from protocols.definition.apparatus import SpringSettings
+from study.session.facts.sensor_facts import SensorFacts
 from study.workflows.recording.play_pieces import Take, along_in_words
 
 
@@ -33,6 +35,7 @@ def segment_facts(take: Take) -> dict[str, Any]:
         "tries": take.tries,
         "sensor_clipped": take.health.sensor_clipped,
         "total_clipped": take.health.total_clipped + take.health.feedback_clipped,
+        "sensor": None if take.health.sensor is None else asdict(take.health.sensor),
     }
 
 
@@ -50,9 +53,16 @@ def warnings_of(take: Take) -> list[str]:
         found.append(f"The force was limited at its cap at {take.played_n:.3g} N ({what}).")
     if health.missed_ticks:
         found.append(f"{health.missed_ticks} ticks were missed ({what}); they are NaN.")
+    if health.sensor is not None and health.sensor.missing:
+        found.append(_sensor_warning(health.sensor, what))
     if health.slew_limited:
         found.append(f"The force was slowed by the slew limit ({what}).")
     return found
+
+
+def _sensor_warning(sensor: SensorFacts, what: str) -> str:
+    packets = f"{sensor.lost} of {sensor.lost + sensor.packets} packets of the accelerometer were lost"
+    return f"{packets} ({what}); at {sensor.unplaced_ticks} of {sensor.ticks} ticks its acceleration is NaN."
 
 
 def _what(take: Take) -> str:

@@ -4,9 +4,11 @@ import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import Clock
-from study.devices.device import Device, Fault
+from study.devices.device import Device, DeviceInfo, Fault
 from study.devices.opening import onset_line, open_device
+from study.errors import DeviceError
 from study.session.state.state import SessionState
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import write_live
@@ -72,6 +74,7 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
         opened_sound(plan.protocol.masking, participant.clock, plan.observer) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
     ):
+        _check_sensor(plan.protocol, device.info)
         equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
         with open_session(plan, device.info, equalized, participant.clock) as opened:
             return _run(opened, At(device, equalized, pulse, sound), participant)
@@ -88,10 +91,21 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
         opened_sound(state.protocol.masking, participant.clock, state.opened.observer) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
     ):
+        _check_sensor(state.protocol, device.info)
         equalized = reload_equalizer(folder, state, device.info)
         with resume_session(folder, device.info, participant.clock) as opened:
             known_steps = len(state.sitting.clock_steps)
             return _run(opened, At(device, equalized, pulse, sound), participant, known_steps)
+
+
+def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
+    """Raises `DeviceError` where the protocol needs an accelerometer and there is none."""
+    if protocol.measurement.accelerometer_needed and not info.has_sensor:
+        raise DeviceError(
+            "The sitting did not begin: its protocol needs the accelerometer",
+            f"None is configured for the {info.name}.",
+            "`hapteq doctor` on it says how to add one; or set accelerometer_needed = false in the protocol.",
+        )
 
 
 @contextlib.contextmanager

@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from pydantic import TypeAdapter
+
 from protocols.procedure.schedule import label_of
 from protocols.trial import VoidCause
 from study.devices.clock import Clock
@@ -16,6 +18,7 @@ from study.session.facts.events import (
     TrialPresented,
     TrialSpoiled,
 )
+from study.session.facts.sensor_facts import SensorFacts
 from study.session.state.due_trial import labels_are_swapped
 from study.session.state.fold import apply
 from study.session.state.state import SessionState
@@ -194,7 +197,8 @@ def _from_recording(
     logged = state.answered.health if state.answered is not None else None
     direction = label_of(presented.direction, labels_are_swapped(state.protocol, state.opened))
     vector = direction_vector(state.protocol.directions, direction)
-    values = measure_delivered(recording, vector, presented.frequency_hz)
+    trusted = recording.meta.get("acceleration_trusted", True)
+    values = measure_delivered(recording, vector, presented.frequency_hz) if trusted else None
     return TrialMeasured(
         utc=clock.utc(),
         run=presented.run,
@@ -211,6 +215,12 @@ def _from_recording(
         missed_ticks=recording.meta.get("missed_ticks"),
         late_ticks=recording.meta.get("late_ticks"),
         latest_s=recording.meta.get("latest_s"),
+        sensor=_sensor_of(recording.meta.get("sensor")),
         vibrated_s=logged.ticks / state.opened.device.sample_rate_hz if logged is not None else None,
         monotonic_s=clock.now_s(),
     )
+
+
+def _sensor_of(logged: object) -> SensorFacts | None:
+    """As it stands in a recording. Raises ValueError where it is none."""
+    return None if logged is None else TypeAdapter(SensorFacts).validate_python(logged)

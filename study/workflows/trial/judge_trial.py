@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from protocols.definition.study_protocol import MeasurementSettings
+from protocols.definition.measurement import MeasurementSettings
 from protocols.trial import VoidCause
 from study.devices.device import Fault, Health
-from study.session.facts.void_reasons import TICK_HELD, TICKS_LATE, TICKS_MISSED
+from study.session.facts.void_reasons import ACCELERATION_MISSING, TICK_HELD, TICKS_LATE, TICKS_MISSED
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,6 +16,8 @@ class Judgement:
     """Remarks on a trial that counts."""
     cause: VoidCause = VoidCause.FAULT
     """Of a void trial."""
+    measured: bool = True
+    """Whether the acceleration can be trusted, where there is any."""
 
 
 def judge(
@@ -30,6 +32,9 @@ def judge(
         return Judgement(f"{share:.1f} % {TICKS_MISSED}", (), VoidCause.MISSED_TICKS)
     if late := _too_late(at_answer or health, settings):
         return Judgement(late, (), VoidCause.MISSED_TICKS)
+    missing = _acceleration_missing(health, settings)
+    if missing and settings.accelerometer_needed:
+        return Judgement(missing, (), VoidCause.NO_ACCELERATION)
     observed = (
         (health.fault is not Fault.NONE, f"after the answer: {health.fault.value}"),
         (health.stimulus_clipped > 0, "stimulus clipped at its cap"),
@@ -37,8 +42,9 @@ def judge(
         (health.total_clipped > 0, "leaned on the spring: stimulus reduced at the total cap"),
         (health.slew_limited > 0, "slew limited"),
         (health.sensor_clipped > 0, "accelerometer clipped"),
+        (bool(missing), f"no trustworthy acceleration: {missing}"),
     )
-    return Judgement("", tuple(text for seen, text in observed if seen))
+    return Judgement("", tuple(text for seen, text in observed if seen), measured=not missing)
 
 
 def _too_late(health: Health, settings: MeasurementSettings) -> str:
@@ -48,6 +54,13 @@ def _too_late(health: Health, settings: MeasurementSettings) -> str:
         return f"{100 * share:.1f} % {TICKS_LATE}"
     latest_ms = 1000 * health.latest_s
     return f"{latest_ms:.1f} ms {TICK_HELD}" if latest_ms > settings.longest_late_ms else ""
+
+
+def _acceleration_missing(health: Health, settings: MeasurementSettings) -> str:
+    """Whether more is missing than the protocol allows; empty if not."""
+    if health.sensor is None or health.sensor.missing <= settings.lost_packets_limit:
+        return ""
+    return f"{100 * health.sensor.missing:.1f} % {ACCELERATION_MISSING}"
 
 
 def cause_of(fault: Fault) -> VoidCause:

@@ -142,16 +142,16 @@ def _log_pulse(state: SessionState, present: Present, pulse: Pulse, sitting: Sit
 def _close(state: SessionState, present: Present, played: Played, asked: Asked, sitting: Sitting) -> AfterTrial:
     correct = state.answered is not None and state.answered.answer == present.label
     vector = direction_vector(state.protocol.directions, present.direction)
-    values = measure_delivered(played.recording, vector, present.frequency_hz) if played.recording else None
     verdict = judge(played.health, state.protocol.measurement, asked.felt_whole, asked.health)
+    recording = played.recording if verdict.measured else None
+    values = measure_delivered(recording, vector, present.frequency_hz) if recording is not None else None
     fault = played.health.fault
     leave = reason_to_leave(fault)
     if verdict.spoiled:
         state = record(state, trial_spoiled(present, (verdict.spoiled, verdict.cause), played.health, sitting), sitting)
         return AfterTrial(state, leave=leave, void=verdict.spoiled, fault=fault)
-    state = record(
-        state, trial_measured(present, Outcome(played, values, verdict.flags, vector), state, sitting), sitting
-    )
+    outcome = Outcome(played, values, verdict.flags, vector, verdict.measured)
+    state = record(state, trial_measured(present, outcome, state, sitting), sitting)
     return AfterTrial(state, correct, leave=leave, fault=fault)
 
 

@@ -1,6 +1,6 @@
 """The facts of one trial as events, and the metadata of its recording."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ class Outcome:
     flags: tuple[str, ...]
     vector: FloatArray
     """(3,): the direction played."""
+    measured: bool
+    """Whether the acceleration of the recording can be trusted."""
 
 
 def trial_presented(present: Present, sitting: Sitting) -> TrialPresented:
@@ -97,6 +99,7 @@ def trial_spoiled(
         latest_s=health.latest_s if health else None,
         vibrated_s=_seconds(health, sitting) if health else 0.0,
         cause=cause,
+        sensor=health.sensor if health else None,
     )
 
 
@@ -127,6 +130,7 @@ def trial_measured(present: Present, outcome: Outcome, state: SessionState, sitt
         latest_s=outcome.played.health.latest_s,
         vibrated_s=_seconds(outcome.played.health, sitting),
         offset_mm=_farthest_mm(outcome.played, sitting),
+        sensor=outcome.played.health.sensor,
     )
 
 
@@ -157,6 +161,8 @@ def _conditions(present: Present, outcome: Outcome, state: SessionState, sitting
         "late_ticks": outcome.played.health.late_ticks,
         "latest_s": outcome.played.health.latest_s,
         "flags": list(outcome.flags),
+        "acceleration_trusted": outcome.measured,
+        "sensor": None if outcome.played.health.sensor is None else asdict(outcome.played.health.sensor),
         "equalizer": sitting.equalizer.name,
         "provenance": {
             "protocol_hash": state.opened.protocol_hash,

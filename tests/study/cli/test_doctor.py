@@ -1,14 +1,18 @@
 """`hapteq doctor` as an experimenter before a study day and as a script uses it."""
 
+import contextlib
 import json
 from importlib.metadata import packages_distributions
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from study.cli import doctor
 from study.cli.main import main
+from study.devices.accelerometer import six_positions
+from study.devices.accelerometer.calibration import GRAVITY_MPS2, UP
 from study.devices.device import Fault, Health
 from study.devices.force_dimension import findings
 from study.devices.force_dimension.usb import UsbDevice
@@ -18,6 +22,7 @@ from study.session.views.views import DeviceFinding, DeviceReport
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.check_timing import Timing
 from study.workflows.checks.examine_setup import Examination
+from tests.study.devices.accelerometer.pty_board import Board, table_of
 
 HEALTH = Health(Fault.NONE, 2000, 0, 0, 0, 0, 0, 0.0)
 
@@ -133,6 +138,36 @@ def test_a_sensor_that_is_not_plugged_in_is_a_line_of_its_own_and_all_else_is_ch
     assert {"Answers", "Handle", "Rate", "Late ticks"} <= set(found)
     assert "\nTiming\n" in out
     assert stub.safe
+
+
+@pytest.mark.real_time
+def test_a_sensor_that_is_there_is_told_with_rate_losses_clock_and_noise(run, stub, tmp_path):
+    with contextlib.closing(Board(4000.0)) as board:
+        (tmp_path / "none.toml").write_text(table_of(board))
+        _, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0)
+    found = verdicts(out)
+    assert {"Sensor rate", "Sensor losses", "Sensor clock"} <= set(found)
+    assert (found["Sensor losses"], found["Sensor noise"]) == ("fine", "WARN")  # the same value again and again
+    assert "samples per second" in out and "ppm" in out
+
+
+@pytest.mark.real_time
+def test_six_positions_by_enter_are_kept_in_the_lab_s_file(capsys, monkeypatch, tmp_path):
+    monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "lab.toml"))
+    monkeypatch.setattr(six_positions, "REST_S", 0.3)
+    with contextlib.closing(Board(2000.0)) as board:
+        laid = iter(UP)
+
+        def readline() -> str:
+            board.acceleration = GRAVITY_MPS2 * next(laid)
+            return "\n"
+
+        monkeypatch.setattr("sys.stdin", SimpleNamespace(readline=readline))
+        assert main(["doctor", "--calibrate-sensor", board.path, "--keep"]) == 0
+    out, err = capsys.readouterr()
+    assert err.count("let go of it, and press Enter") == 6 and err.count("  read ") == 5
+    assert f"Written into {tmp_path / 'lab.toml'}" in err
+    assert (tmp_path / "lab.toml").read_text() == out
 
 
 def test_a_real_device_is_found_with_library_firmware_calibration_and_watchdog(run, stub, tmp_path):

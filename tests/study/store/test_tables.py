@@ -20,7 +20,10 @@ TRIAL = Trial(
     TrialStatus.OK, 135.0,
 )  # fmt: skip
 
-LATER = ",wanted_mps2,void_cause,repeat_cause,late_ticks,latest_s,onset_s,harmonics_mps2,nominal_n"
+LATER = (
+    ",wanted_mps2,void_cause,repeat_cause,late_ticks,latest_s,onset_s,harmonics_mps2,nominal_n,lost_packets,"
+    "garbled_bytes,acceleration_missing"
+)
 """Columns that earlier versions did not write, the newest last."""
 TIMES = ("late_ticks", "latest_s", "onset_s")
 
@@ -59,9 +62,9 @@ def test_a_row_is_plain_text():
     assert first == ",".join(TRIALS_HEADER)
     assert (
         second
-        == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,1,true,false,1.5,2.5,0.01,0.3,0,false,ok,135.0,,,,,,,,"
+        == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,1,true,false,1.5,2.5,0.01,0.3,0,false,ok,135.0,,,,,,,,,,,"
     )
-    assert third == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,,,false,1.5,2.5,0.01,0.3,0,,ok,135.0,,,,,,,,"
+    assert third == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,,,false,1.5,2.5,0.01,0.3,0,,ok,135.0,,,,,,,,,,,"
 
 
 def test_tables_are_rewritten_at_will(tmp_path):
@@ -84,7 +87,7 @@ def test_thresholds_go_to_disk_and_back(tmp_path):
 
 def test_a_table_of_before_a_column_was_is_still_read():
     lines = rows_to_csv([TRIAL], Trial).splitlines()
-    older = "\n".join(line.removesuffix(LATER).removesuffix(",,,,,,,,") for line in lines)
+    older = "\n".join(line.removesuffix(LATER).removesuffix(",,,,,,,,,,,") for line in lines)
     assert rows_from_csv(older, Trial) == (TRIAL,)
     foreign = older.replace("angle_deg", "remark").replace("135.0", "late")
     assert rows_from_csv(foreign, Trial) == (replace(TRIAL, angle_deg=None),)
@@ -127,7 +130,7 @@ def test_a_text_that_is_no_table_is_refused():
             "\n",
             "column 19 of the header is missing; it must be 'status'",
         ),
-        (",135.0,,,,,,,,\n", "\n", "line 2 has 19 fields, but the header names 28"),
+        (",135.0,,,,,,,,,,,\n", "\n", "line 2 has 19 fields, but the header names 31"),
         (",3,1,test", ",three,1,test", "line 2, column trial: 'three' is not a whole number"),
         ("25.0", "high", "line 2, column frequency_hz: 'high' is not a number"),
         ("25.0", "", "line 2, column frequency_hz: it is empty, but a value is needed"),

@@ -72,6 +72,23 @@ def test_a_firmware_restart_is_counted_and_time_continues():
     assert (np.diff(np.concatenate((first.time_us, second.time_us))) > 0).all()
 
 
+@pytest.mark.parametrize(
+    ("first", "times_us"),
+    [
+        (60_000, 9e8 + 250 * np.arange(50)),  # the new numbers look like 5536 lost packets: the time tells
+        (100, 9e8 + 250 * np.arange(50)),
+        (60_000, 2**32 - 12_500 + 250 * np.arange(50)),  # the time looks right, but not for 5536 lost packets
+    ],
+)
+def test_a_clock_that_began_anew_is_told_apart(first, times_us):
+    before = encode_packets(first + np.arange(50), times_us, np.zeros((50, 3)))
+    parser = PacketParser()
+    samples = parser.feed(before + stream(50)[0])
+    assert samples.restarts.tolist() == [0] * 50 + [1] * 50
+    assert (parser.counts.restarts, parser.counts.lost, parser.counts.packets) == (1, 0, 100)
+    assert (np.diff(samples.sequence) == 1).all() and (np.diff(samples.time_us) > 0).all()
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_among_a_million_garbled_bytes_every_good_packet_is_found(seed):
     """Packets between stretches of noise that is full of sync bytes; some packets lose bytes, some have one changed."""
@@ -115,23 +132,54 @@ def test_a_million_bytes_of_noise_are_no_packets():
     assert parser.counts.spoiled_bytes > 10**6 - SIZE
 
 
-def test_a_false_packet_inside_another_does_not_hide_the_real_one():
-    """A false candidate ends in the real packet that follows a good one."""
-    data, _ = stream(3)
-    inner = bytearray(encode_packets(77, 0, [[0, 0, 0]]))
-    forged = None
-    for k in range(2**16):  # raw values so that the candidate's check sum fits
-        trial = bytearray(inner)
-        trial[8:10] = k.to_bytes(2, "little")
-        body = np.frombuffer(bytes(trial[:6]), dtype=np.uint8)
-        whole = np.concatenate((body, np.frombuffer(data[SIZE : SIZE + 10], dtype=np.uint8)))
-        whole[4:6] = np.frombuffer(k.to_bytes(2, "little"), dtype=np.uint8)
-        if crc_of(whole[None, CHECKED])[0] == int.from_bytes(whole[14:16].tobytes(), "little"):
-            forged = bytes(whole[:6].tobytes())
-            break
-    assert forged is not None
-    samples = PacketParser().feed(data[:SIZE] + forged + data[SIZE:])
-    assert samples.sequence.tolist() == [0, 1, 2]
+def forged(tail: bytes, sequence: int) -> bytes:
+    """Bytes that make with `tail`, which a real packet begins with, a packet whose check sum is right."""
+    head = np.frombuffer(encode_packets(sequence, 123_456_789, [[0, 0, 0]])[: SIZE - len(tail)], dtype=np.uint8)
+    tries = np.tile(np.concatenate((head, np.frombuffer(tail, dtype=np.uint8))), (2**16, 1))
+    tries[:, 4:6] = np.arange(2**16, dtype="<u2").view(np.uint8).reshape(-1, 2)  # of its time stamp: one of them fits
+    right = crc_of(tries[:, CHECKED]) == tries[:, 14:16].copy().view("<u2")[:, 0]
+    return tries[np.flatnonzero(right)[0], : SIZE - len(tail)].tobytes()
+
+
+@pytest.mark.parametrize("overlap", [2, 7, 10])
+def test_a_false_packet_that_ends_in_a_real_one_does_not_hide_it(overlap):
+    """However the bytes come: a parser that has used up those of the false one has lost the real one."""
+    data, _ = stream(4)
+    spoiled = data[: 2 * SIZE] + forged(data[2 * SIZE : 2 * SIZE + overlap], 777) + data[2 * SIZE :]
+    for cut in range(len(spoiled)):
+        parser = PacketParser()
+        found = parser.feed(spoiled[:cut]).sequence.tolist() + parser.feed(spoiled[cut:]).sequence.tolist()
+        assert found == [0, 1, 2, 3], cut
+        assert (parser.counts.restarts, parser.counts.spoiled_bytes) == (0, SIZE - overlap)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_false_packets_among_a_million_garbled_bytes_count_for_nothing(seed):
+    """Whole ones with a right check sum, and ones that end in a real packet: neither hides, shifts nor restarts."""
+    random = np.random.default_rng(seed)
+    data, raw = stream(25_000, seed=seed)
+    false = [encode_packets(int(random.integers(2**16)), int(random.integers(2**32)), [[1, 2, 3]]) for _ in range(50)]
+    pieces = [data[: 2 * SIZE]]
+    for k in range(2, len(raw)):
+        fate = random.random()
+        if fate < 0.01:
+            pieces.append(false[int(random.integers(len(false)))])
+        elif fate < 0.011:
+            pieces.append(forged(data[k * SIZE : k * SIZE + 6], int(random.integers(2**16))))
+        else:
+            pieces.append(random.integers(0, 256, int(random.integers(0, 50)), dtype=np.uint8).tobytes())
+        pieces.append(data[k * SIZE : (k + 1) * SIZE])
+    garbled, parser, found, at = b"".join(pieces), PacketParser(), [], 0
+    assert len(garbled) > 10**6
+    while at < len(garbled):
+        size = int(random.choice([1, 15, 16, 17, 64, 4096]))
+        found.append(parser.feed(garbled[at : at + size]))
+        at += size
+    assert np.concatenate([samples.sequence for samples in found]).tolist() == list(range(len(raw)))
+    assert (np.concatenate([samples.raw for samples in found]) == raw).all()
+    counts = parser.counts
+    assert (counts.packets, counts.lost, counts.restarts) == (len(raw), 0, 0)
+    assert counts.spoiled_bytes == len(garbled) - SIZE * len(raw)
 
 
 def test_the_firmware_makes_the_same_packets(vendor, tmp_path):

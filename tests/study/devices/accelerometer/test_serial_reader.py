@@ -2,8 +2,6 @@
 
 import contextlib
 import os
-import threading
-import time
 import tomllib
 import tty
 
@@ -11,59 +9,17 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP, Calibration
+from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP
 from study.devices.accelerometer.newest_sample import FRESH_S
-from study.devices.accelerometer.parser import SIZE, encode_packets
-from study.devices.accelerometer.serial_reader import SerialAccelerometer, open_serial
+from study.devices.accelerometer.parser import SIZE
+from study.devices.accelerometer.sensor import Accelerometer
+from study.devices.accelerometer.serial_reader import open_serial
 from study.devices.accelerometer.six_positions import calibrate_on_table
 from study.devices.force_dimension.lab import SensorSettings
 from study.errors import DeviceError
+from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, SCALE, Board, table_of, within
 
 pytestmark = pytest.mark.real_time
-
-SCALE = 600.0
-IDEAL = Calibration(np.full(3, 32_768.0), SCALE * np.eye(3), np.zeros(3), 0.0)
-AT_REST = np.array([0.0, 0.0, 9.81])
-
-
-class Board:
-    """Sends packets as long as it is on. `spoil` changes the bytes of a block before they go."""
-
-    def __init__(self, rate_hz: float) -> None:
-        self.master, self.slave = os.openpty()
-        tty.setraw(self.slave)
-        self.path = os.ttyname(self.slave)
-        self.acceleration = AT_REST
-        self.rate_hz, self.sent, self.on = rate_hz, 0, True
-        self.spoil = lambda block: block
-        self._thread = threading.Thread(target=self._send, daemon=True)
-        self._thread.start()
-
-    def _send(self) -> None:
-        started_s = time.monotonic()
-        while self.on:
-            due = int((time.monotonic() - started_s) * self.rate_hz)
-            if due > self.sent:
-                numbers = np.arange(self.sent, due)
-                raw = np.tile(np.clip(32_768 + SCALE * self.acceleration, 0, 65_535), (len(numbers), 1))
-                with contextlib.suppress(OSError):
-                    os.write(self.master, self.spoil(encode_packets(numbers, 1e6 * numbers / self.rate_hz, raw)))
-                self.sent = due
-            time.sleep(0.002)
-
-    def close(self) -> None:
-        self.on = False
-        self._thread.join(5.0)
-        for end in (self.master, self.slave):
-            with contextlib.suppress(OSError):
-                os.close(end)
-
-
-def within(seconds: float, condition) -> bool:
-    until_s = time.monotonic() + seconds
-    while not condition() and time.monotonic() < until_s:
-        time.sleep(0.005)
-    return condition()
 
 
 @pytest.fixture
@@ -74,7 +30,7 @@ def board():
 
 @pytest.fixture
 def sensor(board):
-    with contextlib.closing(SerialAccelerometer(open_serial(board.path, 115_200), IDEAL, (10, 65_525))) as one:
+    with contextlib.closing(Accelerometer(open_serial(board.path, 115_200), IDEAL, RAW_RANGE)) as one:
         one.zero(0.2)
         yield one
 
@@ -107,7 +63,7 @@ def test_every_rate_is_followed_and_what_is_lost_is_counted(rate_hz):
             return block if at is None else block[:at] + block[at + 1 :]
 
         board.spoil = losing
-        with contextlib.closing(SerialAccelerometer(open_serial(board.path, 115_200), IDEAL, (10, 65_525))) as sensor:
+        with contextlib.closing(Accelerometer(open_serial(board.path, 115_200), IDEAL, RAW_RANGE)) as sensor:
             assert within(20.0, lambda: sensor.counts.packets > rate_hz / 2)
             counts = sensor.counts
         assert 0 < counts.lost < 0.2 * counts.packets
@@ -118,7 +74,7 @@ def test_every_rate_is_followed_and_what_is_lost_is_counted(rate_hz):
 def test_a_silent_serial_line_is_an_error():
     master, slave = os.openpty()
     tty.setraw(slave)
-    with contextlib.closing(SerialAccelerometer(open_serial(os.ttyname(slave), 115_200), IDEAL, (0, 65_535))) as sensor:
+    with contextlib.closing(Accelerometer(open_serial(os.ttyname(slave), 115_200), IDEAL, (0, 65_535))) as sensor:
         os.write(master, b"no packet at all")
         with pytest.raises(DeviceError, match="The accelerometer is silent"):
             sensor.zero(0.1)
@@ -137,11 +93,7 @@ def test_the_driver_opens_it_as_the_lab_s_file_says(board, stub, rigs, tmp_path,
     from study.devices.opening import open_device
 
     monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "device.toml"))
-    rows = "[[600.0, 0.0, 0.0], [0.0, 600.0, 0.0], [0.0, 0.0, 600.0]]"
-    (tmp_path / "device.toml").write_text(
-        f'[accelerometer]\nport = "{board.path}"\nbaud = 115200\nbias = [32768.0, 32768.0, 32768.0]\n'
-        f"sensitivity = {rows}\nraw_range = [10, 65525]\n"
-    )
+    (tmp_path / "device.toml").write_text(table_of(board))
     with contextlib.closing(open_device("omega3", rigs.SETTINGS, RealClock(), 1)) as device:
         board.acceleration = AT_REST + [1.0, 2.0, 3.0]
 
@@ -156,7 +108,8 @@ def test_the_driver_opens_it_as_the_lab_s_file_says(board, stub, rigs, tmp_path,
 def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
     laid: list[str] = []
 
-    def lay_down(position: str) -> None:
+    def lay_down(position: str, heard: tuple[float, float, float] | None) -> None:
+        assert (heard is None) is (not laid)
         board.acceleration = GRAVITY_MPS2 * UP[len(laid)]
         laid.append(position)
 
@@ -171,4 +124,4 @@ def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
 
 def test_a_sensor_that_was_never_turned_is_not_calibrated(board):
     with pytest.raises(DeviceError, match="was not calibrated"):
-        calibrate_on_table(board.path, 115_200, lambda position: None, rest_s=0.1)
+        calibrate_on_table(board.path, 115_200, lambda position, heard: None, rest_s=0.1)

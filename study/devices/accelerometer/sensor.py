@@ -1,0 +1,126 @@
+"""The accelerometer as the rig wants it: a thread reads the board, the newest sample is there at any time, and what
+belongs to the ticks of a recording can be asked for when it is over."""
+
+import contextlib
+import threading
+import time
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.accelerometer.calibration import Calibration
+from study.devices.accelerometer.clock_fit import ClockFit
+from study.devices.accelerometer.history import History
+from study.devices.accelerometer.newest_sample import NewestSample
+from study.devices.accelerometer.placement import HALF_PERIODS, Placed, place
+from study.devices.accelerometer.samples import Counts, Source
+from study.devices.rig import Sensed
+from study.errors import DeviceError
+from study.session.facts.sensor_facts import SensorFacts
+
+ZEROING_S = 0.5
+"""At rest, when it is opened: gravity, and the drift of the bias since the calibration."""
+
+FITTED_S = 120.0
+"""Before a recording, and the recording: to their arrivals the clock is fitted. Long enough for 1 ppm, and short enough
+for a quartz that warms up."""
+
+LATENESS_S = 0.05
+"""So long after the last tick its samples are waited for."""
+
+
+class Accelerometer:
+    """raw_range: the lowest and the highest raw value that are within the sensor's range."""
+
+    def __init__(self, source: Source, calibration: Calibration, raw_range: tuple[float, float]) -> None:
+        self._source, self._calibration, self._range = source, calibration, raw_range
+        self._history = History()
+        self._newest = NewestSample()
+        self._rest_mps2 = np.zeros(3)
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._read, name="accelerometer", daemon=True)
+        self._thread.start()
+
+    @property
+    def counts(self) -> Counts:
+        return self._source.counts
+
+    def zero(self, seconds: float = ZEROING_S) -> None:
+        """What it reads now, at rest, counts as none from now on. Raises `DeviceError` where it reads nothing."""
+        since_s = time.monotonic()
+        time.sleep(seconds)
+        raw = self._history.stretch(since_s, time.monotonic()).raw
+        if not len(raw):
+            raise silent(seconds, self.counts.spoiled_bytes)
+        self._rest_mps2 = self._calibration.acceleration(raw.mean(axis=0))
+        self._newest.count_as_none(self._rest_mps2)
+
+    @property
+    def samples(self) -> FloatArray:
+        """Where compiled code reads what `latest` tells."""
+        return self._newest.rows
+
+    def latest(self) -> tuple[FloatArray, bool]:
+        return self._newest.fresh(time.monotonic())
+
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed:
+        """As `study.devices.rig.SensesApart`."""
+        if len(tick_s):
+            time.sleep(max(0.0, tick_s[-1] + HALF_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
+        placed = self._placed(tick_s, rate_hz) if len(tick_s) else Placed(np.zeros((0, 3)), None)
+        counts = self._history.counted(since_s)
+        return Sensed(placed.values, _health(counts, placed.values, placed.fit))
+
+    def rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
+        """Of the last seconds, at rest: what came, the standard deviation of each axis, m/s², samples per second."""
+        now_s = time.monotonic()
+        stretch = self._history.stretch(now_s - seconds, now_s)
+        noise = self._calibration.acceleration(stretch.raw).std(axis=0) if len(stretch.raw) else np.full(3, np.nan)
+        fit = self._placed(np.array([now_s]), 1000.0).fit
+        return _health(self._history.counted(now_s - seconds), np.zeros((0, 3)), fit), noise, len(stretch.raw) / seconds
+
+    def close(self) -> None:
+        self._closed.set()
+        self._thread.join(1.0)
+        with contextlib.suppress(Exception):
+            self._source.close()
+
+    def _placed(self, tick_s: FloatArray, rate_hz: float) -> Placed:
+        stretch = self._history.stretch(tick_s[0] - FITTED_S, time.monotonic())
+        values = self._calibration.acceleration(stretch.raw) - self._rest_mps2
+        return place(stretch, values, tick_s, rate_hz)
+
+    def _read(self) -> None:
+        """A line that breaks leaves no fresh sample: that is how it is noticed."""
+        with contextlib.suppress(Exception):
+            while not self._closed.is_set():
+                samples, arrived_s = self._source.read()
+                if len(samples):
+                    clipped = bool((samples.raw <= self._range[0]).any() or (samples.raw >= self._range[1]).any())
+                    value = self._calibration.acceleration(samples.raw[-1].astype(float))
+                    self._newest.put(arrived_s, value, clipped)
+                    self._history.add(samples, arrived_s, self._source.counts)
+
+
+def silent(seconds: float, spoiled_bytes: int) -> DeviceError:
+    """No whole packet came for so long, but so many other bytes."""
+    return DeviceError(
+        "The accelerometer is silent",
+        f"Within {seconds:g} s no whole packet came ({spoiled_bytes} bytes that are none).",
+        "Another device or another firmware sends there, or the baud rate is wrong: check the port, flash the board."
+        if spoiled_bytes
+        else "Check its cable and the port, and that the board runs its firmware (docs/hardware.md).",
+    )
+
+
+def _health(counts: Counts, placed: FloatArray, fit: ClockFit | None) -> SensorFacts:
+    return SensorFacts(
+        packets=counts.packets,
+        lost=counts.lost,
+        spoiled_bytes=counts.spoiled_bytes,
+        restarts=counts.restarts,
+        ticks=len(placed),
+        unplaced_ticks=int(np.isnan(placed).any(axis=1).sum()),
+        drift_ppm=fit.drift_ppm if fit is not None else None,
+        longest_delay_s=fit.longest_delay_s if fit is not None else None,
+    )

@@ -1,0 +1,78 @@
+"""What `hapteq doctor` says of an accelerometer at rest: rate, losses, clock, noise. None of it locks a device."""
+
+import time
+
+from study.devices.accelerometer.sensor import Accelerometer
+from study.session.facts.sensor_facts import SensorFacts
+from study.session.views.views import DeviceFinding
+
+LISTENED_S = 3.0
+"""A drift is known to some 50 ppm by then."""
+
+ENOUGH_PER_S = 1900.0
+"""2 kHz, less what a clock may be off: below, what the sensor's filter of 500 Hz lets through is aliased."""
+
+FEW_LOST = 0.001
+"""Of the packets: no cable needs to lose any."""
+
+PLAUSIBLE_PPM = 500.0
+"""A quartz is within 100 ppm, a ceramic resonator within 5000 and then wanders."""
+
+LATE_S = 0.05
+"""Beyond that the newest sample is none any more."""
+
+NOISY_MPS2 = 0.3
+"""Of one axis. An ADXL335 behind 500 Hz has 0.04 (x, y) and 0.08 (z)."""
+
+
+def sensor_findings(sensor: Accelerometer) -> tuple[DeviceFinding, ...]:
+    """Listens for `LISTENED_S`. The handle is at rest."""
+    time.sleep(LISTENED_S)
+    facts, noise_mps2, per_s = sensor.rest(LISTENED_S)
+    return (_rate(per_s), _losses(facts), _clock(facts), _noise([float(axis) for axis in noise_mps2]))
+
+
+def _rate(per_s: float) -> DeviceFinding:
+    advice = "At least 2000 are wanted: make PERIOD_US in the firmware smaller (docs/firmware/accelerometer.ino)."
+    return _finding("Sensor rate", f"{per_s:.0f} samples per second", per_s >= ENOUGH_PER_S, advice)
+
+
+def _losses(facts: SensorFacts) -> DeviceFinding:
+    came = facts.packets + facts.lost
+    value = f"{facts.lost} of {came} packets lost, torn or garbled, {facts.spoiled_bytes} bytes that were no packet"
+    advice = "Take a short cable and a USB port of the computer itself, no hub; end programs that keep it busy."
+    if facts.restarts:
+        value += f"; the board began anew {facts.restarts} times"
+        advice = "The board loses its power, or its program crashes: check its cable, and flash it again."
+    return _finding("Sensor losses", value, not facts.restarts and facts.lost <= FEW_LOST * came, advice)
+
+
+def _clock(facts: SensorFacts) -> DeviceFinding:
+    if facts.drift_ppm is None or facts.longest_delay_s is None:
+        advice = "Without it no sample can be put on a tick: close other programs that read this line, then try again."
+        return _finding("Sensor clock", "it could not be fitted to this computer's", False, advice)
+    way = "slow" if facts.drift_ppm > 0 else "fast"
+    late_ms = 1000 * facts.longest_delay_s
+    value = f"{abs(facts.drift_ppm):.0f} ppm {way} beside this computer's; packets up to {late_ms:.1f} ms late"
+    drifts = abs(facts.drift_ppm) > PLAUSIBLE_PPM
+    advice = (
+        "No quartz is that far off: check that the firmware's time stamps are in microseconds."
+        if drifts
+        else "This computer is busy: end other programs."
+    )
+    return _finding("Sensor clock", value, not drifts and facts.longest_delay_s <= LATE_S, advice)
+
+
+def _noise(noise_mps2: list[float]) -> DeviceFinding:
+    value = f"{', '.join(f'{axis:.3f}' for axis in noise_mps2)} m/s² rms at rest (x, y, z)"
+    advice = "Let go of the handle and check again. If it stays: check the sensor's capacitors, cable and supply."
+    if any(axis == 0.0 for axis in noise_mps2):
+        value, advice = (
+            f"{value}: a channel does not move at all",
+            "Check its wire: it does not reach the board's input.",
+        )
+    return _finding("Sensor noise", value, bool(min(noise_mps2) > 0.0 and max(noise_mps2) <= NOISY_MPS2), advice)
+
+
+def _finding(name: str, value: str, fine: bool, advice: str) -> DeviceFinding:
+    return DeviceFinding(name, value, fine, "" if fine else advice, warning=not fine)

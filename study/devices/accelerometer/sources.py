@@ -1,0 +1,139 @@
+"""Where samples come from, by the name of the port: a board on a serial line, or a data-acquisition device.
+
+`ni:Dev1` reads ai0 to ai2 of a device of National Instruments, `labjack:ANY` AIN0 to AIN2 of a LabJack T-series device
+(or of the one with that serial number), in volts. Their clock is the number of a sample over its rate.
+**Tested with fakes of their packages only**, never with a driver or a device.
+"""
+
+import time
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.accelerometer.samples import Counts, Samples, Source
+from study.devices.accelerometer.serial_reader import open_serial
+from study.errors import DeviceError
+
+NI, LABJACK = "ni:", "labjack:"
+"""Before the name of a device, in the place of a serial port."""
+
+SCAN_HZ = 4000.0
+PAUSE_S = 0.01
+"""Between two reads: so much comes at once."""
+
+DUMMY_V = -9999.0
+"""In the place of a scan that a LabJack lost."""
+
+
+def open_source(port: str, baud: int) -> Source:
+    """Raises `DeviceError`."""
+    if port.startswith(NI):
+        return _opened(lambda: NiSource(port.removeprefix(NI)), port, "nidaqmx", "ni", "NI-DAQmx from ni.com")
+    if port.startswith(LABJACK):
+        name = port.removeprefix(LABJACK)
+        return _opened(lambda: LabJackSource(name), port, "labjack-ljm", "labjack", "the LJM library from labjack.com")
+    return open_serial(port, baud)
+
+
+def is_volts(port: str) -> bool:
+    """Whether its raw values are volts; else they have 16 bits."""
+    return port.startswith((NI, LABJACK))
+
+
+class ScanCounter:
+    """Numbers scans that come without numbers."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz, self._next = rate_hz, 0
+        self.counts = Counts()
+
+    def samples(self, volts: FloatArray) -> Samples:
+        """volts: (n, 3), one after another; a row of `DUMMY_V` is a lost one."""
+        numbers = self._next + np.arange(len(volts))
+        self._next += len(volts)
+        came = (volts != DUMMY_V).all(axis=1)
+        was, kept = self.counts, int(came.sum())
+        self.counts = Counts(was.packets + kept, was.lost + len(volts) - kept)
+        numbers = numbers[came]
+        time_us = np.round(1e6 * numbers / self._rate_hz).astype(np.int64)
+        return Samples(numbers, time_us, volts[came], np.zeros(kept, dtype=np.int64))
+
+
+class NiSource:
+    """Raises what nidaqmx raises."""
+
+    def __init__(self, device: str) -> None:
+        nidaqmx, constants = import_module("nidaqmx"), import_module("nidaqmx.constants")
+        self._all = constants.READ_ALL_AVAILABLE
+        self._task: Any = nidaqmx.Task()
+        try:
+            self._task.ai_channels.add_ai_voltage_chan(f"{device}/ai0:2")
+            self._task.timing.cfg_samp_clk_timing(SCAN_HZ, sample_mode=constants.AcquisitionType.CONTINUOUS)
+            self._scans = ScanCounter(float(self._task.timing.samp_clk_rate))
+            self._task.start()
+        except BaseException:
+            self._task.close()
+            raise
+
+    @property
+    def counts(self) -> Counts:
+        return self._scans.counts
+
+    def read(self) -> tuple[Samples, float]:
+        time.sleep(PAUSE_S)
+        channels = self._task.read(number_of_samples_per_channel=self._all)
+        arrived_s = time.monotonic()
+        return self._scans.samples(np.array(channels, dtype=np.float64).reshape(3, -1).T), arrived_s
+
+    def close(self) -> None:
+        self._task.close()
+
+
+class LabJackSource:
+    """Raises what labjack-ljm raises."""
+
+    def __init__(self, identifier: str) -> None:
+        self._ljm: Any = import_module("labjack.ljm")
+        self._handle = self._ljm.openS("ANY", "ANY", identifier or "ANY")
+        try:
+            addresses = self._ljm.namesToAddresses(3, ["AIN0", "AIN1", "AIN2"])[0]
+            rate_hz = self._ljm.eStreamStart(self._handle, round(SCAN_HZ * PAUSE_S), 3, addresses, SCAN_HZ)
+            self._scans = ScanCounter(float(rate_hz))
+        except BaseException:
+            self._ljm.close(self._handle)
+            raise
+
+    @property
+    def counts(self) -> Counts:
+        return self._scans.counts
+
+    def read(self) -> tuple[Samples, float]:
+        volts = self._ljm.eStreamRead(self._handle)[0]  # waits for the next scans
+        arrived_s = time.monotonic()
+        return self._scans.samples(np.array(volts, dtype=np.float64).reshape(-1, 3)), arrived_s
+
+    def close(self) -> None:
+        try:
+            self._ljm.eStreamStop(self._handle)
+        finally:
+            self._ljm.close(self._handle)
+
+
+def _opened(opener: Callable[[], Source], port: str, package: str, extra: str, driver: str) -> Source:
+    try:
+        return opener()
+    except ImportError as error:
+        raise DeviceError(
+            "The accelerometer cannot be read",
+            f"The package {package} is not installed.",
+            f"Install hapteq with that extra: pip install '.[{extra}]'.",
+        ) from error
+    except Exception as error:
+        raise DeviceError(
+            "The accelerometer cannot be opened",
+            f"{port}: {type(error).__name__}: {error}.",
+            f"Install {driver}, plug the device in, and name it as its maker's program does.",
+        ) from error

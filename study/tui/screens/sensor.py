@@ -1,0 +1,155 @@
+"""The accelerometer laid down in six positions, step by step."""
+
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+from textual.screen import Screen
+from textual.widgets import Footer, Input, Label, Static
+
+from study.tui.engine.from_engine import Calibrated, LayDown, SensorKept
+from study.tui.home_messages import CalibrateWanted, CalibrationStopped, KeepWanted, LaidDown
+from study.tui.take_off import take_off
+
+HELP = """\
+# The accelerometer in six positions
+
+Gravity is the same everywhere: with each axis of the sensor once up and once down, its bias, its sensitivity with
+cross-axis, and its noise are known. Take the sensor with its cable off the handle, and have a flat table.
+
+1. Name the **port** of the board: /dev/ttyACM0 or so, on Windows COM3. No other program may read it.
+2. **F5** begins. Lay the sensor down as it says, let go of it, press **Enter**, and wait for 2 seconds: it must not
+   move.
+3. After the sixth position the table of the lab's file is shown. **Enter** writes it there; the file that was there
+   before stays beside it.
+
+A position that does not fit the others is named at the end: begin again with F5. **Esc** stops.
+
+In a terminal: `hapteq doctor --calibrate-sensor PORT --keep`.
+"""
+FIELDS = (("port", "Port", "/dev/ttyACM0"), ("baud", "Baud", "2000000"))
+BAUD = 2_000_000
+STEPS = 6
+
+
+class SensorScreen(Screen[None]):
+    HELP = HELP
+    CSS = """
+    SensorScreen { align: center middle; }
+    SensorScreen > Vertical {
+        width: 76; max-width: 95%; height: auto; border: round $primary; padding: 1 2; background: $surface;
+    }
+    SensorScreen .field { height: auto; }
+    SensorScreen Label { width: 8; }
+    SensorScreen Input { width: 1fr; }
+    SensorScreen #do { margin-top: 1; text-style: bold; }
+    SensorScreen #seen { height: auto; color: $foreground 80%; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("f5", "begin", "Begin", priority=True),
+        Binding("enter", "go_on", "Go on", priority=True),
+        Binding("escape", "leave", "Back", key_display="Esc"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._waits_for: LayDown | None = None
+        self._under_way = False
+        self._table = ""
+
+    def compose(self) -> ComposeResult:
+        with Vertical() as box:
+            box.border_title = "The accelerometer in six positions"
+            for name, title, hint in FIELDS:
+                with Horizontal(classes="field"):
+                    yield Label(title)
+                    yield Input(placeholder=hint, compact=True, id=name)
+            yield Static("F5 begins.", id="do", markup=False)
+            yield Static("", id="seen", markup=False)
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self.query_one("#port", Input).focus()
+
+    def hear(self, said: LayDown | Calibrated | SensorKept) -> None:
+        match said:
+            case LayDown(number=number, position=position, heard=heard):
+                self._waits_for = said
+                if heard is not None:
+                    self._note(f"✓ read {', '.join(f'{value:.0f}' for value in heard)}")
+                self._say(f"{number} of {STEPS}: lay the sensor down with {position}, let go of it, press Enter.")
+            case Calibrated(table=table, file=file):
+                self._under_way, self._table = False, table
+                self.query_one("#seen", Static).update(table)
+                self._say(f"Enter writes this into {file}; Esc leaves it.")
+            case SensorKept(file=file):
+                self._lock(False)
+                self._say(f"Written into {file}. `hapteq doctor` checks the sensor. Esc goes back.")
+
+    def begin_again(self) -> None:
+        """After an error, which a panel above says."""
+        self._waits_for, self._under_way, self._table = None, False, ""
+        self._say("F5 begins again.")
+        self.query_one("#seen", Static).update("")
+        self._lock(False)
+
+    def action_begin(self) -> None:
+        port = self.query_one("#port", Input).value.strip()
+        baud = self.query_one("#baud", Input).value.strip() or str(BAUD)
+        if self._under_way:
+            return
+        if not port:
+            self._refuse("Name the port.", "port")
+        elif not baud.isascii() or not baud.isdigit() or int(baud) < 1:
+            self._refuse("The baud rate is a whole number.", "baud")
+        else:
+            self._under_way, self._table = True, ""
+            self.query_one("#seen", Static).update("")
+            self._lock(True)
+            self._say("The port is opened…")
+            self.post_message(CalibrateWanted(port, int(baud)))
+
+    def action_go_on(self) -> None:
+        if self._waits_for is not None:
+            self._note(f"{self._waits_for.position}: listening, leave it at rest…")
+            self.post_message(LaidDown(self._waits_for.number))
+            self._waits_for = None
+        elif self._table:
+            self.post_message(KeepWanted(self._table))
+            self._table = ""
+            self._say("It is written…")
+        elif isinstance(self.focused, Input):
+            self.action_begin()
+
+    def action_leave(self) -> None:
+        if self._under_way:
+            self.post_message(CalibrationStopped())
+        take_off(self, None)
+
+    @on(Input.Changed)
+    def _unsay(self) -> None:
+        if not self._under_way:
+            self._say("F5 begins.")
+
+    def _lock(self, locked: bool) -> None:
+        for field in self.query(Input):
+            field.disabled = locked
+
+    def _refuse(self, text: str, field: str) -> None:
+        self._say(text)
+        self.query_one(f"#{field}", Input).focus()
+
+    def _say(self, text: str) -> None:
+        self.query_one("#do", Static).update(text)
+
+    def _note(self, text: str) -> None:
+        """A line for each position; what is known of it replaces what was said while it was heard."""
+        seen = self.query_one("#seen", Static)
+        lines = [line for line in str(seen.content).split("\n") if line]
+        if text.startswith("✓") and lines:
+            lines[-1] = f"{lines[-1].split(':')[0]}: {text}"
+        else:
+            lines.append(text)
+        seen.update("\n".join(lines))

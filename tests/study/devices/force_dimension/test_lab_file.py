@@ -1,0 +1,73 @@
+"""A calibration put into the lab's file: nothing else of it changes, and nothing at all where it cannot be."""
+
+import pytest
+
+from study.devices.accelerometer.calibration import Calibration
+from study.devices.accelerometer.six_positions import calibration_toml
+from study.devices.force_dimension.lab import keep_sensor, read_lab
+from study.errors import DeviceError
+from tests.study.devices.accelerometer.pty_board import IDEAL
+
+TABLE = calibration_toml(IDEAL, "/dev/ttyACM3", 115_200)
+
+OLD = """# the lab's own words
+effector_mass_kg = 0.153     # with the sensor
+
+[accelerometer]              # of last year
+port = "/dev/ttyACM0"
+bias = [1.0, 2.0, 3.0]
+sensitivity = [
+  [607.0, 3.0, -5.0],
+  [-4.0, 611.0, 2.0],
+  [6.0, 1.0, 598.0],
+]
+raw_range = [13800, 51200]
+
+[pulse]
+kind = "serial-byte"
+port = "/dev/ttyUSB0"
+"""
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    path = tmp_path / "config" / "device.toml"
+    monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(path))
+    return path
+
+
+def test_a_first_calibration_makes_the_file(file):
+    assert keep_sensor(TABLE) == file
+    lab = read_lab()
+    assert lab.accelerometer is not None and lab.accelerometer.port == "/dev/ttyACM3"
+    assert [path.name for path in file.parent.iterdir()] == ["device.toml"]
+
+
+def test_a_new_calibration_takes_the_place_of_the_old_one_alone(file):
+    file.parent.mkdir()
+    file.write_text(OLD)
+    keep_sensor(TABLE)
+    text, lab = file.read_text(), read_lab()
+    assert text.startswith("# the lab's own words\neffector_mass_kg = 0.153     # with the sensor\n")
+    assert "of last year" not in text and text.count("[accelerometer]") == 1
+    assert lab.effector_mass_kg == 0.153 and lab.pulse is not None and lab.pulse.port == "/dev/ttyUSB0"
+    assert lab.accelerometer is not None and lab.accelerometer.baud == 115_200
+    assert lab.accelerometer.sensitivity == tuple(map(tuple, IDEAL.sensitivity.tolist()))
+    assert file.with_name("device.toml.before").read_text() == OLD
+    assert not file.with_name("device.toml.new").exists()
+
+
+def test_nothing_changes_where_the_file_cannot_be_used_or_the_table_is_none(file):
+    file.parent.mkdir()
+    file.write_text("effector_mass_kg = ")
+    with pytest.raises(DeviceError, match="cannot be used"):
+        keep_sensor(TABLE)
+    file.write_text(OLD)
+    with pytest.raises(DeviceError, match="was not kept"):
+        keep_sensor(TABLE.replace("bias", "bais"))
+    assert file.read_text() == OLD
+
+
+def test_a_range_at_the_ends_of_16_bits_is_written_as_whole_numbers():
+    wide = Calibration(IDEAL.bias, 10 * IDEAL.sensitivity, IDEAL.noise_mps2, 0.0)
+    assert "raw_range = [0, 65535]" in calibration_toml(wide, "COM3", 9600)

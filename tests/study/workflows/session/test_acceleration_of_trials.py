@@ -1,0 +1,116 @@
+"""What was lost between accelerometer and computer stands beside each trial; above the limit nothing is said of what
+was delivered, or the trial comes again where the protocol needs the accelerometer."""
+
+from dataclasses import replace
+
+import pytest
+
+from protocols.trial import TrialStatus, VoidCause
+from study.devices.device import Fault, Health
+from study.errors import DeviceError
+from study.session.facts.sensor_facts import SensorFacts
+from study.session.facts.void_reasons import computer_too_busy, void_for_participant
+from study.store.formats.recording_file import read_recording
+from study.store.sessions.event_log import read_log
+from study.workflows.session import conduct_session
+from study.workflows.trial.judge_trial import judge
+
+GOOD = SensorFacts(packets=9900, lost=100, spoiled_bytes=1500, restarts=0, ticks=1000, unplaced_ticks=0, drift_ppm=31.5)
+BAD = replace(GOOD, packets=9000, lost=1000)
+
+
+@pytest.fixture
+def heard(monkeypatch):
+    """The sensor facts of each trial in turn, the last one again and again; and whether the device has a sensor."""
+    facts, has_sensor = [GOOD], [True]
+    real_open = conduct_session.open_device
+
+    def opened(*arguments):
+        device = real_open(*arguments)
+        release = device.release
+
+        def release_and_tell():
+            played = release()
+            now = facts.pop(0) if len(facts) > 1 else facts[0]
+            return replace(played, health=replace(played.health, sensor=now))
+
+        device.release = release_and_tell
+        device._info = replace(device.info, has_sensor=has_sensor[0])
+        return device
+
+    monkeypatch.setattr(conduct_session, "open_device", opened)
+    return facts, has_sensor
+
+
+def judged(sensor, protocol, **settings):
+    health = Health(Fault.NONE, 1000, 0, 0, 0, 0, 0, 1.0, sensor=sensor)
+    return judge(health, replace(protocol.measurement, **settings), True)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "missing"),
+    [
+        (None, None),
+        (GOOD, 0.01),
+        (BAD, 0.1),
+        (replace(GOOD, unplaced_ticks=51), 0.051),
+        (replace(GOOD, unplaced_ticks=50), 0.05),
+        (replace(GOOD, packets=0, lost=0), 1.0),
+        (replace(GOOD, ticks=0), 0.01),
+    ],
+)
+def test_what_is_missing_above_the_limit_cannot_be_trusted(small_protocol, sensor, missing):
+    found = judged(sensor, small_protocol)
+    assert sensor is None or sensor.missing == pytest.approx(missing)
+    too_much = missing is not None and missing > 0.05
+    assert (found.spoiled, found.measured) == ("", not too_much)
+    assert any("no trustworthy acceleration" in flag for flag in found.flags) is too_much
+    needed = judged(sensor, small_protocol, accelerometer_needed=True)
+    assert bool(needed.spoiled) is too_much
+    assert needed.cause is (VoidCause.NO_ACCELERATION if too_much else VoidCause.FAULT)
+
+
+def test_a_participant_reads_that_the_sensor_was_not_heard(small_protocol):
+    reason = judged(BAD, small_protocol, accelerometer_needed=True).spoiled
+    assert reason == "10.0 % of the acceleration is missing" and not computer_too_busy(reason)
+    assert void_for_participant(reason).startswith("The sensor at the handle was not heard well enough")
+
+
+def test_the_counts_stand_beside_each_trial_and_in_its_recording(sitter, heard):
+    done = sitter.whole()
+    rows = {(row.lost_packets, row.garbled_bytes, row.acceleration_missing) for row in done.state.trials}
+    assert rows == {(100, 1500, 0.01)}
+    measured = [event for event in read_log(done.folder.log).events if event.event == "trial_measured"]
+    assert {event.sensor for event in measured} == {GOOD}
+    meta = read_recording(done.folder.path / next(event.recording for event in measured if event.recording)).meta
+    assert (meta["sensor"]["lost"], meta["acceleration_trusted"]) == (100, True)
+
+
+def test_a_trial_without_trustworthy_acceleration_counts_and_says_nothing_of_what_was_delivered(sitter, heard):
+    heard[0][:] = [BAD, BAD, GOOD]
+    done = sitter.whole()
+    first, second, *others = [row for row in done.state.trials if row.counts]
+    assert {(row.status, row.delivered_mps2) for row in (first, second)} == {(TrialStatus.FLAGGED, None)}
+    assert all(row.delivered_mps2 is not None for row in others)
+    assert done.state.closed
+
+
+def test_a_protocol_that_needs_the_accelerometer_has_such_trials_again(sitter, heard):
+    sitter.protocol = replace(
+        sitter.protocol, measurement=replace(sitter.protocol.measurement, accelerometer_needed=True)
+    )
+    heard[0][:] = [BAD, GOOD]
+    done = sitter.whole()
+    void, again = done.state.trials[:2]
+    assert (void.status, void.void_cause) == (TrialStatus.SPOILED, VoidCause.NO_ACCELERATION)
+    assert (void.lost_packets, again.attempt, again.repeat_cause) == (1000, 1, VoidCause.NO_ACCELERATION)
+    assert done.state.closed
+
+
+def test_such_a_protocol_begins_nothing_where_there_is_no_accelerometer(sitter, heard):
+    sitter.protocol = replace(
+        sitter.protocol, measurement=replace(sitter.protocol.measurement, accelerometer_needed=True)
+    )
+    heard[1][0] = False
+    with pytest.raises(DeviceError, match="needs the accelerometer"):
+        sitter.whole()
