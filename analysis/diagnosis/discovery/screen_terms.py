@@ -1,7 +1,8 @@
 """Screens terms by cross-validation: how much of a fit's residual each explains beside what re-tuning explains.
 
 Each block's error is that of numbers fitted to all others (Stone, J. R. Stat. Soc. B 36:111, 1974), with the model's
-own numbers pulled to their calibration, and within the bounds of re-tuning. Terms are tried together, as products of columns.
+own numbers pulled to their calibration, and within the bounds of re-tuning. Terms are tried together, as products of
+columns.
 """
 
 from collections.abc import Sequence
