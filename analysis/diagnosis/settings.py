@@ -132,7 +132,9 @@ NAMED_GAIN = 1.6  # or gains this, four fifths of the error power: noise may be 
 EXPLAINED_BY_CHANCE = 2.5  # error over chance, where a statistic is compared; principle: no law of a contact is exact
 CONFIRMED_SHARE = 0.3  # of the mismatch, in logarithms, that must fall on sealed samples,
 SEALED_TOO_SMALL = 0.05  # unless it is smaller there than this
-SEALED_ALONE_ERROR, SEALED_ALONE_TIMES = 1.25, 1.5  # on sealed samples, and over that on all others: half are opened
+# on sealed samples, and over that on all others: all but the loudest of the sealed ones, or half, are opened
+SEALED_ALONE_ERROR, SEALED_ALONE_TIMES = 1.25, 1.5
+LOUDER = 1.05  # times the largest command elsewhere, from which on a stretch is louder
 
 # Faults that a recording shows by itself (`model_free_faults`). By hand.
 STEP_FACTOR = 1.5  # times a reference device's steps, from which on steps are others

@@ -35,16 +35,40 @@ class Observed:
     test: Mask
     """(n,): held-out samples, used only in the end."""
 
-    def unseal_half(self) -> "Observed":
-        """With the first half of each held-out stretch to fit and to choose by, the second still held out."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.test.astype(np.int8), [0]]))).reshape(-1, 2)
-        fit, choose, test = self.fit.copy(), self.choose.copy(), self.test.copy()
+    def unseal(self, opened: Mask) -> "Observed":
+        """With those of the held-out samples to fit and, of each stretch the last third, to choose by."""
+        opened = opened & self.test
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], opened.astype(np.int8), [0]]))).reshape(-1, 2)
+        fit, choose = self.fit.copy(), self.choose.copy()
         for start, stop in edges.tolist():
-            third, half = start + (stop - start) // 3, start + (stop - start) // 2
-            fit[start:third] = True
-            choose[third:half] = True
-            test[start:half] = False
-        return replace(self, fit=fit, choose=choose, test=test)
+            chosen = start + 2 * (stop - start) // 3
+            fit[start:chosen] = True
+            choose[chosen:stop] = True
+        return replace(self, fit=fit, choose=choose, test=self.test & ~opened)
+
+    def first_halves(self) -> Mask:
+        """(n,): the first half of each held-out stretch."""
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.test.astype(np.int8), [0]]))).reshape(-1, 2)
+        found = np.zeros(len(self.test), dtype=np.bool_)
+        for start, stop in edges.tolist():
+            found[start : start + (stop - start) // 2] = True
+        return found
+
+    def held_out_levels(self) -> list[tuple[Segment, float]]:
+        """Each segment of which something is held out, with its largest command."""
+        parts = [(segment, slice(segment.start, segment.stop)) for segment in self.recording.segments]
+        return [
+            (segment, float(np.abs(self.command[part]).max(initial=0.0)))
+            for segment, part in parts
+            if self.test[part].any()
+        ]
+
+    def held_out_below(self, level: float) -> Mask:
+        """(n,): held-out samples of segments whose commands stay below a level."""
+        found = np.zeros(len(self.test), dtype=np.bool_)
+        for segment, largest in self.held_out_levels():
+            found[segment.start : segment.stop] = largest < level
+        return found & self.test
 
     def fit_to_all(self) -> "Observed":
         """With the samples to choose by fitted to as well, for what was chosen by other means."""

@@ -16,7 +16,8 @@ from analysis.diagnosis.discovery.screen_terms import Products, Solution, add_co
 from equalizer.laws.law import ActsOn
 from equalizer.signals.signal import FloatArray
 
-_MOVE = 1e-3
+_MOVE, _MOVE_OF_LINE = 1e-3, 1e-5
+"""Moves of a number for its slope. A frequency that moved by 0.1 % would be out of phase at a recording's end."""
 _ROUNDS = 8
 _CONVERGED = 1e-3
 """Relative decrease of the cost below which a step is the last."""
@@ -120,10 +121,11 @@ def _gauss_newton_step(base: Products, at: _Point, best: Solution) -> tuple[_Poi
     moves, slopes = [], []
     for number, term in enumerate(at.terms):
         for place in range(len(term.numbers)):
-            column = column_of(view, _move_number(term, place, _MOVE))
+            move = _MOVE_OF_LINE if f"p{place}*t" in term.shape else _MOVE
+            column = column_of(view, _move_number(term, place, move))
             if column is None:
                 return None
-            slopes.append(factors[number] * (column - at.columns[number]) / _MOVE)
+            slopes.append(factors[number] * (column - at.columns[number]) / move)
             moves.append((number, place))
     if not moves:
         return None

@@ -191,24 +191,28 @@ def periodic_terms(columns: Columns, own: Axis, left: FloatArray, rate_hz: float
     waves = np.arange(1.0, 40.0, 0.175) / own.travel
     turns = np.exp(-2j * np.pi * np.outer(x[::every], waves)).astype(np.complex64)
     found = []
-    for name, wave, angle in product(("", own.f, own.v), np.geomspace(1.0, 6.0, 9).tolist(), (0.0, np.pi / 2)):
-        pitch = own.travel / wave
-        found.append(_wave(name, f"{own.x}/p0", pitch, (0.5 * pitch, min(2 * pitch, own.travel)), angle))
+    travelled = float(np.ptp(x))
+    for name, wave, angle in product(("", own.f, own.v), np.geomspace(1.0, 12.0, 13).tolist(), (0.0, np.pi / 2)):
+        pitch = travelled / wave
+        found.append(_wave(name, f"{own.x}/p0", pitch, (0.5 * pitch, min(2 * pitch, travelled)), angle))
     for name in ("", own.f, own.v):
         weight = columns[name] if name else np.ones_like(x)
         lines = (left * weight)[::every].astype(np.complex64) @ turns
         for k in _peaks(np.abs(lines), 2):
             pitch = 1 / float(waves[k])
-            bounds = (0.5 * pitch, min(2 * pitch, own.travel))
+            bounds = (0.5 * pitch, min(2 * pitch, travelled))
             found.append(_wave(name, f"{own.x}/p0", pitch, bounds, _angle(lines[k])))
     for name in (own.x, own.v, own.f):
-        lines = np.fft.rfft(left * columns[name])
-        first = max(int(2.0 * len(x) / rate_hz * 0.05), 1)
-        lines[:first] = 0
+        length = 4 * len(x)  # Zero-padded: a start half a line off is out of phase by the end.
+        lines = np.fft.rfft(left * columns[name], length)
+        lines[: int(_SLOWEST_LINE_HZ * length / rate_hz) + 1] = 0
         k = int(np.argmax(np.abs(lines)))
-        hz = max(k, 1) * rate_hz / len(x)
+        hz = max(k, 1) * rate_hz / length
         found.append(_wave(name, "p0*t", hz, (0.8 * hz, 1.2 * hz), _angle(lines[k])))
     return tuple(found)
+
+
+_SLOWEST_LINE_HZ = 0.1
 
 
 def _wave(weight: str, phase: str, number: float, bounds: tuple[float, float], angle: float) -> Term:

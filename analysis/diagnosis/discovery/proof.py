@@ -22,7 +22,7 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.settings import LAW_BEATS, LAW_PLACEBO, LAW_SAME, LAW_STABLE
+from analysis.diagnosis.settings import LAW_BEATS, LAW_PLACEBO, LAW_SAME, LAW_STABLE, LOUDER
 from analysis.wording import conjoin
 from equalizer.effects.discovered_law import axis_names
 from equalizer.signals.recording import Segment
@@ -185,7 +185,7 @@ def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
     kinds, axes = {kind for kind, _, _ in found}, {driven for _, driven, _ in found}
     loudest = max(level for _, _, level in found)
     said = [
-        (any(level > 1.05 * loudest for _, _, level in sealed), "louder commands"),
+        (any(level > LOUDER * loudest for _, _, level in sealed), "louder commands"),
         (any(driven not in axes and len(driven) > 1 for _, driven, _ in sealed), "axes driven together"),
         (any(kind not in kinds for kind, _, _ in sealed), "another kind of command"),
     ]

@@ -1,7 +1,8 @@
 """Screens terms by cross-validation: how much of a fit's residual each explains beside what re-tuning explains.
 
 Each block's error is that of numbers fitted to all others (Stone, J. R. Stat. Soc. B 36:111, 1974), with the model's
-own numbers pulled to their calibration. Terms are tried together, as products of columns.
+own numbers pulled to their calibration, and within the bounds of re-tuning. Terms are tried together, as products of
+columns.
 """
 
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from analysis.diagnosis.discovery.matched_filter import View
+from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.signals.signal import FloatArray
 
 _DEPENDENT = 1e-6
@@ -43,6 +45,22 @@ class Products:
         pulled = np.where(sizes > 0, 1e-10 * sizes, 1.0)
         pulled[: len(self.view.pull) - 1] = 1.0
         return pulled
+
+    @property
+    def wanted(self) -> FloatArray:
+        """(k,): the prior's part of the right side."""
+        pull = np.zeros(len(self.calibration))
+        pull[: len(self.view.pull)] = self.view.pull
+        return self.calibration * pull
+
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """(k,) each: bounds of the weights. The model's numbers stay within those of re-tuning: with mass, damping and
+        stiffness free to vanish, a force that takes the command away would explain everything."""
+        tuned, k = len(self.view.pull) - 1, len(self.calibration)
+        low, high = np.full(k, -np.inf), np.full(k, np.inf)
+        low[:tuned], high[:tuned] = self.view.pull[:tuned] - RETUNING_BOUND, self.view.pull[:tuned] + RETUNING_BOUND
+        return low, high
 
     def cross(self, columns: FloatArray) -> FloatArray:
         """(blocks, k, terms): products of the base columns with others. columns: (terms, s)"""
@@ -99,22 +117,17 @@ def cross_validate_terms(of: Products, columns: FloatArray) -> TermErrors:
     cross = of.cross(columns)
     own = np.array([np.einsum("ks,ks->k", columns[:, part], columns[:, part]) for part in parts])
     seen = np.array([columns[:, part] @ of.view.residual[part] for part in parts])
-    pulled = of.calibration
-    wanted = np.zeros(len(pulled))
-    wanted[: len(of.view.pull)] = pulled[: len(of.view.pull)] * of.view.pull
     without, with_it, factors = [], [], []
     for number in range(len(parts)):
-        squares = of.squares.sum(axis=0) - of.squares[number] + np.diag(pulled)
-        pull = of.with_residual.sum(axis=0) - of.with_residual[number] + wanted
-        other = cross.sum(axis=0) - cross[number]
-        solved = np.linalg.solve(squares, np.column_stack([pull, other]))
-        alone, along = solved[:, 0], solved[:, 1:]
-        size = own.sum(axis=0) - own[number]
-        left = size - np.einsum("kt,kt->t", other, along)
-        free = left > _DEPENDENT * size
-        gained = seen.sum(axis=0) - seen[number] - other.T @ alone
-        factor = np.where(free, gained / np.where(free, left, 1.0), 0.0)
-        weights = alone[:, None] - along * factor
+        squares = of.squares.sum(axis=0) - of.squares[number] + np.diag(of.calibration)
+        pull = of.with_residual.sum(axis=0) - of.with_residual[number] + of.wanted
+        other, size = cross.sum(axis=0) - cross[number], own.sum(axis=0) - own[number]
+        bordered = _border(squares, other, size)
+        right = np.column_stack([np.tile(pull, (len(size), 1)), seen.sum(axis=0) - seen[number]])
+        low, high = (np.append(bound, side) for bound, side in zip(of.limits, (-np.inf, np.inf), strict=True))
+        solved = solve_within(bordered, right, low, high)
+        weights, factor = solved[:, :-1].T, solved[:, -1]
+        alone = solve_within(squares[None], pull[None], *of.limits)[0]
         without.append(_held_out_squares(of, number, alone[:, None])[0])
         with_it.append(
             _held_out_squares(of, number, weights)
@@ -124,6 +137,35 @@ def cross_validate_terms(of: Products, columns: FloatArray) -> TermErrors:
         )
         factors.append(factor)
     return TermErrors(np.array(without), np.array(with_it), np.array(factors))
+
+
+def _border(squares: FloatArray, other: FloatArray, size: FloatArray) -> FloatArray:
+    """(terms, k + 1, k + 1): normal equations of the base columns (k, k) bordered by each term. A term that depends on
+    them gets the weight 0. other: (k, terms) products; size: (terms,) squares."""
+    left = size - np.einsum("kt,kt->t", other, np.linalg.solve(squares, other))
+    k = len(squares)
+    bordered = np.zeros((len(size), k + 1, k + 1))
+    bordered[:, :k, :k] = squares
+    bordered[:, :k, k] = bordered[:, k, :k] = other.T
+    bordered[:, k, k] = np.where(left > _DEPENDENT * size, size, np.inf)
+    return bordered
+
+
+def solve_within(squares: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """(systems, k): least squares within bounds, from normal equations (systems, k, k) and right sides (systems, k), by
+    an active set: weights that leave their bounds are fixed there, and the others solved for again. An infinite
+    diagonal makes its weight 0."""
+    barred = np.isinf(np.einsum("tkk->tk", squares))
+    fixed, at = barred.copy(), np.zeros_like(right)
+    for _ in range(right.shape[1]):
+        system = np.where(fixed[:, :, None], np.eye(right.shape[1]), squares)
+        found = np.linalg.solve(system, np.where(fixed, at, right)[:, :, None])[:, :, 0]
+        outside = ((found < low) | (found > high)) & ~fixed
+        if not outside.any():
+            break
+        at = np.where(outside, np.clip(found, low, high), at)
+        fixed |= outside
+    return np.asarray(found)
 
 
 def _held_out_squares(of: Products, number: int, weights: FloatArray) -> FloatArray:
@@ -146,9 +188,7 @@ class Solution:
 def solve(of: Products) -> Solution:
     """Weights and cost of the base columns, fitted to all blocks together."""
     pulled, squares, seen = of.calibration, of.squares.sum(axis=0), of.with_residual.sum(axis=0)
-    wanted = np.zeros(len(pulled))
-    wanted[: len(of.view.pull)] = pulled[: len(of.view.pull)] * of.view.pull
-    weights = np.linalg.solve(squares + np.diag(pulled), seen + wanted)
+    weights = solve_within((squares + np.diag(pulled))[None], (seen + of.wanted)[None], *of.limits)[0]
     own = weights[: len(of.view.pull)] - of.view.pull
     left = float(of.power.sum() - 2 * seen @ weights + weights @ squares @ weights)
     return Solution(weights, left + float(pulled[: len(own)] @ own**2))

@@ -1,4 +1,4 @@
-"""Runs the search without clean recordings; repeats it with half of the held-out samples where only they show a
+"""Runs the search without clean recordings; repeats it with a part of the held-out samples where only they show a
 mismatch."""
 
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, explain, is_worthwhile
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
-from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, shows_there_alone
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (
     Judgement,
@@ -24,7 +24,7 @@ from analysis.diagnosis.search.verdict import (
     worth_naming,
 )
 from analysis.diagnosis.search.without_effect import without_effect
-from analysis.diagnosis.settings import LAST_EFFECT_SHARE, SEALED_ALONE_ERROR, SEALED_ALONE_TIMES
+from analysis.diagnosis.settings import LAST_EFFECT_SHARE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
@@ -64,6 +64,10 @@ def _drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
 TEST_HALF_USED = (
     "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
     "such stretch was used to find it, the second half to confirm it."
+)
+MILDER_TEST_USED = (
+    "What was kept for the test shows something that the rest of the recording does not hold: all but the loudest of "
+    "it was used to find it, the loudest to confirm it."
 )
 NOT_SHOWN = "What was kept for the test shows a mismatch that the rest of the recording does not hold."
 
@@ -107,44 +111,63 @@ def search_effects(
     beyond: Callable[[SearchResult], SearchResult] = lambda seen: seen,
 ) -> SearchResult:
     """The search for effects with its verdict. beyond: tried where the catalogue leaves a mismatch, with and without
-    the half of the held-out samples that is opened where only they show it."""
+    the part of the held-out samples that is opened where only they show it."""
     found = _prune_guarded(context, explain(context, catalogue, progress, time_left), time_left)
     judged = _judge_with_prediction(context, found)
     first = SearchResult(context, found, judged, _remarks(found))
-    opens = not (found.ended_early or found.barred) and _shows_in_test_alone(
-        found.after if judged.named else found.retuned
-    )
-    half = _find_with_half(first, catalogue, progress, time_left) if opens else None
-    if half is not None and (judged.named or half.judgement.verdict == "explained"):
-        return half
+    left = found.after if judged.named else found.retuned
+    if found.ended_early or found.barred or not shows_there_alone(left.score.test, left):
+        return beyond(first)
+    opened = _find_with_opened(first, left, catalogue, progress, time_left)
+    adds = _adds_confirmed(first, opened)
+    if adds and (judged.named or opened.judgement.verdict == "explained"):
+        return opened
+    if judged.named:
+        return beyond(first)
+    return _find_beyond(first, opened, adds, beyond)
+
+
+def _find_beyond(
+    first: SearchResult, opened: SearchResult, adds: bool, beyond: Callable[[SearchResult], SearchResult]
+) -> SearchResult:
+    """What is found beyond the catalogue without and with the opened samples, or what these alone added to it."""
     tried = beyond(first)
-    if not opens or judged.named or tried.judgement.named:
+    if tried.judgement.named:
         return tried
-    if half is not None:
-        return replace(half, unconfirmed=tried.unconfirmed)
-    judged = replace(judged, verdict="unexplained")
-    return replace(tried, judgement=judged, remarks=(NOT_SHOWN, *tried.remarks))
+    if adds:
+        return replace(opened, unconfirmed=tried.unconfirmed)
+    there = beyond(replace(opened, judgement=replace(opened.judgement, named=False)))
+    if there.judgement.named:
+        return replace(there, remarks=(*opened.remarks, *there.remarks))
+    judged, unconfirmed = replace(first.judgement, verdict="unexplained"), (*tried.unconfirmed, *there.unconfirmed)
+    return replace(tried, judgement=judged, remarks=(NOT_SHOWN, *tried.remarks), unconfirmed=unconfirmed)
 
 
-def _find_with_half(
-    first: SearchResult, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
-) -> SearchResult | None:
-    """The search repeated with half of the held-out samples to fit and to choose by; None unless it names all that
-    the first did, and more, which the other half confirms."""
-    half = first.context.open_half()
-    found = _prune_guarded(half, explain(half, catalogue, progress, time_left), time_left)
-    judged = _judge_with_prediction(half, found)
-    before = first.found.after if first.judgement.named else first.found.retuned
-    if not judged.named or not _sites(before) < _sites(found.after):
-        return None
-    if first.judgement.named:
-        # Fitted to the same samples: what the opened half does to the first effect is no merit of the second.
-        measure, fitted = half.measure, before.fitted
-        start = evaluate_fit(measure, half.tuning, fitted.deviations, fitted.hypothesis)
-        refitted = half.with_test_score(half.candidate(refine(half, start)))
-        if not confirms_addition(refitted, found.after):
-            return None
-    return SearchResult(half, found, judged, (TEST_HALF_USED, *_remarks(found)))
+def _find_with_opened(
+    first: SearchResult, left: FittedCandidate, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> SearchResult:
+    """The search repeated with a part of the held-out samples to fit and to choose by: all but the loudest stretches
+    where the others show the mismatch, else the first half of each."""
+    milder = first.context.open_milder(left)
+    context = first.context.open_half() if milder is None else milder
+    found = _prune_guarded(context, explain(context, catalogue, progress, time_left), time_left)
+    used = TEST_HALF_USED if milder is None else MILDER_TEST_USED
+    return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
+
+
+def _adds_confirmed(first: SearchResult, opened: SearchResult) -> bool:
+    """Whether a search with opened samples names all that the first did, and more, which what is still held out
+    confirms."""
+    before, found = first.found.after if first.judgement.named else first.found.retuned, opened.found
+    if not opened.judgement.named or not _sites(before) < _sites(found.after):
+        return False
+    if not first.judgement.named:
+        return True
+    # Fitted to the same samples: what the opened ones do to the first effect is no merit of the second.
+    context, fitted = opened.context, before.fitted
+    start = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
+    refitted = context.with_test_score(context.candidate(refine(context, start)))
+    return confirms_addition(refitted, found.after)
 
 
 def _sites(candidate: FittedCandidate) -> set[tuple[str, int]]:
@@ -177,12 +200,6 @@ def _judge_with_prediction(context: SearchContext, found: Explanation) -> Judgem
     if judged.named and is_without_prediction(context.whole, found.after):
         return Judgement("unexplained", False)
     return judged
-
-
-def _shows_in_test_alone(candidate: FittedCandidate) -> bool:
-    """Whether held-out samples show a mismatch that the others do not."""
-    shown = float(np.nanmax(candidate.score.test, initial=0.0))
-    return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * candidate.score.worst_channel
 
 
 def hums_low(found: Explanation) -> bool:

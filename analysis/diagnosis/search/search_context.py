@@ -6,15 +6,22 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import FitScore, fit_score
+from analysis.diagnosis.errors.fit_score import FitScore, fit_score, rms_over
 from analysis.diagnosis.errors.hypothesis import Hypothesis, without_claim
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, sensitivity
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
 from analysis.diagnosis.search.screening import ScreenedHypothesis
-from analysis.diagnosis.settings import LEAST_FITTED, MOST_FITTED, WORTH_FITTING
-from analysis.diagnosis.types import Mapper
+from analysis.diagnosis.settings import (
+    LEAST_FITTED,
+    LOUDER,
+    MOST_FITTED,
+    SEALED_ALONE_ERROR,
+    SEALED_ALONE_TIMES,
+    WORTH_FITTING,
+)
+from analysis.diagnosis.types import Mapper, Mask
 from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.signals.signal import FloatArray
 
@@ -66,7 +73,24 @@ class SearchContext:
 
     def open_half(self) -> "SearchContext":
         """With the first half of every held-out stretch to fit and to choose by."""
-        whole = self.whole.with_records(tuple(record.unseal_half() for record in self.whole.records))
+        return self._open([record.first_halves() for record in self.whole.records])
+
+    def open_milder(self, shows: FittedCandidate) -> "SearchContext | None":
+        """With all held-out segments but the loudest to fit and to choose by, where these show a mismatch that the
+        other samples do not: the loudest still test by another kind of command. None where they do not. shows: with
+        its residuals in all samples."""
+        records = self.whole.records
+        levels = [level for record in records for _, level in record.held_out_levels()]
+        opened = [record.held_out_below(max(levels, default=0.0) / LOUDER) for record in records]
+        if not any(mask.any() for mask in opened):
+            return None
+        scale = self.whole.unit / self.whole.noise
+        errors = rms_over(records, shows.fitted.residuals, opened) * scale
+        return self._open(opened) if shows_there_alone(errors, shows) else None
+
+    def _open(self, opened: Sequence[Mask]) -> "SearchContext":
+        records = (record.unseal(mask) for record, mask in zip(self.whole.records, opened, strict=True))
+        whole = self.whole.with_records(tuple(records))
         return replace(self, measure=whole.shorten(), whole=whole)
 
     def fit_to_all(self) -> "SearchContext":
@@ -92,6 +116,13 @@ class SearchContext:
             return FittedCandidate(fitted, score)
         gained = self.references.gain_on_clean(fitted.hypothesis)
         return FittedCandidate(fitted, score.larger(np.exp(gained)), 2 * float(gained.mean()))
+
+
+def shows_there_alone(errors: FloatArray, candidate: FittedCandidate) -> bool:
+    """Whether held-out samples show a mismatch that those to fit and to choose by do not. errors: (c,), there, times
+    the noise."""
+    shown = float(np.nanmax(errors, initial=0.0))
+    return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * candidate.score.worst_channel
 
 
 def first_fits(

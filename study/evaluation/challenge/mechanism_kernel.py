@@ -93,7 +93,7 @@ def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> Motion:
         if m.play[AXIS] >= 0.0:
             _through_play(m.play, q, v, motor, drive, h)
         if k % steps == 0:
-            _accelerate(m, q, f, before, a)
+            _accelerate_before(m, (q, now, before), (kept, k * h, pushed), f, a)
             for j in range(3):
                 acceleration[k // steps, j], position[k // steps, j] = a[j], q[j]
                 velocity[k // steps, j], lawful[k // steps, j] = now[j], pushed[j]
@@ -103,6 +103,28 @@ def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> Motion:
             q[i] += h * v[i]
         before[:] = drive
     return Motion(acceleration, position, velocity, lawful)
+
+
+@njit(cache=True, nogil=True)
+def _accelerate_before(
+    m: Mechanism,
+    at: tuple[FloatArray, FloatArray, FloatArray],
+    laws: tuple[FloatArray, float, FloatArray],
+    f: FloatArray,
+    a: FloatArray,
+) -> None:
+    """Acceleration under the drive force that acted until now, in the laws of the command as well. at: positions,
+    velocities, that drive force. laws: memory states, the time, and the laws' forces under the next drive force, which
+    are in `f`."""
+    kept, t, pushed = laws
+    if m.laws.shape[0] == 0:
+        _accelerate(m, at[0], f, at[2], a)
+        return
+    until, there = np.zeros(3), f.copy()
+    law_forces(m.laws, at, kept, t, until)
+    for j in range(3):
+        there[j] += until[j] - pushed[j]
+    _accelerate(m, at[0], there, at[2], a)
 
 
 @njit(cache=True, nogil=True)
