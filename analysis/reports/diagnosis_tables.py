@@ -79,10 +79,10 @@ def error_table(found: Findings) -> Table:
 
 
 def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None:
-    """In each channel's unit, with the multiple of the noise; None where no course tells the channels."""
-    if not found.courses:
+    """In each channel's unit, with the multiple of the noise; None where no series tells the channels."""
+    if not found.time_series:
         return None
-    names, units, noises = found.courses[0].channels, found.courses[0].units, found.noise_rms
+    names, units, noises = found.time_series[0].channels, found.time_series[0].units, found.noise_rms
     statistic, what = found.explanation.statistic, "noise"
     if statistic is not None:
         units, noises, what = ("1",) * len(names), dict(zip(names, statistic.chance.tolist(), strict=True)), "chance"

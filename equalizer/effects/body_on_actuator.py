@@ -41,6 +41,6 @@ EFFECT = Effect(
     ),
     acts=Structure(_change),
     starts=_starts,
-    # Of one axis, and damped so little that it rings.
+    # Only oscillators of one axis, and not those damped so little that they ring (`extra_mode`).
     simpler=("extra_mode",),
 )

@@ -24,7 +24,7 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     late = lateness(evidence.response * weight, evidence.predicted * weight, longest)
     if abs(late) <= LEAST_SAMPLES:
         return ()
-    # A straight line between samples loses height where another start does not: both are tried.
+    # Linear interpolation between samples lowers peaks where band-limited interpolation does not: both are tried.
     starts = [{"offset": late / evidence.sample_rate_hz, "interpolated": straight} for straight in (0.0, 1.0)]
     return tuple(sorted(starts, key=lambda values: _misfit(evidence, values)))
 

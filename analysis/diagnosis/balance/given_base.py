@@ -64,8 +64,8 @@ def _power_per_freedom(plain: Regression) -> float:
     """Residual sum of squares over its degrees of freedom, with the open numbers fitted freely."""
     left = plain.remainder(plain.columns_of(()))
     power, freedom = 0.0, 0.0
-    for course, motion in zip(left, plain.motions, strict=True):
-        seen = np.where(motion.valid_samples(motion.fit), course, 0.0)
+    for residual, motion in zip(left, plain.motions, strict=True):
+        seen = np.where(motion.valid_samples(motion.fit), residual, 0.0)
         lines = np.abs(np.fft.rfft(seen)) ** 2
         power += float(seen @ seen)
         freedom += 2 * float(lines.sum()) ** 2 / max(float((lines**2).sum()), 1e-300)

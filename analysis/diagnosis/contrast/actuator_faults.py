@@ -106,7 +106,7 @@ def _gain_drift(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
 
 def drift_course(part: Part, begun: float) -> FloatArray:
     """(n,): a drift to 1 at the end of the file, of which a share `begun` had come before the file began."""
-    return np.asarray(begun + (1 - begun) * part.course)
+    return np.asarray(begun + (1 - begun) * part.elapsed_share)
 
 
 def _delay(axis: _Axis, time_s: float) -> Variant:

@@ -74,8 +74,10 @@ def likely_step(parts: Sequence[Part]) -> int:
         power = np.abs(np.fft.rfft(moved, axis=0)) ** 2
         for column in power.T:
             floor = float(np.median(column[3 * len(column) // 4 :]))
-            course = np.cumsum(np.maximum(column - floor, 0.0))
-            if course[-1] > 0:
-                ends.append(int(np.searchsorted(course, RESPONSE_BAND_SHARE * course[-1])) * part.rate_hz / len(moved))
+            cumulative = np.cumsum(np.maximum(column - floor, 0.0))
+            if cumulative[-1] > 0:
+                ends.append(
+                    int(np.searchsorted(cumulative, RESPONSE_BAND_SHARE * cumulative[-1])) * part.rate_hz / len(moved)
+                )
     fastest = max(ends, default=parts[0].rate_hz / 2)
     return max(int(parts[0].rate_hz / (RESPONSE_OVERSAMPLED * 2 * max(fastest, 1e-9))), 1)

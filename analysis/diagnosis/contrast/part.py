@@ -34,7 +34,7 @@ class Part:
     """Samples of the file."""
 
     @property
-    def course(self) -> FloatArray:
+    def elapsed_share(self) -> FloatArray:
         """(n,): share of the file's time that has passed."""
         return np.linspace(self.start, self.start + len(self.known) - 1, len(self.known)) / max(self.whole - 1, 1)
 

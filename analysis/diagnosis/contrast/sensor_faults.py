@@ -99,10 +99,10 @@ def faults_of_all(parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
             yield fault
 
 
-def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray, rows: Rows) -> Iterator[Fault]:
-    """Faults that one channel may have, or all. course: (n,) of the longest part."""
+def _common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray, rows: Rows) -> Iterator[Fault]:
+    """Faults that one channel may have, or all. samples: (n,) of the longest part."""
     longest = max(parts, key=lambda part: len(part.response))
-    times = delays_to_try(course, longest.rate_hz)
+    times = delays_to_try(samples, longest.rate_hz)
     yield channel.fault("sensor_gain", [_gain(channel, gain) for gain in GAINS])
     shifts = [side * share * channel.rms for share in SHIFTS for side in (1.0, -1.0)]
     yield channel.fault("sensor_offset", [_offset(channel, shift) for shift in shifts])
@@ -114,7 +114,7 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray,
     ])  # fmt: skip
     lags = [time_s for time_s in times if time_s * longest.rate_hz >= 0.1 * rows.lag_samples]
     yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz, rows.lag_samples) for time_s in lags])
-    period = longest.rate_hz / median_frequency_hz(course, longest.rate_hz)
+    period = longest.rate_hz / median_frequency_hz(samples, longest.rate_hz)
     rates = [side * late * period / longest.whole for late in LATE for side in (1.0, -1.0)]
     runs_on = (True, False) if any(part.start > 0 for part in parts) else (True,)
     clocks = [_clock_drift(channel, rate, on, parts) for rate in rates if abs(rate) < CLOCK_FASTEST for on in runs_on]
@@ -133,9 +133,9 @@ def _undo_play(y: FloatArray, gap: float) -> FloatArray:
     ahead = 0.5 * side
     turns = np.flatnonzero(side[1:] * side[:-1] < 0) + 1
     for begin, turn in pairwise([0, *turns.tolist()]):
-        course = side[turn - 1] * y[begin:turn]
-        top = begin + int(np.argmax(course))
-        left = top + int(np.flatnonzero(course[top - begin :] > course.max() - REVERSAL_OF_GAP * gap)[-1])
+        excursion = side[turn - 1] * y[begin:turn]
+        top = begin + int(np.argmax(excursion))
+        left = top + int(np.flatnonzero(excursion[top - begin :] > excursion.max() - REVERSAL_OF_GAP * gap)[-1])
         crossed = (np.arange(top, turn) - top) / max(left - top, 1)
         ahead[top:turn] = side[turn - 1] * (0.5 - np.minimum(crossed, 1.0) ** 2)
     return np.asarray(y + gap * ahead)

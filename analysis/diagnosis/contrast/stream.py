@@ -125,8 +125,8 @@ def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Strea
     everything = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
     columns = np.sqrt(np.mean(everything**2, axis=0))
     columns = np.where(columns > 0, columns, 1.0)
-    courses = [_residuals(rows[side], masks[side], columns) for side in (0, 1)]
-    colour = _whitening_filter([*courses[0], *courses[1]], [*masks[0], *masks[1]])
+    residuals = [_residuals(rows[side], masks[side], columns) for side in (0, 1)]
+    colour = _whitening_filter([*residuals[0], *residuals[1]], [*masks[0], *masks[1]])
     sides = []
     for parts, own, kept in zip((clean, other), rows, masks, strict=True):
         white = _whiten(colour, own, kept) / columns
@@ -167,12 +167,12 @@ def _white_error(white: FloatArray) -> float:
 
 
 def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
-    courses = [np.where(mask, error, np.nan)[:, None] for error, mask in zip(errors, masks, strict=True)]
+    masked = [np.where(mask, error, np.nan)[:, None] for error, mask in zip(errors, masks, strict=True)]
     power = np.sum(
         [
-            lagged_products(course, CONTRAST_WHITENING_ORDER)[:, 0]
-            for course in courses
-            if len(course) > CONTRAST_WHITENING_ORDER
+            lagged_products(series, CONTRAST_WHITENING_ORDER)[:, 0]
+            for series in masked
+            if len(series) > CONTRAST_WHITENING_ORDER
         ],
         axis=0,
     )

@@ -37,11 +37,11 @@ def response_significance(recordings: Sequence[Recording]) -> float | None:
     power = (np.abs(inputs) ** 2).sum(axis=(0, 2))
     lines = np.flatnonzero(power > DRIVEN * power.max(initial=0.0))
     lines = lines[lines > 0]
-    looks = [look for line in lines if (look := _coherence(inputs[:, line], outputs[:, line])) is not None]
-    if not looks:
+    coherences = [value for line in lines if (value := _coherence(inputs[:, line], outputs[:, line])) is not None]
+    if not coherences:
         return None
-    found, expected, variance = (np.array(column) for column in zip(*looks, strict=True))
-    spread = np.sqrt(SHARED_BY_WINDOW * variance.sum()) / len(looks)
+    found, expected, variance = (np.array(column) for column in zip(*coherences, strict=True))
+    spread = np.sqrt(SHARED_BY_WINDOW * variance.sum()) / len(coherences)
     if (ANSWER_COHERENCE - expected.mean()) / spread < 2 * ANSWER_DEVIATIONS:
         return None
     sure = float(((found.mean(axis=0) - expected.mean()) / spread).max())

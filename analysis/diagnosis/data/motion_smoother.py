@@ -33,29 +33,29 @@ _READ = types.Array(types.float64, 2, "C", readonly=True)
 @njit(types.void(_MATRIX, _MATRIX, _MATRIX, _MATRIX, _READ, _READ, _MATRIX), cache=True, nogil=True)
 def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its products out
     advance: FloatArray,
-    look: FloatArray,
+    observation: FloatArray,
     gain: FloatArray,
     back: FloatArray,
     pushed: FloatArray,
-    seen: FloatArray,
+    measured: FloatArray,
     out: FloatArray,
 ) -> None:
-    """out (n, s): the states. advance (s, s), look (c, s), gain (s, c), back (s, s): see `motion_smoother`. pushed
-    (n, s): what is added over the step that begins there. seen (n, c): NaN where nothing was."""
-    n, s, c = out.shape[0], out.shape[1], look.shape[0]
+    """out (n, s): the states. advance (s, s), observation (c, s), gain (s, c), back (s, s): see `motion_smoother`.
+    pushed (n, s): what is added over the step that begins there. measured (n, c): NaN where nothing was."""
+    n, s, c = out.shape[0], out.shape[1], observation.shape[0]
     predicted = np.empty((n, s))
     state = out[0].copy()
     for k in range(n):
         predicted[k] = state
         known = True
         for i in range(c):
-            known = known and not np.isnan(seen[k, i])
+            known = known and not np.isnan(measured[k, i])
         if known:
             off = np.empty(c)
             for i in range(c):
-                total = seen[k, i]
+                total = measured[k, i]
                 for j in range(s):
-                    total -= look[i, j] * predicted[k, j]
+                    total -= observation[i, j] * predicted[k, j]
                 off[i] = total
             for j in range(s):
                 for i in range(c):
@@ -94,19 +94,25 @@ def smooth_motion(model: MechanicalModel, record: Observed, forces: FloatArray, 
     advance = np.eye(size + m)
     advance[:size, :size], advance[:size, size:] = steps.advance, steps.by_axis_force
     advance *= 1 - _LEAK
-    look, direct = _observation_matrices(steps, record.measured.shape[1])
+    observation, direct = _observation_matrices(steps, record.measured.shape[1])
     expected = EXPECTED * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12
     walk = np.concatenate([np.zeros(size), expected**2 / (CHANGES_S * rate_hz)])
-    gain, back = _smoother_gains(advance, look / unit[:, None], walk, _state_sizes(steps, expected))
+    gain, back = _smoother_gains(advance, observation / unit[:, None], walk, _state_sizes(steps, expected))
     gain = gain / unit[None, :]
-    seen = _subtract_feedthrough(model, record, forces, direct)
+    measured = _subtract_feedthrough(model, record, forces, direct)
     pushed = np.hstack([forces @ steps.by_axis_force.T, np.zeros((len(forces), m))])
     out = np.zeros((len(forces), size + m))
-    first = seen[np.isfinite(seen).all(axis=1)][:1]
+    first = measured[np.isfinite(measured).all(axis=1)][:1]
     if len(first):
-        out[0] = np.linalg.pinv(look, rcond=1e-6) @ first[0]
+        out[0] = np.linalg.pinv(observation, rcond=1e-6) @ first[0]
     smooth(
-        advance, look, np.ascontiguousarray(gain), back, np.ascontiguousarray(pushed), np.ascontiguousarray(seen), out
+        advance,
+        observation,
+        np.ascontiguousarray(gain),
+        back,
+        np.ascontiguousarray(pushed),
+        np.ascontiguousarray(measured),
+        out,
     )
     moved = out[:, :size] @ steps.motion[: 2 * m].T
     return SmoothedMotion(out[:, :size], moved[:, :m], moved[:, m:], out[:, size:])
@@ -123,11 +129,11 @@ def _observation_matrices(steps: LinearSteps, channels: int) -> tuple[FloatArray
 def _subtract_feedthrough(
     model: MechanicalModel, record: Observed, forces: FloatArray, direct: FloatArray
 ) -> FloatArray:
-    seen, p = np.array(record.measured), model.outputs
+    measured, p = np.array(record.measured), model.outputs
     if model.sensor.bandwidth_hz > 0:
-        seen[:, :p] = undo_low_pass(seen[:, :p], record.recording.sample_rate_hz, model.sensor.bandwidth_hz)
-    seen[1:] -= forces[:-1] @ direct.T
-    return seen
+        measured[:, :p] = undo_low_pass(measured[:, :p], record.recording.sample_rate_hz, model.sensor.bandwidth_hz)
+    measured[1:] -= forces[:-1] @ direct.T
+    return measured
 
 
 def _state_sizes(steps: LinearSteps, expected: FloatArray) -> FloatArray:
@@ -139,12 +145,12 @@ def _state_sizes(steps: LinearSteps, expected: FloatArray) -> FloatArray:
 
 
 def _smoother_gains(
-    advance: FloatArray, look: FloatArray, walk: FloatArray, large: FloatArray
+    advance: FloatArray, observation: FloatArray, walk: FloatArray, large: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Gains of the Kalman filter (s, c) and of the backward pass (s, s). look: observation matrix of channels in units
-    of their noise. Solved in units in which all states have about the same size."""
-    eye = np.eye(len(look))
-    scaled, observed = advance * large[None, :] / large[:, None], look * large[None, :]
+    """Gains of the Kalman filter (s, c) and of the backward pass (s, s). observation: observation matrix of channels in
+    units of their noise. Solved in units in which all states have about the same size."""
+    eye = np.eye(len(observation))
+    scaled, observed = advance * large[None, :] / large[:, None], observation * large[None, :]
     process_noise = np.diag(walk / large**2) + _PROCESS_NOISE * np.eye(len(advance))
     try:
         predicted = _steady_covariance(scaled, observed, process_noise)

@@ -62,8 +62,8 @@ class BandPower:
     def predict(self, residuals: Residuals) -> FloatArray:
         """(stretches, bands, c): logarithm of the predicted amplitude, the noise's power added."""
         unit = self.measure.unit
-        courses = [r.measured - left * unit for r, left in zip(self.measure.records, residuals, strict=True)]
-        return np.asarray(0.5 * np.log(self._power(courses) + self._noise))
+        predicted = [r.measured - left * unit for r, left in zip(self.measure.records, residuals, strict=True)]
+        return np.asarray(0.5 * np.log(self._power(predicted) + self._noise))
 
     def misfits(self, off: FloatArray) -> FitScore:
         """Rms by channel of a difference of logarithms `off`, on the samples to fit, choose and test by; NaN = none."""
@@ -82,13 +82,13 @@ class BandPower:
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         return np.asarray(self.measure.noise**2 / (rate_hz / 2))
 
-    def _power(self, courses: Sequence[FloatArray]) -> FloatArray:
+    def _power(self, predicted: Sequence[FloatArray]) -> FloatArray:
         """(stretches, bands, c): mean density."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         rows = np.empty((len(self.stretches), len(self._edges) - 1, len(self.measure.noise)))
         for row, stretch in zip(rows, self.stretches, strict=True):
             window = min(int(WINDOW_S * rate_hz), stretch.last - stretch.first)
-            lines, density = spectral_density(courses[stretch.record][stretch.first : stretch.last], rate_hz, window)
+            lines, density = spectral_density(predicted[stretch.record][stretch.first : stretch.last], rate_hz, window)
             firsts = np.searchsorted(lines, self._edges)
             for band, (low, high) in enumerate(pairwise(firsts)):
                 row[band] = density[low : max(high, low + 1)].mean(axis=0)

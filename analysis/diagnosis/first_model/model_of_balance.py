@@ -96,12 +96,12 @@ def share_within(balances: Sequence[Balance], band_hz: float) -> float:
     return min(shares)
 
 
-def _below(courses: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
+def _below(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
     """Of takes that each run one way, what a friction differs by from take to take is at frequency zero."""
-    within, whole, mean = 0.0, 1e-300, float(np.mean(np.concatenate(courses)))
-    for course, motion in zip(courses, motions, strict=True):
-        power = np.abs(np.fft.rfft(course - mean)) ** 2
-        frequency_hz = np.fft.rfftfreq(len(course), motion.step / motion.rate_hz)
+    within, whole, mean = 0.0, 1e-300, float(np.mean(np.concatenate(forces)))
+    for force, motion in zip(forces, motions, strict=True):
+        power = np.abs(np.fft.rfft(force - mean)) ** 2
+        frequency_hz = np.fft.rfftfreq(len(force), motion.step / motion.rate_hz)
         within, whole = within + float(power[frequency_hz <= band_hz].sum()), whole + float(power.sum())
     return within / whole
 

@@ -185,13 +185,13 @@ def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
     rows, aims = [], []
     for motion in motions:
         rubbing = smooth_sign(motion.velocity, SHARP * max(float(motion.velocity.std()), 1e-300))
-        courses = [motion.force, motion.velocity, motion.position, rubbing]
+        columns = [motion.force, motion.velocity, motion.position, rubbing]
         if not np.isfinite(motion.band_hz):
-            courses, aim = [motion.force, rubbing], motion.position
+            columns, aim = [motion.force, rubbing], motion.position
         else:
             aim = motion.acceleration
         kept = motion.valid_samples(motion.fit)
-        rows.append(motion.decimate(np.hstack(courses))[kept])
+        rows.append(motion.decimate(np.hstack(columns))[kept])
         aims.append(motion.decimate(aim)[kept])
     # About their means, and without what they do only in their last digits: of two commands with a constant sum, the
     # sum would else be taken for the drive.

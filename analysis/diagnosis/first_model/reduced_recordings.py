@@ -74,8 +74,8 @@ def _force_beside(balance: Balance, motion: Motion) -> FloatArray:
     weights = regression.weights(regression.columns_of([*linear, *(each.place for each in balance.named)]))
     # The constant of the base is left to the fit.
     weights = np.delete(weights, regression.base - 1)
-    courses = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]
-    whole = np.hstack([*courses, *(law.columns(motion, law.numbers) for law in linear_laws(balance))])
+    motion_columns = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]
+    whole = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in linear_laws(balance))])
     others = d > motion.force.shape[1]
     kept = [k >= regression.matrices or (others and k % d != regression.beside.own) for k in range(whole.shape[1])]
     return np.asarray(whole[:, kept] @ weights[: whole.shape[1]][kept])

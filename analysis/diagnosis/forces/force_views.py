@@ -56,8 +56,8 @@ def force_views(
     noise = np.minimum(np.fmin.reduce([view.response_rms for view in seen]), np.std(forces, axis=0).max())
     noise = np.asarray(np.hypot(noise, KNOWN * np.sqrt(np.mean(forces**2, axis=0))))
     rate_hz = records[0].recording.sample_rate_hz
-    courses = tuple(band_motion(motion.position, rate_hz, band_hz) for motion in motions)
-    measure = PredictedForce(tuple(views), courses, noise, noise, band_hz)
+    band_motions = tuple(band_motion(motion.position, rate_hz, band_hz) for motion in motions)
+    measure = PredictedForce(tuple(views), band_motions, noise, noise, band_hz)
     return ForceViews(measure, tuple(seen))
 
 

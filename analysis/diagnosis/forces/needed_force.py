@@ -82,11 +82,11 @@ def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> Needed
     pushed = np.linalg.inv(model.input)
     matrices = model.stiffness, model.damping, model.mass
     force = sum(
-        (course @ (pushed @ matrix @ moved).T for course, matrix in zip(motion.around, matrices, strict=True)),
+        (derivative @ (pushed @ matrix @ moved).T for derivative, matrix in zip(motion.around, matrices, strict=True)),
         np.zeros_like(motion.position),
     )
     along = (driven_axes(model).T @ moved).T
-    return NeededForce(force, *(course @ along for course in motion.at))
+    return NeededForce(force, *(derivative @ along for derivative in motion.at))
 
 
 def _force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:

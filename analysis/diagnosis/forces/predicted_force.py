@@ -94,10 +94,10 @@ class PredictedForce:
         needed = self._remember("needed", number, (structure, motion), lambda: needed_force(structure, motion))
         entered = self._actuator_force(model, effects, number)
         ahead = np.concatenate([needed.force[1:], needed.force[-1:]])
-        course = needed.axis_position, needed.axis_velocity, needed.axis_acceleration
+        axis_motion = needed.axis_position, needed.axis_velocity, needed.axis_acceleration
         pushing = entered.within - (needed.force + ahead) / 2
         effects = under_conditions(effects, record.recording)
-        added = force_along(structure, effects, course, (record.command, pushing), rate_hz)
+        added = force_along(structure, effects, axis_motion, (record.command, pushing), rate_hz)
         # Both are means over the step that begins at a sample; the needed force is that around it.
         total = entered.around
         if added.any():

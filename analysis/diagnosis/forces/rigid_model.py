@@ -63,8 +63,8 @@ def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalMod
     for record, motion in zip(measure.records, measure.motions, strict=True):
         moved = needed_force(model, motion)
         used = record.fit | record.choose
-        courses = moved.axis_acceleration, moved.axis_velocity, moved.axis_position, np.ones((len(used), 1))
-        rows.append(np.hstack(courses)[used])
+        columns = moved.axis_acceleration, moved.axis_velocity, moved.axis_position, np.ones((len(used), 1))
+        rows.append(np.hstack(columns)[used])
         aims.append(record.measured[used])
     shapes, aim, m = np.vstack(rows), np.vstack(aims), model.inputs
     whole, left = _least_squares(shapes, aim)

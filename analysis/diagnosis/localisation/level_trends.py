@@ -38,7 +38,7 @@ class LevelTrend:
         return self.p_value < DISTORTION_P
 
     @property
-    def course(self) -> str:
+    def level_dependence(self) -> str:
         """ "falls", "rises", "rises from nothing", "stays", or "" where nothing can be said."""
         if not self.present or self.db_per_doubling is None:
             return ""

@@ -152,14 +152,15 @@ def _of_windows(
 def _window_power(samples: FloatArray, starts: Sequence[int], length: int) -> FloatArray:
     """(windows, lines, channels)"""
     hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
-    looks = np.stack([samples[start : start + length] for start in starts])
-    return np.abs(spectra((looks - looks.mean(axis=1, keepdims=True)) * hann[:, None])) ** 2
+    periods = np.stack([samples[start : start + length] for start in starts])
+    return np.abs(spectra((periods - periods.mean(axis=1, keepdims=True)) * hann[:, None])) ** 2
 
 
-def _noise_power(seen: Observation, lines_hz: FloatArray, looks: int) -> FloatArray:
-    """Noise power times length, of the mean of `looks` periods; the repeating part of rounding does not average out."""
+def _noise_power(seen: Observation, lines_hz: FloatArray, periods: int) -> FloatArray:
+    """Noise power times length, of the mean of `periods` periods; the repeating part of rounding does not average
+    out."""
     density = np.stack([np.interp(lines_hz, seen.noise_hz, channel) for channel in seen.noise.density.T], axis=1)
-    return (density - seen.noise.rounding) / looks + seen.noise.rounding
+    return (density - seen.noise.rounding) / periods + seen.noise.rounding
 
 
 def _sum_lines(

@@ -51,25 +51,27 @@ def residual_spectra(
         noises.append(floor.position)
     residual = np.hstack(left)
     whole = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
-    looks = [
+    segments = [
         period for period in (_whole_periods(periods, whole) for periods in settled_periods(recording)) if period.starts
     ]
-    if not looks:
-        looks = _windows(recording, whole)
-    looks = [look for look in looks if look.length == looks[0].length]
-    if not looks or not floor.known:
+    if not segments:
+        segments = _windows(recording, whole)
+    segments = [segment for segment in segments if segment.length == segments[0].length]
+    if not segments or not floor.known:
         return None
-    lines_hz = looks[0].frequency_hz(recording.sample_rate_hz)
-    excitation = np.stack([period_spectra(instrument_signal(recording), look).mean(axis=0) for look in looks])
+    lines_hz = segments[0].frequency_hz(recording.sample_rate_hz)
+    excitation = np.stack([period_spectra(instrument_signal(recording), segment).mean(axis=0) for segment in segments])
     together = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
     driven = detection_lines(together, hold_length(instrument_signal(recording)))
     if driven is None:
         return None
     first, last = np.flatnonzero(driven.driven)[[0, -1]]
     inside = slice(int(first), int(last) + 1)
-    spectra = np.stack([period_spectra(residual, look).mean(axis=0)[inside] for look in looks])
-    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], look) for look in looks])
-    noise += model_error**2 * np.stack([_response_power(recording, look, len(noises) > 1)[inside] for look in looks])
+    spectra = np.stack([period_spectra(residual, segment).mean(axis=0)[inside] for segment in segments])
+    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], segment) for segment in segments])
+    noise += model_error**2 * np.stack(
+        [_response_power(recording, segment, len(noises) > 1)[inside] for segment in segments]
+    )
     return ResidualSpectra(lines_hz[inside], spectra, noise, left[0].shape[1])
 
 

@@ -67,8 +67,8 @@ def segment_spectra(
             if linear is not None:
                 brought, doubt = command_contribution(linear, np.where(lines.driven[:, None], 0, command))
                 mean, error = mean - brought, error + doubt
-            look = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
-            found.append(SegmentSpectrum(inputs_of(recording, period), period.segment.amplitude, *look))
+            spectrum = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
+            found.append(SegmentSpectrum(inputs_of(recording, period), period.segment.amplitude, *spectrum))
     return found
 
 
@@ -85,10 +85,10 @@ def _noise_on_lines(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatAr
 def _mean_and_errors(
     answer: ComplexArray, floor: FloatArray, rounding: FloatArray
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    looks = len(answer)
-    spread = period_variance(answer) if looks > 1 else floor
+    count = len(answer)
+    spread = period_variance(answer) if count > 1 else floor
     larger = np.maximum(floor, smooth_over_lines(spread, _SMOOTHED_LINES))
-    return answer.mean(axis=0), larger / looks + rounding, spread
+    return answer.mean(axis=0), larger / count + rounding, spread
 
 
 def _linear_response(

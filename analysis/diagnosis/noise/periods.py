@@ -73,10 +73,10 @@ def mean_spectrum(samples: FloatArray, periods: Periods) -> ComplexArray:
     return np.asarray(spectra(period_samples(samples, periods).mean(axis=0, keepdims=True))[0])
 
 
-def spectra(looks: FloatArray) -> ComplexArray:
+def spectra(periods: FloatArray) -> ComplexArray:
     """Spectra (periods, lines, channels) of samples (periods, length, channels)."""
-    length = looks.shape[1]
-    return np.asarray(np.fft.rfft(looks, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
+    length = periods.shape[1]
+    return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
 
 
 def _is_whole(recording: Recording, start: int, length: int) -> bool:

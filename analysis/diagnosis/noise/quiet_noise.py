@@ -40,9 +40,9 @@ def fast_noise_at_rest(recording: Recording, samples: FloatArray) -> FastNoise |
     variances = []
     for start, stop in _rests(recording, _WINDOW_S):
         for at in range(start, stop - length + 1, length):
-            look = samples[at : at + length]
-            if np.isfinite(look).all():
-                variances.append(np.mean(np.diff(look, n=3, axis=0) ** 2, axis=0) / _DIFFERENCE_GAIN)
+            stretch = samples[at : at + length]
+            if np.isfinite(stretch).all():
+                variances.append(np.mean(np.diff(stretch, n=3, axis=0) ** 2, axis=0) / _DIFFERENCE_GAIN)
     if not variances:
         return None
     variance: FloatArray = np.array(variances)
@@ -59,9 +59,9 @@ def rest_noise(recording: Recording, samples: FloatArray, frequency_hz: FloatArr
     powers = []
     for start, stop in _rests(recording, SETTLING_S):
         for at in range(start, stop - length + 1, length // 2):
-            look = samples[at : at + length]
-            if np.isfinite(look).all():
-                spectrum = np.fft.rfft((look - look.mean(axis=0)) * hann[:, None], axis=0)[1 : length // 2]
+            stretch = samples[at : at + length]
+            if np.isfinite(stretch).all():
+                spectrum = np.fft.rfft((stretch - stretch.mean(axis=0)) * hann[:, None], axis=0)[1 : length // 2]
                 powers.append(np.abs(spectrum) ** 2 / length)
     if not powers:
         return None

@@ -20,7 +20,7 @@ from equalizer.signals.summary import Summarised, Summary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class TimeSeries:
     """One recording, measured and predicted; channels are the response's, then the position's; all (n, c), SI."""
 
     name: str
@@ -108,7 +108,7 @@ class Findings(Summarised):
     named: tuple[PlacedEffect, ...]
     evidence: tuple[Evidence, ...]
     """Evidence of the re-tuned model, per recording."""
-    courses: tuple[Course, ...]
+    time_series: tuple[TimeSeries, ...]
     noise_rms: Mapping[str, float]
     """By channel, SI."""
     channel_errors: Mapping[str, Mapping[str, float]]

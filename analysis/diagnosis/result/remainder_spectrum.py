@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.result.findings import Course
+from analysis.diagnosis.result.findings import TimeSeries
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
 
@@ -29,14 +29,14 @@ class RemainderSpectrum:
     """NaN where it is not known."""
 
 
-def remainder_spectra(courses: Sequence[Course], floor: NoiseFloor | None) -> tuple[RemainderSpectrum, ...]:
+def remainder_spectra(time_series: Sequence[TimeSeries], floor: NoiseFloor | None) -> tuple[RemainderSpectrum, ...]:
     """One per channel, over all held-out stretches; in sixths of an octave. Empty where nothing was held out."""
-    parts = [(course, start, stop) for course in courses for start, stop in course.tested if stop - start >= 64]
+    parts = [(series, start, stop) for series in time_series for start, stop in series.tested if stop - start >= 64]
     if not parts:
         return ()
     first = parts[0][0]
     parts = [part for part in parts if part[0].channels == first.channels]
-    rate_hz = min(course.sample_rate_hz for course, _, _ in parts)
+    rate_hz = min(series.sample_rate_hz for series, _, _ in parts)
     length = min(_LENGTH, min(stop - start for _, start, stop in parts))
     lines_hz: FloatArray = np.fft.rfftfreq(length, 1 / rate_hz)[1:].astype(np.float64)
     weights = np.array([stop - start for _, start, stop in parts], dtype=float)
@@ -63,13 +63,13 @@ def remainder_spectra(courses: Sequence[Course], floor: NoiseFloor | None) -> tu
     )  # fmt: skip
 
 
-def _power(part: tuple[Course, int, int], name: str, length: int) -> FloatArray:
+def _power(part: tuple[TimeSeries, int, int], name: str, length: int) -> FloatArray:
     """(lines, channels)"""
-    course, start, stop = part
-    measured = course.measured[start:stop]
-    values = measured if name == "measured" else measured - getattr(course, name)[start:stop]
+    series, start, stop = part
+    measured = series.measured[start:stop]
+    values = measured if name == "measured" else measured - getattr(series, name)[start:stop]
     known = np.nan_to_num(values)
-    return spectral_density(known, course.sample_rate_hz, length)[1]
+    return spectral_density(known, series.sample_rate_hz, length)[1]
 
 
 def _noise_power(floor: NoiseFloor | None, lines_hz: FloatArray, rate_hz: float, channels: int) -> FloatArray:

@@ -9,7 +9,7 @@ from equalizer.signals.signal import FloatArray
 
 TAPS, PHASES = 32, 256
 BETA = 8.0
-"""Of the Kaiser window: ripple of 1e-4 up to 0.42 of the sample rate."""
+"""Shape parameter of the Kaiser window: ripple of 1e-4 up to 0.42 of the sample rate."""
 
 
 def read_other_times(response: FloatArray, per_sample: float, offset: float, straight: float = 0.0) -> FloatArray:

@@ -24,9 +24,9 @@ _SPARE = 8
 def local_noise(command: ComplexArray, response: ComplexArray) -> FloatArray:
     """(lines, p): expected |error|² of the response. command: (lines, m), response: (lines, p); NaN for too few.
 
-    Noise of a spectrum of which there is only one look: what a smooth response and a smooth transient leave unexplained
-    in a window of neighbouring lines (the local polynomial method of Schoukens, Vandersteen, Barbé and Pintelon, 2009).
-    Where a resonance is narrower than the window the figure is too large, never too small.
+    Noise of a spectrum of which there is only one period: what a smooth response and a smooth transient leave
+    unexplained in a window of neighbouring lines (the local polynomial method of Schoukens, Vandersteen, Barbé and
+    Pintelon, 2009). Where a resonance is narrower than the window the figure is too large, never too small.
     """
     lines, m = command.shape
     unknowns = 2 * m + 3
@@ -185,7 +185,7 @@ def _whole_periods(recording: Recording, segment: Segment) -> tuple[list[int], i
 
 
 def _spectra(samples: FloatArray, starts: Sequence[int], length: int) -> ComplexArray:
-    """Spectra (looks, lines, channels), one look per start."""
-    looks = np.stack([samples[start : start + length] for start in starts])
-    looks = looks - looks.mean(axis=1, keepdims=True)
-    return np.asarray(np.fft.rfft(looks, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
+    """Spectra (periods, lines, channels), one period per start."""
+    periods = np.stack([samples[start : start + length] for start in starts])
+    periods = periods - periods.mean(axis=1, keepdims=True)
+    return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)

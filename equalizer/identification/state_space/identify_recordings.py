@@ -97,8 +97,8 @@ def _has_repeats(recordings: Sequence[Recording]) -> bool:
     In a single period, or in windows, transient and leakage look like lightly damped resonances, so that poles are not
     relaxed on their evidence. Noise estimated from the scatter of the lines does not tell the cause of a misfit either.
     """
-    looks = periodic_experiments(recordings)
-    return bool(looks.experiments) and all(experiment.looks > 1 for experiment in looks.experiments)
+    found = periodic_experiments(recordings)
+    return bool(found.experiments) and all(experiment.periods > 1 for experiment in found.experiments)
 
 
 def _remove_transients(

@@ -187,13 +187,13 @@ def _spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArra
     """Amplitude density in twelfths of an octave, with its standard error."""
     length = min(2 * _FREQUENCY_LINES, len(signal))
     lines_hz, power = spectral_density(signal, rate_hz, length)
-    looks = max(1.0, 1.5 * len(signal) / length)
+    stretches = max(1.0, 1.5 * len(signal) / length)
     edges = np.geomspace(lines_hz[1], lines_hz[-1], int(12 * np.log2(lines_hz[-1] / lines_hz[1])) + 1)
     which = np.digitize(lines_hz[1:], edges)
     groups = [power[1:][which == k] for k in np.unique(which)]
     at = np.array([float(np.exp(np.mean(np.log(lines_hz[1:][which == k])))) for k in np.unique(which)])
     mean = np.array([float(np.sqrt(group.mean())) for group in groups])
-    return at, mean, mean / 2 / np.sqrt(looks * np.array([len(group) for group in groups]))
+    return at, mean, mean / 2 / np.sqrt(stretches * np.array([len(group) for group in groups]))
 
 
 def _strongest(sites: tuple[int, ...], force: FloatArray) -> int:

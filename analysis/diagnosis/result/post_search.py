@@ -29,7 +29,7 @@ WHERE = "the look at where it sits"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Looks:
+class Examination:
     evidence: tuple[Evidence, ...]
     """Evidence of the re-tuned model."""
     local: Localisation
@@ -37,13 +37,13 @@ class Looks:
     black_box: BlackBox | None
 
 
-def looks_of(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Looks:
+def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examination:
     """floor: of the first recording."""
     context, found = result.context, result.found
     measure, tuning, stages = context.whole, context.tuning, found.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
-    look = partial(find_entry_point, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])
-    entry = context.guard.part(WHERE, "its work", look, None)
+    entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])
+    entry = context.guard.part(WHERE, "its work", entry_search, None)
     # What is the same fit is looked at once.
     fits = {id(fitted): stage for stage, fitted in stages.items()}
     tied = [
@@ -60,7 +60,7 @@ def looks_of(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Looks:
     *each, signatures, box, distortions = context.guard.parts(context.map_, pieces)
     by_fit = dict(zip(fits, each, strict=True))
     states = {stage: by_fit[id(fitted)] for stage, fitted in stages.items()}
-    return Looks(evidence, Localisation(states, entry, distortions), signatures, box)
+    return Examination(evidence, Localisation(states, entry, distortions), signatures, box)
 
 
 def _black_box(context: SearchContext, found: Explanation) -> BlackBox | None:
