@@ -229,15 +229,16 @@ def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
     commands: FloatArray, ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
 ) -> None:  # fmt: skip
-    """Motion under forces. rows: (n stride, s + r ...): what commands add to the state over a step and to the
-    ports' accelerations at its start; a sample's first row becomes the state before it and the forces (r,) just
-    then. commands: (n stride, m), or (0, 0) where no law sees them. ports: (PORT_ROWS, r) and state: (s,) become
-    those of the end.
+    """Motion under forces; rows, ports and state are overwritten.
 
-    places: (items, 6) law, port, begin and end in `numbers`, begin and end in `memory`. step: how the state advances,
-    the ports' positions and velocities (2 r, s), where laws ask with accelerations (3 r, s), what forces do to the
-    state (r, s), and `per_newton`. count: steps per sample; stride, which is 1 where commands are held over all of
-    them, else so many; the first sample's number.
+    rows: (n stride, s + r ...), contribution of the commands to the state over a step and to the ports' accelerations
+    at its start; a sample's first row becomes the state before it and the forces (r,) at that instant. commands: (n
+    stride, m), or (0, 0) where no law reads them. ports: (PORT_ROWS, r) and state: (s,) become those of the end.
+
+    places: (items, 6) law, port, begin and end in `numbers`, begin and end in `memory`. step: matrix that advances the
+    state; output matrix of the ports' positions and velocities (2 r, s), with accelerations (3 r, s) where a law reads
+    them; effect of the forces on the state (r, s); and `per_newton`. count: steps per sample; stride (1 where commands
+    are held over all steps, else the number of steps); number of the first sample.
     """
     advance, output, by_force, per_newton = step
     steps, stride, begun = count

@@ -25,10 +25,11 @@ def period_variance(residuals: ComplexArray) -> FloatArray:
 
 
 def line_scatter(response: ComplexArray) -> FloatArray:
-    """Expected |error|² per entry, from third differences between neighbouring lines, which a smooth curve lacks.
+    """Expected |error|² per entry, from third differences between neighbouring lines, which are small for a smooth
+    curve.
 
-    Catches what repeats exactly, too (friction in a sweep). Where resonances are as narrow as the lines are apart it is
-    too large. response: (lines, ...). NaN everywhere for less than five lines.
+    Includes distortion that repeats exactly (friction in a sweep). Too large where resonances are as narrow as the line
+    spacing. response: (lines, ...). NaN everywhere for less than five lines.
     """
     if len(response) < 5:
         return np.full(response.shape, np.nan)

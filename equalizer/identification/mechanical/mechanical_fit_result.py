@@ -62,22 +62,22 @@ class ChannelError:
     """Error of a free simulation of the held-out samples, started from the state that fits best; None without such
     samples."""
     noise: float | None
-    """From period to period; None where nothing repeats."""
+    """Noise: rms of the differences between periods; None where nothing repeats."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MechanicalFit:
     model: MechanicalModel
-    """Its first coordinates are the motions of the driven axes, in the commands' order."""
+    """The fitted model. Its first coordinates are the motions of the driven axes, in the commands' order."""
     errors: tuple[ChannelError, ...]
     """One per response channel."""
     error: float
-    """Over all channels, on the fitted segments."""
+    """Error over all channels, on the fitted segments."""
     held_out: float | None
     noise: float | None
     band_hz: tuple[float, float]
     tried: tuple[OrderTried, ...]
     reason: str
-    """Why these coordinates and no more, in a sentence."""
+    """Reason for the number of coordinates, as a sentence."""
     remarks: tuple[str, ...]
-    """Sentences: what was assumed, what could not be told."""
+    """Sentences: assumptions, and what the recordings do not determine."""

@@ -1,8 +1,8 @@
-"""Banded feedforward from two models of one place, a narrow exact one and a wide one, row by row.
+"""Banded feedforward from two models of the same place: an accurate narrow one and a wide one.
 
-Below the narrow model's band a rigid one that is fitted to its lowest lines, in its band the narrow model, above it
-the wide one's response along one direction. The run-in and run-out of the outer bands are no rows of a table and are
-cut off; the middle band is solved for the rows alone, and for what the cut forces leave to it.
+Below the narrow model's band, a rigid model fitted to its lowest lines is used; in its band, the narrow model; above
+it, the wide model's response along one direction. The outer bands' run-in and run-out are no rows of the table and are
+cut off; the middle band is solved for the rows alone, for the acceleration that the cut forces leave.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,8 @@ from equalizer.tracking.lqr.padding import band_error, simulate_from_rest
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 RIGID_OCTAVES = 0.6
-"""Above the lower end of the narrow band, where the rigid model is fitted: below the first resonance."""
+"""Width in octaves of the lowest part of the narrow band to which the rigid model is fitted: below the first
+resonance."""
 RIGID_LINES = 30
 LEAST_REACH = 2.0
 """Least ratio of the two bands' upper ends: a high band with a single direction needs an octave."""
@@ -40,7 +41,7 @@ BINS_PER_OCTAVE = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwoModels:
-    """Raises ValueError where they are not one within the other, with room for a band above."""
+    """A narrow and a wide model. Raises ValueError unless the bands overlap and leave room for a band above."""
 
     narrow: IdentifiedModel
     wide: IdentifiedModel
@@ -65,27 +66,28 @@ class TwoModels:
 class BandFacts:
     edges_hz: tuple[float, float]
     cut_error: float
-    """In the middle band, were run-in and run-out only cut off."""
+    """Error in the middle band if the run-in and run-out were only cut off."""
     whole_error: float
-    """Likewise, were they played."""
+    """Error in the middle band if the run-in and run-out were played."""
     level_error: float | None
-    """Of the high band's level, by sixths of an octave, of the rows alone; None where nothing is wanted there."""
+    """Error of the high band's level by sixths of an octave, of the table's rows; None where nothing is wanted in this
+    band."""
     direction: tuple[float, ...]
-    """Of the high band's force."""
+    """Unit vector of the high band's force."""
     travel_m: float
-    """How far the low band moves the handle."""
+    """Largest displacement of the handle by the low band."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedFeedforward:
     feedforward: Feedforward
-    """`error`: in the middle band, by the narrow model."""
+    """Forces of all bands; their `error` is that in the middle band, by the narrow model."""
     facts: BandFacts
 
 
 def banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardSettings) -> BandedFeedforward:
-    """Raises ForceLimitError above the cap, TrackingError where nothing is wanted in the middle band or the cap leaves
-    no solution, ValueError for a signal or a weight that does not fit."""
+    """Solve for the forces of all bands. Raises ForceLimitError above the cap, TrackingError where nothing is wanted in
+    the middle band or the cap leaves no solution, ValueError for an unsuitable signal or weight."""
     check_wanted(models.narrow, wanted)
     check_wanted(models.wide, wanted)
     equalizer, rate_hz = banded_equalizer(models, settings.weight), wanted.sample_rate_hz

@@ -2,7 +2,7 @@
 
 The feedforward of the trajectory ahead is linear in the direction, and the gains do not depend on it: both are stored,
 and a new direction costs a combination of nine numbers per axis. Each tick solves the rest of the trajectory exactly.
-Transients that overlap: a LiveState each, forces added. A transient that replaces another: `restart`.
+Overlapping transients have a LiveState each, and their forces are added. `restart` replaces a transient by another.
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class LiveState:
     tick: int
     """The row that comes next."""
     x: FloatArray
-    """(n,): the model's state"""
+    """(n,): the state of the model."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,9 +45,9 @@ class TurningResult:
     forces: FloatArray
     """(T, m)"""
     predicted: FloatArray
-    """(T, p): what the model answers"""
+    """(T, p): the model's response."""
     state: LiveState
-    """After the last of these rows."""
+    """State after the last of these rows."""
 
 
 def turning_transient(gains: StoredGains, trajectory: FloatArray) -> TurningTransient:
@@ -67,8 +67,7 @@ def initial_state(transient: TurningTransient) -> LiveState:
 
 
 def restart(state: LiveState) -> LiveState:
-    """State in which the first row comes next, from the present motion: the former transient's free decay is
-    compensated."""
+    """State at the first row, from the present motion: the former transient's free decay is compensated."""
     return LiveState(0, state.x)
 
 

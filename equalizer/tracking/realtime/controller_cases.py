@@ -13,7 +13,7 @@ OF_CAP = 0.9
 """Largest force of a case over the cap, because the cap is not compared."""
 
 NO_FORCE = 1e-12
-"""Of the cap: what a comparison allows as a difference. A way whose largest force is below it is none."""
+"""Tolerance of a comparison, relative to the cap. A way whose largest force is below it counts as zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,7 +21,7 @@ class ControllerCases:
     """T ticks of transient and stream, from rest."""
 
     rotations: FloatArray
-    """(T, p, p): one that wanders, and no rotation alone: the level changes with it."""
+    """(T, p, p): directions that change over time and are not only rotations: the level changes too."""
     transient_forces: FloatArray
     """(T, m)"""
     wanted: FloatArray
