@@ -41,6 +41,6 @@ EFFECT = Effect(
     ),
     acts=Structure(_change),
     starts=_starts,
-    # Only oscillators of one axis, and not those damped so little that they ring (`extra_mode`).
+    # An extra mode is the special case of one axis and light damping.
     simpler=("extra_mode",),
 )

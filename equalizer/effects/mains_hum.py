@@ -31,7 +31,7 @@ def _add_tone(response: FloatArray, sample_rate_hz: float, channels: tuple[int, 
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Frequencies of the line that all channels share, between 45 and 65 Hz and anywhere, with this channel's amplitude
+    """Starting values: the line that all channels share, between 45 and 65 Hz and anywhere, with this channel's amplitude
     and phase."""
     residual = (evidence.response - evidence.predicted) * evidence.used[:, None]
     power = np.sum(np.abs(np.fft.rfft(residual / evidence.noise, axis=0)) ** 2, axis=1)

@@ -20,7 +20,7 @@ class Law:
     numbers: tuple[float, ...]
     """Values of p0, p1, … in SI units."""
     units: tuple[str, ...]
-    """Standard errors of the numbers; empty where not known."""
+    """Units of the numbers; empty where not known."""
     acts_on: ActsOn
     """What the law acts on. force: it is added to the force at the axis; command, response: it replaces that of the
     axis."""

@@ -74,7 +74,7 @@ def _mass(name: str) -> EffectParameter:
 
 
 MATRIX_UNITS = {"mass": _mass("mass"), "damping": _damping("damping"), "stiffness": _stiffness("stiffness")}
-"""Which of a model's matrices."""
+"""Units of the entries of a model's matrices."""
 
 
 def matrix_unit(part: str, system: UnitSystem) -> str:

@@ -26,7 +26,7 @@ _QUANTITY = {word: quantity for quantity, words in QUANTITY_WORDS.items() for wo
 _LARGE, _SMALL = "A-ZÀ-ÖØ-Þ", "a-zß-öø-ÿ"
 _WORD = re.compile(f"[{_LARGE}]?[{_SMALL}]+|[{_LARGE}]+(?![{_SMALL}])")
 _OF_ANGLE = "rate"
-"""Words for a derivative behind an angle: `yaw rate`."""
+"""Word for a derivative behind an angle: `yaw rate`."""
 _OF_ANOTHER = frozenset(
     ["dot", "ddot", "d", "delta", "diff", "rate", "error", "gyro", "pedal", "time", "ratio", "mode", "limit"]
 )

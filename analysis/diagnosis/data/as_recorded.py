@@ -12,7 +12,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 ADDED_MASS, ADDED_INERTIA = "added_mass_kg", "added_inertia_kg_m2"
-"""Keys of a recording's `meta`: along every driven axis, beside what the model has."""
+"""Keys of a recording's `meta`: mass or inertia that the device carried along every driven axis, beside the model's."""
 
 
 def add_carried_weight(model: MechanicalModel, recording: Recording) -> MechanicalModel:
@@ -27,8 +27,8 @@ def add_mass(model: MechanicalModel, added: float) -> MechanicalModel:
 
 
 def under_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> tuple[PlacedEffect, ...]:
-    """The effects, those that depend on conditions with the recording's; what is missing of these is interpolated.
-    Without recorded conditions such effects stay as they are, and cannot be simulated."""
+    """The effects with the recording's conditions, for those that depend on conditions; missing samples of these are
+    interpolated. Without recorded conditions such effects are not changed, and cannot be simulated."""
     signal = recording.condition
     if signal is None or all(placed.effect.with_conditions is None for placed in effects):
         return tuple(effects)

@@ -13,7 +13,7 @@ def growth_rate(model: MechanicalModel) -> float:
 
 
 def free_motion_rates(model: MechanicalModel) -> ComplexArray:
-    """(2 coordinates,): eigenvalues of the model, 1/s; those of oscillations come in pairs."""
+    """(2 coordinates,): eigenvalues of the model, 1/s; complex ones come in conjugate pairs."""
     n = model.coordinates
     motion = np.block(
         [

@@ -1,7 +1,8 @@
 """Error measure for impacts: the power of each channel in each band and segment, because waveforms are unpredictable.
 
-The logarithm of the amplitude in half octaves (Welch's spectra over 1 s), the noise counted in. Two motions of a device
-that rattles, apart at first by less than any sensor sees, agree in it to a few per cent.
+The logarithm of the amplitude in half octaves (Welch's spectra over 1 s), the noise counted in. Two simulations of a
+rattling device whose initial states differ by less than any sensor resolves agree in it to a few per cent, while their
+waveforms do not (chaos).
 """
 
 from collections.abc import Sequence
@@ -19,18 +20,18 @@ from equalizer.signals.spectral_density import spectral_density
 
 WINDOW_S, OCTAVES = 1.0, 0.5
 LOWEST, HIGHEST = 2.0, 0.48
-"""Edges of the bands: over a window's own line, and over the rate."""
+"""Edges of the bands, relative to a window's own line, and relative to the sample rate."""
 LONGEST_S, LEAST = 8.0, 256
-"""Length of a stretch without segments at most, and samples of any stretch at least."""
+"""Longest stretch without segments, and least samples of any stretch."""
 HEARD = 4.0
-"""Power of a band over the noise's, from which on it counts."""
+"""Least ratio of a band's power to the noise's."""
 PARTS = ("fit", "choose", "test")
 Residuals = tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Samples of one record that count for one purpose."""
+    """Samples of one record with one role (fit, choose or test)."""
 
     record: int
     first: int

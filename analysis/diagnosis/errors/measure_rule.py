@@ -1,17 +1,21 @@
 """The rule by which the error measure of recordings and a model is chosen.
 
-Free simulation, from rest by the commands alone, is the strictest: nothing measured helps it. It cannot be asked of
+Free simulation, from rest by the commands alone, is the strictest test, because no measurement corrects it. It is not
+suitable for
 
-* a plant in closed loop that does not hold itself: the command then contains what the controller did about the very
-  physics that is missing. Where positions or velocities were measured, forces are compared instead: the one that
-  entered against the one that the model needs along the measured motion; where only accelerations were, windows;
-* a plant whose motion grows by itself within a window, as a levitated body or a pendulum on its head: it was recorded
-  under control, whether that shows or not, and is compared likewise;
-* a plant that integrates freely, whose slowest motion takes longer to die out than a third of the recording: any small
-  error grows without end. It is simulated in windows of 1 s or longer, each from a state estimated from the measured
-  motion, or, where no state can be estimated, compared by forces;
-* a recording that does not begin at rest: what its beginning left behind dies out, so its first seconds are left out;
-  where that would be more than a quarter of it, windows, too.
+* a plant in closed loop that is not stable by itself: its command contains the controller's reaction to the missing
+physics. Where positions or velocities were measured, the force that entered is compared with the force that the model
+needs along the measured motion; with accelerations only, windows are used;
+
+* a plant that is unstable within a window, such as a levitated body or an inverted pendulum: it was recorded under
+control, whether the data show it or not, and is compared likewise;
+
+* a plant without restoring force (integrator), whose slowest motion takes longer to decay than a third of the
+recording: any small error grows without bound. It is simulated in windows of 1 s or longer, each from a state estimated
+from the measured motion, or, where no state can be estimated, compared by forces;
+
+* a recording that does not begin at rest: the initial motion decays, so its first seconds are left out; where that
+would be more than a quarter of the recording, windows are used.
 """
 
 from collections.abc import Sequence
@@ -66,11 +70,11 @@ NOT_AT_REST = (
 class Choice:
     measure: Measure
     why: str
-    """A sentence for the reader; empty for a free simulation."""
+    """A sentence for the user; empty for a free simulation."""
 
 
 def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choice:
-    """The rule of this module's first lines."""
+    """Select the measure by the rule in the module's docstring."""
     longest_s = max(len(record.command) / record.recording.sample_rate_hz for record in records)
     holds, motion = is_self_stable(model, longest_s), all(has_motion(record.recording, model) for record in records)
     if motion and any(is_quasi_static(record.recording) for record in records):
@@ -92,12 +96,13 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
 
 
 def is_self_stable(model: MechanicalModel, longest_s: float) -> bool:
-    """Whether all motion dies out well within a recording (so that no pole is at or near the unit circle)."""
+    """Whether all free motion decays well within a recording (no pole at or near the stability limit)."""
     return _slowest_decay_rate(model) * DIES_OUT_SHARE * longest_s > 1
 
 
 def samples_to_settle(record: Observed, model: MechanicalModel) -> int:
-    """Samples to leave out at the beginning, where that is in motion and short; 0 = none."""
+    """Samples to leave out at the beginning, where the recording begins in motion and that takes a short time; 0 =
+    none."""
     after = _settling_samples(record, model)
     if after > MOST_LEFT_OUT * len(record.command) or not _begins_moving(record):
         return 0

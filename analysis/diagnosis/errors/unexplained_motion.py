@@ -10,7 +10,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 EXPECTED = 0.1
-"""Rms of a missing force, as a share of the command's."""
+"""Expected rms of a missing force, relative to the command's."""
 
 
 def evidence_of(
@@ -47,8 +47,8 @@ def evidence_of(
 
 
 def without_gaps(measured: FloatArray, left: FloatArray, played: SimulationResult) -> tuple[FloatArray, FloatArray]:
-    """Measured and predicted signals, (n, c) each, without gaps: where nothing was measured, both are the simulation,
-    so that they do not differ."""
+    """Measured and predicted signals, (n, c) each, without gaps: missing samples are replaced by the simulation in
+    both, so that their difference is zero."""
     known = np.isfinite(measured)
     course = np.hstack([played.response, played.position])[:, : measured.shape[1]]
     predicted = np.where(known, measured - left, course)

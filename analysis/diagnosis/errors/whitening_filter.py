@@ -1,7 +1,7 @@
-"""Prewhitening filter: an autoregression of the residual that a re-tuned model leaves of a device in order.
+"""Prewhitening filter: an autoregression of the residual that a re-tuned model leaves on reference recordings.
 
-The whitened residual is the one-step prediction error (Yule 1927, Walker 1931): each frequency is weighted by the
-inverse of the residual's spectrum on a device in order.
+The whitened residual is the one-step prediction error of an AR(p) model (Yule 1927, Walker 1931): each frequency is
+weighted by the inverse of the residual's spectrum on the reference recordings.
 """
 
 from collections.abc import Sequence
@@ -16,9 +16,9 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 MOST_LAGS, SAMPLES_PER_LAG = 64, 50
-"""Largest order of the autoregression, and samples per lag."""
+"""Largest order of the autoregression, and least samples per lag."""
 FLAT = 1e-4
-"""White part added to the power, as a share of it: bounds the weight of any frequency."""
+"""White noise added to the power, as a share of it: bounds the weight of any frequency."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,15 +18,15 @@ from equalizer.signals.band_limited import filter_low_pass, low_pass_gain
 from equalizer.signals.signal import FloatArray, Signal
 
 KNOWN = 0.01
-"""Relative uncertainty of an actuator's force at best, counted as noise."""
+"""Relative uncertainty of an actuator's force at best; it counts as noise."""
 NOISE_SHARE = 0.02
-"""Noise that the motion's noise may cause in the force, over the force's rms; differentiation amplifies it."""
+"""Largest force noise due to the motion's noise, relative to the force's rms; differentiation amplifies it."""
 WIDEST, NARROWEST = 0.2, 0.002
-"""Bands, over the sample rate."""
+"""Band ends that are tried, relative to the sample rate."""
 REACH = 10.0
-"""End of the band at most, over the frequency below which half of the force's power lies."""
+"""Largest end of the band, relative to the frequency below which half of the force's power lies."""
 UNKNOWN = 1e-4
-"""Noise of the motion over its rms, assumed where it is not known."""
+"""Noise of the motion relative to its rms, assumed where it is not known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +52,8 @@ def force_views(
         views.append(view)
         seen.append(_floor(model, motion, floor, band_hz))
     forces = np.vstack([view.measured for view in views])
-    # The forces are not all noise, however little an unsuitable model makes of the motion; those of an idle axis are.
+    # An unsuitable model overestimates the noise, so it is limited to the strongest force; on an idle axis it may exceed
+    # the force.
     noise = np.minimum(np.fmin.reduce([view.response_rms for view in seen]), np.std(forces, axis=0).max())
     noise = np.asarray(np.hypot(noise, KNOWN * np.sqrt(np.mean(forces**2, axis=0))))
     rate_hz = records[0].recording.sample_rate_hz

@@ -16,7 +16,7 @@ _NEARLY_STILL_HZ = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NeededForce:
-    """All (n, m), within a band."""
+    """Needed force and axis motion within a band; each (n, m)."""
 
     force: FloatArray
     axis_position: FloatArray
@@ -29,7 +29,7 @@ class BandMotion:
     """A measured motion and its derivatives within a band, from which every model's force is computed."""
 
     position: FloatArray
-    """(n, m): as measured, finite, of the model's first m outputs' rows."""
+    """(n, m): positions of the model's first m outputs, as measured, finite."""
     sample_rate_hz: float
     band_hz: float
     at: tuple[FloatArray, FloatArray, FloatArray]
@@ -57,7 +57,7 @@ def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> 
 
 
 def needed_force(model: MechanicalModel, motion: BandMotion) -> NeededForce:
-    """Mean force over one sample period around each instant, without actuator, sensor and effects. Raises
+    """Mean of the needed force over one sample period around each instant, without actuator, sensor and effects. Raises
     numpy.linalg.LinAlgError where the first m outputs do not determine the model's motion."""
     if model.coordinates == model.inputs:
         return _force_of_square_model(model, motion)
@@ -77,7 +77,7 @@ def needed_force(model: MechanicalModel, motion: BandMotion) -> NeededForce:
 
 
 def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> NeededForce:
-    """For a model whose every coordinate is measured: no spectrum has to be computed again."""
+    """For a model whose every coordinate is measured: the derivatives suffice, without another Fourier transform."""
     moved = np.linalg.inv(model.output[: model.inputs])
     pushed = np.linalg.inv(model.input)
     matrices = model.stiffness, model.damping, model.mass
@@ -90,7 +90,8 @@ def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> Needed
 
 
 def _force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
-    """(n, 4 m): of the straight line between the first and the last position, after which all has settled."""
+    """(n, 4 m): needed force and motion for the straight line between first and last position, in the steady state. The
+    Fourier transform is applied to the rest only."""
     m = model.inputs
     line = end_to_end_line(position)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz

@@ -18,10 +18,10 @@ from equalizer.signals.band_limited import filter_low_pass
 from equalizer.signals.signal import FloatArray
 
 EDGE = 0.5
-"""Periods of the band's end."""
+"""Length of the distorted edge, in periods of the band's end."""
 _Found = TypeVar("_Found")
 WEAKEST = 1e-3
-"""Force of an actuator over its command at least, in rms."""
+"""Least ratio of an actuator's force to its command, in rms."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,19 +29,19 @@ class PredictedForce:
     """For a plant in closed loop, whose command depends on the response, and for one that drifts freely."""
 
     records: tuple[Observed, ...]
-    """Views: their `measured` is the force that entered, as far as it lies within the band."""
+    """Records whose `measured` is the force that entered, within the band."""
     motions: tuple[BandMotion, ...]
-    """Per record: of the model's first m outputs, as measured."""
+    """Per record: measured motion of the model's first m outputs."""
     unit: FloatArray
     noise: FloatArray
-    """(m,): rms of what the noise of the motion makes in the force."""
+    """(m,): rms of the force noise due to the noise of the motion."""
     band_hz: float
     name: str = "predicted force"
     known: tuple[PlacedEffect, ...] = ()
-    """What the model's own file names: it is part of every simulation."""
+    """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
     remembered: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
-    """Cache by kind and record of the last inputs and result: laws are compared on one model, models on one command."""
+    """Last inputs and result by kind and record: laws are compared on one model, models on one command."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
@@ -70,7 +70,7 @@ class PredictedForce:
         return replace(cut, fit=cut.fit & inside, choose=cut.choose & inside)
 
     def can_observe(self, effect: Effect) -> bool:
-        """Whether the effect changes forces; effects of sensors do not, for the reading is taken for the motion."""
+        """Whether the effect changes forces. Effects of sensors do not, because the reading is used as the motion."""
         return isinstance(effect.acts, (Structure, AxisForce, OnCommand))
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
@@ -98,11 +98,11 @@ class PredictedForce:
         pushing = entered.within - (needed.force + ahead) / 2
         effects = under_conditions(effects, record.recording)
         added = force_along(structure, effects, axis_motion, (record.command, pushing), rate_hz)
-        # Both are means over the step that begins at a sample; the needed force is that around it.
+        # Both are means over the step that begins at a sample; the needed force is the mean around the sample.
         total = entered.around
         if added.any():
             total = total + filter_low_pass(added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
-        # A weaker actuator must not make every error smaller.
+        # Scaled back by the actuator's gain: a weaker actuator must not make every error smaller.
         strength = _rms(record.command)
         weaker = strength / np.maximum(_rms(entered.force), WEAKEST * strength + np.finfo(float).tiny)
         return _Balance(needed, (total - needed.force) * weaker, total)
@@ -150,7 +150,7 @@ def edge_samples(sample_rate_hz: float, band_hz: float) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ActuatorForce:
-    """(n, m) each: the force that entered, mean over the step that begins at a sample; within the band; and there, as
+    """Two arrays (n, m) of the force that entered: mean over the step that begins at a sample; and, within the band,
     the mean around the sample."""
 
     force: FloatArray
@@ -162,10 +162,10 @@ class _ActuatorForce:
 class _Balance:
     needed: NeededForce
     left: FloatArray
-    """(n, m): what entered, effects included, less what the motion needed; as if the actuator were as strong as it is
-    said to be."""
+    """(n, m): force that entered, effects included, less the force that the motion needed; scaled to the actuator's
+    nominal gain."""
     total: FloatArray
-    """(n, m): what entered, effects included."""
+    """(n, m): force that entered, effects included."""
 
 
 def _rms(samples: FloatArray) -> FloatArray:

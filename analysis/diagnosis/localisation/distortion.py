@@ -1,5 +1,5 @@
 """Nonlinear distortion by kind (odd, even, varying), from repeats and from silent lines of a periodic excitation, by
-channel, input, level and band. `Distortions.remarks` say which kinds the recording cannot show."""
+channel, input, level and band. `Distortions.remarks` names the kinds that the recording cannot show."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
 Kind = Literal["odd", "even", "either", "varying"]
-"""Odd and even distortion; distortion of either kind where even lines were driven; what differs between periods beyond
-the noise."""
+"""Odd and even distortion; distortion of either kind where even lines were driven; variation between periods beyond the
+noise."""
 
 
 class _Where(NamedTuple):
@@ -33,7 +33,7 @@ class _Where(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Distortion:
-    """One kind in one cell."""
+    """One kind of distortion in one cell."""
 
     output: str
     quantity: str
@@ -43,19 +43,19 @@ class Distortion:
     amplitude: float
     band_hz: Band
     whole_band: bool
-    """True: all that was driven, not one octave of it."""
+    """True: the whole driven band; False: one octave of it."""
     kind: Kind
     rms: float
     """Rms distortion in the output's unit, over all lines of the band that this kind reaches; 0 where not above the
     noise."""
     limit_rms: float
-    """Detection limit."""
+    """Detection limit, rms in the output's unit."""
     signal_rms: float
-    """The response on the driven lines."""
+    """Rms response on the driven lines."""
     p_value: float
-    """Chance of as much from noise alone."""
+    """p-value: probability of such a value from noise alone."""
     lines: int
-    """Number of lines that it was measured on."""
+    """Number of lines that were evaluated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ def _kinds(spectrum: SegmentSpectrum, channel: int, inside: Mask, where: _Where,
         beyond = excess(power[chosen], error[chosen], freedom)
         found.append((kind, beyond, reached / chosen.sum(), int(chosen.sum())))
     if spectrum.count > 1:
-        # Each line is known from count - 1 differences.
+        # Each line has count - 1 differences between periods.
         seen = np.repeat(spectrum.spread[inside, channel], spectrum.count - 1)
         beyond = excess(
             seen, np.repeat(spectrum.floor[inside, channel], spectrum.count - 1), float(spectrum.floor_freedom[channel])
@@ -137,7 +137,7 @@ def _kinds(spectrum: SegmentSpectrum, channel: int, inside: Mask, where: _Where,
 
 
 def _detection_masks(spectrum: SegmentSpectrum, inside: Mask) -> list[tuple[Kind, Mask, int]]:
-    """Kinds of detection lines, those in the band, and how many lines of the band that kind of distortion reaches."""
+    """Kinds of distortion with their lines in the band, and the number of lines of the band that each kind reaches."""
     numbers = np.arange(1, len(inside) + 1)
     multiple = inside & (numbers % spectrum.lines.step == 0)
     odd = numbers // spectrum.lines.step % 2 == 1

@@ -42,8 +42,8 @@ def residual_spectra(
     model_error: float = 0.01,
 ) -> ResidualSpectra | None:
     """Spectra of mean periods; of windows of two seconds where nothing is periodic. None where there is neither, or the
-    noise is not known. used: (n,), the samples that count. model_error: share of the response on each line that the
-    model is not trusted for, counted as noise: else what re-tuning leaves on other axes passes for a second force."""
+    noise is not known. used: (n,), the samples that count. model_error: share of the response on each line that counts
+    as noise: otherwise residuals of the re-tuned model on other axes would appear as a second force."""
     left = [recording.response.samples - prediction.response]
     noises = [floor.response]
     if recording.position is not None and prediction.position is not None and floor.position is not None:
@@ -93,7 +93,8 @@ def _windows(recording: Recording, whole: Mask) -> list[Periods]:
 
 
 def _response_power(recording: Recording, periods: Periods, position: bool) -> FloatArray:
-    """(lines, channels): squared magnitudes; a channel counts for a tenth of the loudest of its signal at least."""
+    """(lines, channels): squared magnitudes; a weak channel counts with a tenth of the strongest channel of its
+    signal."""
     signals = [recording.response, *([recording.position] if position and recording.position is not None else [])]
     parts = []
     for signal in signals:

@@ -14,7 +14,8 @@ used."""
 LARGEST_REST = 1e-12
 """Largest residual coupling between the pairs that is neglected."""
 NEARLY_ONE = 1e-3
-"""Cosine above which the two directions of a pair count as parallel; they are replaced by a basis of their plane."""
+"""Ratio of the singular values of a pair's two directions below which they count as parallel; they are then replaced by
+a basis of the invariant plane."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -99,7 +99,7 @@ def _simulate_motion(
     axes: bool = True,
     restarts: Restarts | None = None,
 ) -> SimulationResult:
-    """The response before the sensor."""
+    """The simulation without the sensor."""
     bodies, (rate_hz, hold) = bodies_of(model, effects), sampled
     moves = moves_between_samples(model, effects, hold)
     steps = max((acts.steps for acts in bodies.acts), default=STEPS if moves else 1)

@@ -70,7 +70,7 @@ def fit_square_law(evidence: Evidence, site: int) -> tuple[float, float] | None:
     whole = first + second * peak
     if gained < LEAST_SHARE or whole <= 0:
         return None
-    # Where the force differs from the command even for the smallest commands, a gain error acts besides.
+    # Where force and command agree at no amplitude within the range, there is a gain error besides.
     agrees = (1 - first) / second if second else 0.0
     share, reference = (1 - first, agrees) if 0 < agrees < 10 * peak else (second * peak / whole, peak)
     return (share, reference) if share and -1 <= share <= 1 else None

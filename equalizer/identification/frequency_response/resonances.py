@@ -28,7 +28,7 @@ class ResonanceSearch:
 @dataclass(frozen=True, slots=True)
 class Resonance:
     frequency_hz: float
-    """Damping ratio of the fitted mode."""
+    """Natural frequency of the fitted mode."""
     frequency_interval_hz: tuple[float, float]
     """95 % interval, from resampled noise."""
     damping_ratio: float

@@ -37,7 +37,7 @@ class RigidBody:
     of_friction: FloatArray
     """(m,), the equivalent damping of friction: at forces far above friction the damping is lower by it."""
     tolerance: Tolerance
-    """Natural frequencies of the whole model without it."""
+    """Tolerance of the whole model without the equivalent damping."""
 
 
 def fit_rigid_body(

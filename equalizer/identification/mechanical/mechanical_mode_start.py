@@ -31,7 +31,7 @@ class ModeStart:
     unknowns: FloatArray
     frequency_hz: float
     explained: float
-    """Share of the residual sum of squares that the mode explains, to first order in its mass."""
+    """Part of the residual sum of squares that the mode explains, to first order in its mass."""
 
 
 def mode_starts(

@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 _LEAST_EIGENVALUE = 0.05
 _DELAYS = 33
 _MOST_DELAY_CYCLES = 8.0
-"""Upper end of the first fit, as a share of the highest line."""
+"""Longest delay that is tried, in periods of the highest line."""
 
 
 def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: float) -> tuple[Structure, FloatArray]:

@@ -16,7 +16,7 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.signal import FloatArray
 
 DRIVEN_SHARE = 0.5
-"""Least mass at the driven axes beside the oscillators, as a share of the whole."""
+"""Share of the mass without oscillators that is on the driven side of an elastic joint."""
 
 
 def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: float) -> MechanicalModel:
@@ -52,7 +52,7 @@ def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: 
 
 _WIDEST_LOG = 12.0
 _FARTHEST_MODE = 4.0
-"""Bounds of the joint's resonance, relative to the band's end."""
+"""Largest ratio of a mode's frequency to the nearer end of the band, outside it."""
 _LARGEST_TURN = 0.3
 _MOST_DELAY_SAMPLES = 200.0
 _WIDEST_JOINT_LOG = 2.5
@@ -111,7 +111,7 @@ class Structure:
 
     @property
     def units(self) -> tuple[float, float, float]:
-        """Number of unknowns of mass, damping and stiffness."""
+        """Units (scales) of mass, damping and stiffness."""
         return (
             self.mass_scale,
             self.mass_scale * self.speed_scale,

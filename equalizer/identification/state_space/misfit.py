@@ -54,7 +54,7 @@ def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, u
 def _lower_noise_bound(variance: FloatArray, unknowns: int) -> float:
     """One-sided lower 95 % bound of the noise power that a fit leaves."""
     total = float(variance.sum())
-    entries = total**2 / max(float((variance**2).sum()), 1e-300)  # lines that dominate the sum
+    entries = total**2 / max(float((variance**2).sum()), 1e-300)  # effective number of entries
     return total * (1 - unknowns / (2 * max(variance.size, 1)) - ONE_SIDED_95 * float(np.sqrt(2 / max(entries, 1.0))))
 
 

@@ -10,7 +10,7 @@ from equalizer.identification.state_space.warped_subspace import default_horizon
 from equalizer.identification.state_space.weighted_lines import WeightedLines, weight_lines
 
 LEAST_SIGNAL_TO_NOISE = 2.0
-"""Relative noise of the strongest entry at a typical line above which a fit is refused."""
+"""Least ratio of amplitude to noise of the strongest entry at a typical line."""
 LARGEST_GAP = 0.1
 """Largest gap without a line, in octaves..."""
 SPACINGS = 3.0

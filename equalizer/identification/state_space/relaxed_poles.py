@@ -32,7 +32,7 @@ FALSE_ALARM = 1e-3
 RELAXED = ", poles relaxed"
 
 Search = Callable[[IdentificationSettings], Sequence[Candidate]]
-"""Rounds of searches from new starting values."""
+"""Search for candidates from new starting models, under the given settings."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 WIDE_OCTAVES = 4.5
-"""Ratio of the band's ends above which it is fitted on logarithmic bins: on a linear axis most lines are at its top."""
+"""Width of a band above which it is fitted on logarithmic bins: on a linear axis most lines are at its top."""
 ORDINARY_DECAY_S = 0.5
 """Longest time constant of a pole unless the data require more. Superfluous poles of an order go to the bound and cost
 nothing there; without it they may end anywhere inside the unit circle, with a slow decay that ruins a simulation."""

@@ -79,7 +79,7 @@ class HighBandForces:
     direction: FloatArray
     """(m,), unit length, of the force"""
     peak_n: float
-    """Peaks of the sum of these and the other forces."""
+    """Peak of the sum of these and the other forces."""
     peak_by_axis_n: FloatArray
     """(m,): peak along each single axis, for comparison."""
 
