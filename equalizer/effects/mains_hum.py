@@ -31,8 +31,8 @@ def _add_tone(response: FloatArray, sample_rate_hz: float, channels: tuple[int, 
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Starting values: the line that all channels share, between 45 and 65 Hz and anywhere, with this channel's amplitude
-    and phase."""
+    """Starting values: the line that all channels share, between 45 and 65 Hz and anywhere, with this channel's
+    amplitude and phase."""
     residual = (evidence.response - evidence.predicted) * evidence.used[:, None]
     power = np.sum(np.abs(np.fft.rfft(residual / evidence.noise, axis=0)) ** 2, axis=1)
     lines_hz = np.fft.rfftfreq(len(residual), 1 / evidence.sample_rate_hz)

@@ -52,8 +52,8 @@ def force_views(
         views.append(view)
         seen.append(_floor(model, motion, floor, band_hz))
     forces = np.vstack([view.measured for view in views])
-    # An unsuitable model overestimates the noise, so it is limited to the strongest force; on an idle axis it may exceed
-    # the force.
+    # An unsuitable model overestimates the noise, so it is limited to the strongest force; that of an idle axis may be
+    # less than the noise.
     noise = np.minimum(np.fmin.reduce([view.response_rms for view in seen]), np.std(forces, axis=0).max())
     noise = np.asarray(np.hypot(noise, KNOWN * np.sqrt(np.mean(forces**2, axis=0))))
     rate_hz = records[0].recording.sample_rate_hz

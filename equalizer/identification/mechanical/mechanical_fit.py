@@ -92,8 +92,8 @@ LINES_TO_CHOOSE_BY, IN_ALL = 400, 1600
 """Most lines of each group, and of all groups together, in the search; the chosen structure is then fitted to all
 lines."""
 _LOW_PARTS = (0.25, 0.5, 1.0)
-"""Shares of the first stage's band (in octaves, from its lower end) to which the rigid body is fitted: modes above would
-bias it."""
+"""Shares of the first stage's band (in octaves, from its lower end) to which the rigid body is fitted: modes above
+would bias it."""
 
 
 def fit_mechanical_model(
