@@ -1,8 +1,8 @@
-"""Prepares recordings for the comparison with a model, alike for files, real recordings and values.
+"""Prepares recordings for the comparison with a model, the same for files, real recordings and values.
 
-In this order: segments are found where a recording states none, commands and responses are brought into the form that
-a force balance needs (only where no model says what they are), motions become force-driven, gaps in commands are left
-out; then what cannot be compared is refused, and positions that say nothing are left out.
+In this order: segments are found where a recording states none, commands and responses are brought into the form that a
+force balance needs (only where no model says what they are), motions become force-driven, gaps in commands are left
+out; then unsuitable recordings are refused, and constant positions are left out.
 """
 
 from collections.abc import Sequence

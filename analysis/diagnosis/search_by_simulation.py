@@ -1,4 +1,4 @@
-"""The search by simulation: which effects to try, beside which measure, and what is made of the search."""
+"""The search by simulation: the effects to try, the error measure, and the use of its result."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,16 +27,16 @@ from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
 from equalizer.signals.recording import Recording
 
 TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
-"""Laws of the command that a force balance tests: what it does not name is absent."""
+"""Laws of the command that a force balance tests: those that it does not name are absent."""
 GAINS = ("force_gain", "sensor_gain")
-"""A model fitted to the recordings contains these: only against a calibrated one can a gain be wrong."""
+"""Effects that a model fitted to the recordings absorbs: only with a calibrated model can a gain be found wrong."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchOutcome:
     result: SearchResult
     floor: CleanFloor
-    """What was learned from clean recordings; empty without any."""
+    """Model error of the clean recordings; empty without any."""
 
 
 def search_context_of(
@@ -114,7 +114,7 @@ def _search(
     context: SearchContext, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
 ) -> SearchOutcome:
     def beyond(seen: SearchResult) -> SearchResult:
-        # A low hum is no answer: the search is repeated without it.
+        # Low-frequency hum is not accepted as an answer: the search is repeated without it.
         if not settings.discovery or settings.fitted or hums_low(seen.found):
             return seen
         from analysis.diagnosis.discovery.add_laws import add_laws
@@ -134,7 +134,7 @@ def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozen
 
 
 def _beside_motion(name: str, place: str, imposed: bool) -> bool:
-    """Whether an effect of the actuator or sensor cannot be seen by a force balance. Where a motion is imposed, no
+    """Whether a force balance cannot observe an effect of the actuator or sensor. Where a motion is imposed, no
     actuator drives it."""
     driven = not imposed and name != "body_on_actuator" and name not in TESTED_BY_BALANCE
     return place == "sensor" or (place == "actuator" and driven)

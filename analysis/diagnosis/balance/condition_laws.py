@@ -56,7 +56,7 @@ def _friction_values(w: FloatArray, n: tuple[float, ...], mass: float) -> dict[s
 
 
 def _friction_formula(known: Condition) -> Callable[[dict[str, float]], Formula]:
-    # A friction below zero would push.
+    # Negative friction would drive the motion.
     text = f"-maximum(p0 + p1*{_deviation(known)}, 0)*sign(v)"
     return lambda of: Formula(text, (of["level"], of["change"]), "force")
 
@@ -67,8 +67,9 @@ def _formula(known: Condition, *factors: str) -> Callable[[dict[str, float]], Fo
 
 
 def _deviation(known: Condition) -> str:
-    """Of the condition from its mean, in standard deviations, all in whole numbers: these belong to a formula's form,
-    and no fit moves them. The standard deviation keeps four digits or more, the mean a thousandth of it."""
+    """Formula of a condition's deviation from its mean, in standard deviations, with whole numbers: these are part of a
+    formula's form, and no fit changes them. The standard deviation is rounded to four digits or more, the mean to a
+    thousandth of it."""
     finer = 10 ** max(0, min(3 - math.floor(math.log10(known.spread)), 15 - _digits(known.mean)))
     mean, spread = round(known.mean * finer), max(round(known.spread * finer), 1)
     scaled = known.name if finer == 1 else f"{finer}*{known.name}"
@@ -76,5 +77,5 @@ def _deviation(known: Condition) -> str:
 
 
 def _digits(value: float) -> int:
-    """Before the point."""
+    """Number of digits before the decimal point."""
     return max(math.floor(math.log10(abs(value))) + 1, 1) if value else 1

@@ -1,9 +1,9 @@
-"""A given model's part in a force balance: the force that it needs, and how that changes with its open numbers.
+"""A given model as the base of a force balance: the force that it needs, and its sensitivity to the free parameters.
 
-Both are columns: the first has the weight 1, the others the weight 0 give or take 1, for they are counted in standard
-deviations of the calibration. How much the recording weighs against that follows from what the columns leave: error
-power per degree of freedom, of which an error with a narrow spectrum has few (equivalent degrees of freedom of a power
-estimate; Bendat and Piersol 2010, Random Data, ch. 8).
+Both are columns: the first has the weight 1, the others a prior of 0 ± 1, because they are counted in standard
+deviations of the calibration. The weight of the data against that prior follows from the residual: its power per degree
+of freedom, of which a residual with a narrow spectrum has few (equivalent degrees of freedom of a power estimate;
+Bendat and Piersol 2010, Random Data, ch. 8).
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from analysis.diagnosis.balance.regression import Regression, fit_all_laws, regr
 from equalizer.signals.signal import FloatArray
 
 FIXED = 1e6
-"""Precision of the weight 1, over what the recording knows of it; principle: far beyond it."""
+"""Precision of the prior of the weight 1, relative to the data's information on it: large enough to fix it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,17 +25,17 @@ class GivenBase:
     """A given model's columns along one axis, in place of free mass, damping and stiffness."""
 
     columns: tuple[FloatArray, ...]
-    """Per motion, (n, 1 + numbers): the force that the model needs along the measured motion, and what one standard
-    deviation more of each open number adds to it; at the recording's rate."""
+    """Per motion, (n, 1 + numbers): the force that the model needs along the measured motion, and its change per
+    standard deviation of each free parameter; at the recording's rate."""
     mass: float
-    """That moves along the axis."""
+    """Mass that moves along the axis, kg (kg m^2)."""
     least: float = 0.0
-    """Share of the force's rms that all laws together must take for any to be searched."""
+    """Least share of the force's rms that all laws together must explain; else none is searched for."""
 
 
 def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: GivenBase) -> Regression:
-    """As `regression_of`, with the model's needed force as the base. Open numbers that hardly change the force are left
-    out."""
+    """As `regression_of`, with the model's needed force as the base. Free parameters that hardly change the force are
+    left out."""
     varying = _sensitive_columns(given)
     columns = [each[:, varying] for each in given.columns]
     plain = replace(regression_of(motions, axis, laws, False, None, columns), mass=given.mass)
@@ -61,7 +61,7 @@ def _sensitive_columns(given: GivenBase) -> list[int]:
 
 
 def _power_per_freedom(plain: Regression) -> float:
-    """Residual sum of squares over its degrees of freedom, with the open numbers fitted freely."""
+    """Residual sum of squares over its degrees of freedom, with the free parameters fitted without their prior."""
     left = plain.remainder(plain.columns_of(()))
     power, freedom = 0.0, 0.0
     for residual, motion in zip(left, plain.motions, strict=True):

@@ -11,7 +11,7 @@ WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
 
 
 def plainest_structure(search: StructureSearch) -> Structure:
-    """The structure with the fewest parameters whose cross-validated error is hardly above the best one's."""
+    """The structure with the fewest parameters whose cross-validated error is close to the smallest."""
     allowed = search.best.error + PLAINER_LEAVES * (search.linear.error - search.best.error)
     enough = [each for each in search.ranked if each.error <= allowed]
     plain = min(enough, key=lambda each: (numbers_of(search.regression, each.laws), each.error), default=search.linear)
@@ -22,7 +22,8 @@ def plainest_structure(search: StructureSearch) -> Structure:
 
 
 def _further(search: StructureSearch, plain: Structure, ceiling: float) -> Structure | None:
-    """The structure with further laws that take most of what all laws together could still take; None = no such."""
+    """The structure with further laws that explain most of what all laws together could still explain; None = none
+    such."""
     allowed = plain.error - max(FURTHER_LAW_OF_REST * (plain.error - ceiling), FURTHER_LAW_OF_ALL * plain.error)
     more = [
         each
@@ -33,7 +34,8 @@ def _further(search: StructureSearch, plain: Structure, ceiling: float) -> Struc
 
 
 def _extends(regression: Regression, plain: Sequence[int], richer: Sequence[int]) -> bool:
-    """Whether these laws are the plain ones and more, a dry friction perhaps as one that depends on a condition."""
+    """Whether these laws are the given ones and more; dry friction may be replaced by one that depends on a
+    condition."""
     covered, known = set(richer), {regression.laws[number].key for number in richer}
     for number in plain:
         effect, channel = regression.laws[number].key
@@ -43,8 +45,8 @@ def _extends(regression: Regression, plain: Sequence[int], richer: Sequence[int]
 
 
 def numbers_of(regression: Regression, laws: Sequence[int]) -> int:
-    """Number of parameters of these laws. The width of a dry friction's smoothed sign is not counted, and a weight on a
-    lever counts for one less, for it takes the place of the spring."""
+    """Number of parameters of these laws. The width of a friction's smoothed sign is not counted, and gravity torque
+    counts for one less, because it replaces the spring."""
     count = 0
     for number in laws:
         law, place = regression.laws[number], regression.places[number]

@@ -1,8 +1,9 @@
-"""The force balance beside a given model, whose open numbers are columns under the prior of their calibration.
+"""The force balance with a given model as its base, whose free parameters are columns with the prior of their
+calibration.
 
-The force that the model needs is taken along the measured motion, with everything that its file names: actuator, modes,
-effects. Laws are then tested as beside a fitted model (`balance.judge_laws`), by what they take of the error on
-held-out data that re-tuning leaves.
+The force that the model needs is computed along the measured motion, with everything that its file names: actuator,
+modes, effects. Laws are then tested as for a fitted model (`balance.judge_laws`), by their gain on held-out data over
+the re-tuned model.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,7 +33,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 FINEST = 6.0
-"""Samples per period of the band's end at which laws are computed: their overtones must not be aliased."""
+"""Least samples per period of the band's end at which laws are computed, so that their harmonics are not aliased."""
 MOVED = 0.1
 """Step of the finite differences, in standard deviations of the calibration."""
 

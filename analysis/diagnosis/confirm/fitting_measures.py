@@ -33,7 +33,7 @@ class FittingMeasure:
     model: MechanicalModel
     chosen: Chosen
     narrow: bool = False
-    """Whether the band ends where noise is small in the force, which may leave numbers of laws open."""
+    """Whether the band is limited to small noise in the force, which may leave parameters of laws undetermined."""
 
 
 def choose_fitting_measure(

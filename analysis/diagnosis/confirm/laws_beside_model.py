@@ -1,9 +1,9 @@
-"""Decides by held-out gain what a search beside a given model names, where its errors are not those of noise.
+"""Decides by held-out gain what a search with a given model names, where residuals exceed the noise.
 
-Where repeats show a noise about as large as the remaining error, the verdict is the likelihood's (`verdict`). Elsewhere
-a real device is far from any model in units of its noise, and even a true law does not bring the error near it. An
-effect is then confirmed by its share of the held-out error power: against the re-tuned model, against its best rival,
-and against what could be taken at all.
+Where repeats show that the noise is about as large as the residual, the likelihood decides (`verdict`). Otherwise the
+residual of a real device is far above its noise, and remains so even with a true law. An effect is then confirmed by
+its share of the held-out error power: compared with the re-tuned model, with its best rival, and with the gain of all
+laws together.
 """
 
 from collections.abc import Sequence

@@ -19,7 +19,7 @@ from equalizer.signals.signal import FloatArray
 CONSTANT = "constant_force"
 _OWN = re.compile(r"\b[qvf]\b")
 _PREFIX = {"q": "", "v": "v", "f": "f"}
-"""Of an axis' signals in the language of laws, by what a balance's formula calls its own."""
+"""Signals of an axis in the language of laws, by their names in a balance's formula."""
 
 
 def can_be_played(own: int, judged: JudgedLaw) -> bool:
@@ -114,7 +114,7 @@ def numbers_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Seque
     weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
     given = (model.mass, model.damping, model.stiffness)
     for place, (weight, matrix) in enumerate(zip(weights, given, strict=False)):
-        if tuning.deviation[place] == 0:  # it stays as it is
+        if tuning.deviation[place] == 0:  # it is not changed
             continue
         if place == 0:
             weight = max(weight, matrix[0, 0] / 10)

@@ -29,7 +29,7 @@ class Part:
     known: Mask
     """(n,)"""
     start: int
-    """Its first sample in the file: what drifts or counts time does so between the parts, too."""
+    """Its first sample in the file: drifts and clocks also run between the parts."""
     whole: int
     """Samples of the file."""
 

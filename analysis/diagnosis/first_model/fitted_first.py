@@ -54,8 +54,9 @@ def first_model_of(
     on_progress: Progress,
     map_: Mapper = map,
 ) -> FirstModel:
-    """From the force balance where that names laws along the motion of one body per command; else by a fit to spectra,
-    which takes longer. recordings: in the form of `plain_form`. Raises NothingToDiagnose where they carry no model."""
+    """The first model, from the force balance where that names laws along the motion of one body per command; else by a
+    fit to spectra, which takes longer. recordings: in the form of `plain_form`. Raises NothingToDiagnose where no model
+    can be fitted."""
     _require_no_weight(recordings)
     on_progress("weighing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(without), time_left, map_)
@@ -79,7 +80,7 @@ def first_model_of(
 
 
 def _hold_mass(model: MechanicalModel) -> MechanicalModel:
-    """The model with a mass that re-tuning leaves as it is."""
+    """The model with a mass that re-tuning does not change."""
     assert model.tolerance is not None
     return replace(model, tolerance=replace(model.tolerance, mass_kg=HELD_FIXED * float(np.abs(model.mass).max())))
 
@@ -125,8 +126,8 @@ def fit_first_linear_model(
 
 
 def _answers(model: MechanicalModel, recording: Recording) -> bool:
-    """Whether the commands move the model at all. Where the response hangs on them less than on the start of the
-    recording, as of an axis that friction holds, the fit's masses and springs grow beyond all bounds."""
+    """Whether the commands move the model at all. Where the response depends on them less than on the initial state, as
+    on an axis that friction holds, the fitted masses and springs grow without bound."""
     played = simulate_response(
         model, fill_gaps(recording.command.samples), recording.sample_rate_hz, (), recording.hold
     )

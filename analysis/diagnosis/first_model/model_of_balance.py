@@ -16,13 +16,13 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstModel:
-    """What a diagnosis starts from where no model was given."""
+    """Force balances and first model that a diagnosis starts from where no model was given."""
 
     model: MechanicalModel
     remarks: tuple[str, ...]
-    """What must be known of it."""
+    """Remarks about it."""
     balances: tuple[Balance, ...] | None = None
-    """None = not weighed."""
+    """Force balances; None = not computed."""
 
 
 def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
@@ -67,7 +67,8 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
 
 
 def _common_delay_s(balances: Sequence[Balance]) -> float:
-    """The delay of all commands where reduced recordings do not hold it; 0 where each has another: a model has one."""
+    """The delay of all commands where the reduced recordings do not contain it; 0 where the commands have different
+    ones, because a model has a single delay."""
     delays = {balance.search.regression.beside.delay_s for balance in balances}
     return delays.pop() if len(delays) == 1 and not is_reduced(balances) else 0.0
 
@@ -97,7 +98,8 @@ def share_within(balances: Sequence[Balance], band_hz: float) -> float:
 
 
 def _below(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
-    """Of takes that each run one way, what a friction differs by from take to take is at frequency zero."""
+    """The mean over all recordings is subtracted: where each runs one way, the friction differs between recordings at
+    frequency zero."""
     within, whole, mean = 0.0, 1e-300, float(np.mean(np.concatenate(forces)))
     for force, motion in zip(forces, motions, strict=True):
         power = np.abs(np.fft.rfft(force - mean)) ** 2

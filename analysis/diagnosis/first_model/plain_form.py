@@ -1,8 +1,5 @@
-"""Converts recordings of any form to ones whose forces can be balanced along a measured motion, with a sentence for
-each change.
-
-Only where no model is given: a model says itself what its commands and responses are.
-"""
+"""Converts recordings of any form so that forces can be balanced along a measured motion, with a sentence for each
+change. Only used without a given model: a model defines its commands and responses itself."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -115,8 +112,8 @@ def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
-    """Leaves out commands that never change, for nothing of their axis can be known, and with them the motion of their
-    axis, where there is one for each command."""
+    """Leaves out commands that never change, because nothing about their axis can be identified, and with them the
+    motion of their axis, where there is one for each command."""
     command, response = recordings[0].command, recordings[0].response
     samples = np.vstack([each.command.samples for each in recordings])
     samples = samples[np.isfinite(samples).all(axis=1)]
@@ -193,8 +190,8 @@ def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
         kept = motion.valid_samples(motion.fit)
         rows.append(motion.decimate(np.hstack(columns))[kept])
         aims.append(motion.decimate(aim)[kept])
-    # About their means, and without what they do only in their last digits: of two commands with a constant sum, the
-    # sum would else be taken for the drive.
+    # The means are subtracted, and components of the size of rounding ignored: of two commands with a constant sum, the
+    # sum would otherwise appear to drive the motion.
     x, y = (found - found.mean(axis=0) for found in (np.vstack(rows), np.vstack(aims)[:, 0]))
     size = np.maximum(x.std(axis=0), 1e-300)
     pushed = np.linalg.lstsq(x / size, y, rcond=DEPENDENT_SIGNALS)[0][: motions[0].force.shape[1]]

@@ -1,9 +1,9 @@
 """Infers the quantity of responses without one: position, velocity or force, from their name where that is clear, else
-from how they go with the command.
+from their relation to the command.
 
-Along a measured position forces need its second derivative, unless no mass moves; along a velocity they do not, for
-the mass then goes with the first. So a response is taken as a position, or as a velocity where it is of use by itself
-and its second derivative is not. A sensor's voltage says as little.
+If the response is a position, the force balance needs its second derivative, unless the mass is negligible; if it is a
+velocity, the mass belongs to the first derivative. So a response is taken as a position, or as a velocity where it is
+significant itself and its second derivative is not. The same is done for a sensor's voltage.
 """
 
 from collections.abc import Sequence
@@ -51,7 +51,7 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
 
 
 def _said_by_names(recording: Recording) -> tuple[str, ...]:
-    """Quantities of the responses, where a name tells one of them that nothing else does; else empty."""
+    """Quantities of the responses, where a name determines one that nothing else determines; else empty."""
     from equalizer.signals.quantity_words import quantity_in  # only where a quantity is missing
 
     response = recording.response
@@ -72,7 +72,7 @@ def _sentence_of_names(recording: Recording, quantities: Sequence[str]) -> str:
 
 
 def _likely_quantity(recordings: Sequence[Recording]) -> str:
-    """Quantity of the first response, judged against the first command; a position where nothing tells."""
+    """Quantity of the first response, judged against the first command; a position where it cannot be determined."""
     count = len(recordings[0].response.channels)
     taken = [replace(_with_quantity(each, "position"), position=None) for each in recordings]
     try:

@@ -23,7 +23,7 @@ from equalizer.signals.signal import FloatArray
 
 LEARNING = "learning from the clean recordings"
 BEGUN = 0.02
-"""Share of the whole diagnosis that is done when learning ends."""
+"""Progress (share of the whole diagnosis) at the end of learning."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,8 +64,9 @@ class LearnedError:
 def learn_model_error(
     clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
 ) -> LearnedError:
-    """clean: of the same device, alike in channels and units; the model is re-tuned to each by itself, for days differ.
-    diagnosed: what is to be diagnosed, measured alike. Raises NothingLearned where that cannot be."""
+    """clean: of the same device, alike in channels and units; the model is re-tuned to each separately, because
+    recordings of different days differ. diagnosed: the recordings to diagnose, with the same measure. Raises
+    NothingLearned where that cannot be."""
     error = measure_of(diagnosed, model, clean).measure.name
     lessons: list[_Lesson] = []
     for number, recording in enumerate(clean):
@@ -120,8 +121,8 @@ def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) ->
 
 
 def _signal(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
-    """(c,): standard deviation of the measured or the predicted signal, the smaller of both, so that neither hum or
-    drift nor a model that is far off makes it larger."""
+    """(c,): standard deviation of the measured or the predicted signal, the smaller of both, so that neither hum and
+    drift nor a bad model increases it."""
     measured = [record.measured for record in measure.records]
     predicted = [each - left * measure.unit for each, left in zip(measured, residuals, strict=True)]
     sizes = [np.nanstd(np.vstack(series), axis=0) for series in (measured, predicted)]

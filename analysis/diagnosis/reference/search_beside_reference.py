@@ -28,11 +28,11 @@ def search_beside_reference(
     progress: Progress,
     time_left: TimeBudget,
 ) -> SearchResult:
-    """context: as without reference recordings, but for what is certain. What is found has its residuals by its own
-    measure, with what a device in order differs by counted as noise.
+    """context: as without reference recordings, but for what is certain. Residuals of the result are by its own
+    measure, with the model error of the reference recordings counted as noise.
 
-    Where much more is left than on a device in order, its colour is of little use: then what is simply larger than that
-    is looked for, too, and whichever leaves less stands.
+    Where the residual is much larger than that, whitening helps little: then effects are also searched for with the
+    plain residual, and the result with the smaller error is kept.
     """
     fine = _unname_what_was_there(_by_contrast(context, learned, catalogue, progress, time_left), learned)
     if context.certain or fine.found.after.score.worst_channel <= learned.floor.beyond or not time_left():
@@ -46,8 +46,8 @@ def search_beside_reference(
 
 
 def _unname_what_was_there(seen: SearchResult, learned: LearnedError) -> SearchResult:
-    """The result without effects that the recordings in order show as well, with the same numbers: the model lacks
-    these, but they are no fault."""
+    """The result without effects that the reference recordings show as well, with the same parameters: the model lacks
+    them, but they are not the fault."""
     found, before = seen.found, []
     for place in reversed(range(len(found.steps) if seen.judgement.named and not seen.context.certain else 0)):
         whole = found.after.fitted.hypothesis
@@ -112,8 +112,8 @@ def _by_contrast(
 
 
 def _judge_with_floor(measure: ErrorMeasure, found: Explanation, named: bool, beyond: float) -> Judgement:
-    """The verdict, with all thresholds raised by the factor `beyond`, for devices differ from day to day, too. measure:
-    of the residuals of what was found; scores may be of a whitened one, which is blind to what changes slowly."""
+    """The verdict, with all thresholds raised by the factor `beyond`, because devices differ from day to day. measure:
+    that of the result's residuals; scores may be of a whitened one, which does not show slow changes."""
     if named:
         return Judgement(
             "explained" if found.after.score.worst_channel <= beyond * EXPLAINED_ERROR else "partly_explained", True

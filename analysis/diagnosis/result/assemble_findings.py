@@ -215,7 +215,7 @@ def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
     return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
 
 
-# Rows of the remainder where impacts are compared by band power: no simulation predicts single blows.
+# Rows of the residual where impacts are compared by band power: no simulation predicts single impacts.
 def impact_remainder(measure: ErrorMeasure, found: Explanation) -> tuple[Mismatch, ...]:
     """One row for each channel whose band powers differ by more than chance; the share is the rms logarithm of the
     ratio of amplitudes. Empty where samples were compared."""

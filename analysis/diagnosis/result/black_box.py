@@ -1,8 +1,8 @@
-"""A black-box correction as a reference for the named effects: where it predicts better, something is still missing.
+"""A black-box correction as a reference for the named effects: where it predicts better, physics is still missing.
 
-A polynomial of the re-tuned model's own signals is added to each channel of its prediction, term by term as each takes
-most of what is left (orthogonal least squares; Chen, Billings and Luo 1989), as many terms per channel as the physics
-has numbers.
+A polynomial of the re-tuned model's own signals is added to each channel of its prediction, term by term, each time the
+one that explains most of the residual (orthogonal least squares; Chen, Billings and Luo 1989), as many terms per
+channel as the physics has parameters.
 """
 
 from collections.abc import Sequence
@@ -18,9 +18,9 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 SELECTION_SAMPLES = 20_000
-"""Samples that terms are selected by, evenly spaced among the fit samples; the final fit uses all of these."""
+"""Most samples for the selection of terms, evenly spaced among the fit samples; the final fit uses all."""
 _LEAST_RMS = 1e-6
-"""Rms of a term at least, on the samples that terms are selected by; over all samples it is about 1."""
+"""Least rms of a term on the samples for the selection; over all samples it is about 1."""
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -31,7 +31,7 @@ def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, phy
         return None
     fitted = [record.fit for record in measure.records]
     signals = [
-        # Where nothing was measured, nothing is fitted or tested either.
+        # Missing samples are neither fitted nor tested, so their value does not matter.
         _signals_and_changes(record.command, np.nan_to_num(record.measured - left * measure.unit))
         for record, left in zip(measure.records, retuned.fitted.residuals, strict=True)
     ]
@@ -104,7 +104,7 @@ def _terms(base: FloatArray, numbers: Sequence[int]) -> FloatArray:
 
 
 def _select_terms(seen: FloatArray, wanted: FloatArray, count: int) -> list[int]:
-    """Numbers of the terms selected by orthogonal least squares, one after the other."""
+    """Indices of the terms selected by orthogonal least squares, one after the other."""
     picked: list[int] = []
     rest = wanted
     power = np.sum(seen**2, axis=0)

@@ -1,4 +1,4 @@
-"""Implausible results of a fit, such as a negative damping, a sentence each."""
+"""Implausible results of a fit, such as negative damping, one sentence each."""
 
 from collections.abc import Iterator, Sequence
 

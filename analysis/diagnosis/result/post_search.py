@@ -1,4 +1,4 @@
-"""What is looked at once a search is done, piece by piece beside each other: where it sits, curves, a black box."""
+"""Examination of the fits after a search, in parallel pieces: localisation, curves, and a black box."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -44,7 +44,7 @@ def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examina
     evidence = gather_evidence(measure, tuning, stages["retuned"])
     entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])
     entry = context.guard.part(WHERE, "its work", entry_search, None)
-    # What is the same fit is looked at once.
+    # Stages with the same fit are examined once.
     fits = {id(fitted): stage for stage, fitted in stages.items()}
     tied = [
         partial(find_tied_states, measure, tuning, stages[stage], maps.cells[stage], entry, known)
@@ -71,7 +71,7 @@ def _black_box(context: SearchContext, found: Explanation) -> BlackBox | None:
 
 
 def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, ...]:
-    """Each named effect's, against the final model without it alone, in one record."""
+    """Curves of the named effects, each against the final model without that effect, in one record."""
     measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
     if not fitted.hypothesis.claims:
         return ()
@@ -91,7 +91,7 @@ def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, 
 
 
 def _most_fitted(measure: ErrorMeasure) -> int:
-    """Place of the first record with as many samples to fit or choose by as any: another one may be held out whole."""
+    """Index of the first record with the most samples to fit or choose by: another one may be held out completely."""
     return int(np.argmax([np.sum(record.fit | record.choose) for record in measure.records]))
 
 

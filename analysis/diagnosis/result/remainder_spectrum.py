@@ -26,7 +26,7 @@ class RemainderSpectrum:
     retuned: FloatArray
     after: FloatArray
     noise: FloatArray
-    """NaN where it is not known."""
+    """Density of the noise; NaN where not known."""
 
 
 def remainder_spectra(time_series: Sequence[TimeSeries], floor: NoiseFloor | None) -> tuple[RemainderSpectrum, ...]:

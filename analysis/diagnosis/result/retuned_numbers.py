@@ -1,4 +1,4 @@
-"""Lists the model's own numbers that a fit moved beyond their calibration, with sentences about doubtful ones."""
+"""Lists the model's own parameters that a fit moved beyond their calibration, with sentences about doubtful ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ _LISTED = 4
 class MovedNumber:
     name: str
     change: float
-    """Change of the number, in `unit`."""
+    """Change of the parameter, in `unit`."""
     unit: str
     """SI; "1" for a relative change."""
     deviations: float
@@ -47,7 +47,7 @@ def all_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ..
 
 
 def moved_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
-    """Those that moved by a standard deviation or more, the furthest first. deviations: (parameters,)"""
+    """Parameters that moved by a standard deviation or more, the largest first. deviations: (parameters,)"""
     moved = [number for number in all_numbers(tuning, deviations) if abs(number.deviations) >= RETUNING_NAMED]
     return tuple(sorted(moved, key=lambda number: -abs(number.deviations)))
 
@@ -66,8 +66,8 @@ def retuned_sentence(moved: Sequence[MovedNumber], fitted: bool = False) -> str:
 
 
 def doubtful_sentences(moved: Sequence[MovedNumber], fitted: bool = False) -> tuple[str, ...]:
-    """Numbers that left what their calibration makes likely: they may stand for physics that was not named. Many are
-    counted, for all of them stand in the table of numbers. fitted: as in `retuned_sentence`."""
+    """Sentence on parameters that left the likely range of their calibration: they may compensate for physics that was
+    not named. Many are only counted, because the table of parameters lists all. fitted: as in `retuned_sentence`."""
     far = [number for number in moved if abs(number.deviations) >= RETUNING_DOUBTED]
     at_end = [number for number in far if abs(number.deviations) >= RETUNING_BOUND - 1e-6]
     if fitted:

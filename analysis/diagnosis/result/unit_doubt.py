@@ -1,5 +1,5 @@
-"""Channels that differ from the prediction by a constant factor or a sign: a wrong unit or wire is likelier than such a
-device."""
+"""Channels that differ from the prediction by a constant factor or a sign: a wrong unit or reversed wiring is then more
+likely than such a device."""
 
 from collections.abc import Sequence
 

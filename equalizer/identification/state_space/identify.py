@@ -83,11 +83,9 @@ class Identified(Summarised):
 
     model: IdentifiedModel
     cost: float
-    """Reduced chi-squared: squared residual over noise variance, per degree of freedom; about 1 when only noise is
-    left."""
+    """Reduced chi-squared: squared residual over noise variance, per degree of freedom."""
     rms_relative_error: float
-    """Root-mean-square error of the model against the estimate over the lines of the band, the estimate's noise
-    included."""
+    """Rms error of the model against the estimate over the band, the estimate's noise included."""
     worst_relative_error: float
     """Error of the worst line, relative to the root mean square of the response."""
     scatter: float | None
@@ -96,8 +94,7 @@ class Identified(Summarised):
     misfit: Misfit
     """Lack of fit: difference of the lines from the model beyond their noise."""
     expected_error: float | None
-    """Bound of the total error, likewise relative: noise, and the most misfit that the noise may hide; exceeded in 5 %
-    of cases."""
+    """95 % bound of the total error, likewise relative: noise, and the most misfit that the noise may hide."""
     lines: int
     candidates: tuple[Candidate, ...]
     chosen: Candidate

@@ -1,4 +1,4 @@
-"""Signature curve of a named effect: what is missing without it against the variable that it depends on, and the fitted
+"""Signature curve of a named effect: the residual without it against the variable that it depends on, and the fitted
 law, simulated and averaged over the same kind of bins."""
 
 from collections.abc import Mapping
@@ -50,7 +50,7 @@ ALONG: Mapping[str, Along] = {
     "sensor_drift": "time",
     "clock_drift": "growth",
 }
-"""Variable of each effect's curve; for all other effects the spectrum of what is missing is shown."""
+"""Variable of each effect's curve; for all other effects the spectrum of the residual is shown."""
 _FREQUENCY_LINES = 1024
 
 
@@ -60,9 +60,9 @@ class Names:
 
     axes: tuple[str, ...]
     channels: tuple[str, ...]
-    """Of the response."""
+    """Names of the response's channels."""
     unit: str
-    """Of the response."""
+    """Unit of the response."""
     system: UnitSystem = LINEAR
 
 
@@ -143,7 +143,8 @@ def _of_command(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signa
 def _of_reading(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names) -> Signature:
     used = evidence.used > 0
     drives = evidence.predicted[used]
-    # The pair of channels in which the effect shows most: how much of what it changes here goes with what is there.
+    # The pair of channels with the strongest effect: regression of the change in one channel on the signal of the
+    # other.
     together = np.abs(change[used].T @ drives) / np.maximum(np.sqrt(np.sum(drives**2, axis=0)), 1e-300)
     here, there = np.unravel_index(int(np.argmax(together)), together.shape)
     errors = (evidence.response - evidence.predicted)[:, here]

@@ -1,4 +1,4 @@
-"""The missing force along each axis against position, velocity, command and time, and the loops that it makes."""
+"""The missing force along each axis against position, velocity, command and time, and its hysteresis loops."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import system_of
 
 CLOUD = 600
-"""Single samples that are drawn."""
+"""Number of single samples that are drawn."""
 LOOP_SAMPLES = 2000
-"""Samples of a loop at most."""
+"""Most samples of a loop."""
 LOOP_PERIODS = 1.1
 """Length of a loop in periods of the motion's strongest line, so that it closes."""
 NAMED, NOT_CONFIRMED = "with what is named", "with the best candidates, not confirmed"
@@ -30,7 +30,7 @@ NAMED, NOT_CONFIRMED = "with what is named", "with the best candidates, not conf
 @dataclass(frozen=True, slots=True, eq=False)
 class StateView:
     along: str
-    """What the abscissa is: "position"."""
+    """Name of the abscissa: "position"."""
     unit: str
     """Unit of the abscissa, SI."""
     cloud_at: FloatArray
@@ -42,7 +42,7 @@ class StateView:
     error: FloatArray
     """Standard error of the mean."""
     left: FloatArray
-    """Mean of what the completed model leaves per bin; empty where there is none."""
+    """Mean residual of the completed model per bin; empty without one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +69,7 @@ class StateMaps:
     model: str
     """The model that lacks the force, in words."""
     completed: str
-    """What the model was completed by: NAMED, NOT_CONFIRMED; empty = nothing."""
+    """Kind of the laws that complete the model: NAMED, NOT_CONFIRMED; empty = none."""
     share: float
     """Missing force over force, rms."""
     views: tuple[StateView, ...]
@@ -171,7 +171,7 @@ def _of_evidence(evidence: Sequence[Evidence], axis: int) -> _AxisSeries | None:
 
 def _maps(series: _AxisSeries, said: tuple[str, str, str, str], length: str) -> StateMaps:
     axis, unit, model, completed = said
-    # As a force on the device that the model lacks: what friction does points against the motion.
+    # As the missing force on the device: friction then points against the motion.
     missing = series.before - series.force
     left = None if series.after is None else series.after - series.force
     views = tuple(
@@ -211,7 +211,7 @@ def _loops(series: _AxisSeries, length: str) -> tuple[Loop, ...]:
 
 
 def _stretch(series: _AxisSeries) -> slice:
-    """About a period of the motion where it travels furthest."""
+    """About one period of the motion, where its travel is largest."""
     part = max(series.parts, key=lambda each: float(np.ptp(series.position[each])) if each.stop > each.start else 0.0)
     position = series.position[part]
     power = np.abs(np.fft.rfft(position - position.mean()))

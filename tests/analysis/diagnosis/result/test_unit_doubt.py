@@ -29,7 +29,7 @@ def test_a_channel_of_the_right_shape_and_another_size_is_doubted(measured, word
 
 def test_so_is_one_with_the_other_sign():
     (said,) = unit_sentences([series(-1.1 * WAVE)])
-    assert "foresees, but with the other sign: its sign, the command's or one in the model may be wrong." in said
+    assert "predicts, but with the other sign: its sign, the command's or one in the model may be wrong." in said
 
 
 @pytest.mark.parametrize(
