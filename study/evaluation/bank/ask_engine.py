@@ -85,7 +85,7 @@ class Engine:
 
 
 Workers = int | Executor
-"""So many processes of this computer, or an executor whose workers are sent the cases: they may share no disk."""
+"""Number of processes on this computer, or an executor to whose workers the cases are sent: they may share no disk."""
 
 
 def ask_engine(folder: ProofFolder, names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]) -> None:

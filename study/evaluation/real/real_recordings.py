@@ -64,7 +64,7 @@ class RealPlan:
     inject: int = 0
     """Number of faults to inject into the diagnosed recordings; 0 = none."""
     seed: int = 1
-    """Seed of these draws."""
+    """Seed of the draws."""
 
 
 def diagnose_folder(

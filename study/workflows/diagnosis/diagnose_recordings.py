@@ -65,7 +65,7 @@ class DiagnosePlan:
     discovery: bool = True
     """Also search for laws outside the catalogue."""
     force_constants: tuple[float, ...] = ()
-    """One for all commands or one per command, where these are not forces."""
+    """Force constants: one for all commands or one per command, where these are not forces."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -51,7 +51,7 @@ class EqualizedTrajectory:
     solved: Feedforward
     """Feedforward from the linear models alone."""
     peaks: Peaks
-    """Of `forces`."""
+    """Force peaks of `forces`."""
     bands: BandFacts | None
     compensation: Compensation | None
 

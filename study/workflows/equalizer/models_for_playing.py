@@ -49,7 +49,7 @@ class ModelsForPlaying:
 
     @property
     def quality(self) -> ModelQuality | None:
-        """Of the worst model; None if any has none."""
+        """Expected error of the worst model; None if any has none."""
         return worst_quality(tuple(model.quality for model in self.given))
 
     @property

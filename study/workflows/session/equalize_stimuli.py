@@ -83,7 +83,7 @@ def equalize_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceIn
     equalizer = _equalizer(identified, protocol, info)
     try:
         scales = level_scales(protocol, equalizer, info.sample_rate_hz)
-    except (ValueError, ArithmeticError) as error:  # what linear algebra says of a model that is none
+    except (ValueError, ArithmeticError) as error:  # linear algebra fails on an invalid model
         raise _refusal(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
     facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales, quality_sentence(identified.quality))
     return Equalized(equalizer, facts, model)
