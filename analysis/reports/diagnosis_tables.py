@@ -69,7 +69,7 @@ def candidate_table(found: Findings) -> Table | None:
 
 
 def error_table(found: Findings) -> Table:
-    """Of both records, over all channels."""
+    """Errors of both records, over all channels."""
     rows = tuple(
         (f"On {_PARTS[part]}", *(_stage_error_text(errors, stage) for stage, _ in _STAGES), error_text(errors.noise))
         for part, errors in (("fit", found.diagnosis.fit.fit), ("test", found.diagnosis.fit.test))

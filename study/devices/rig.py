@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
 
 POSITION = slice(0, 3)
-"""Where a reading holds the encoders' position of the handle, m."""
+"""Slice of a reading with the encoders' position of the handle, m."""
 ACCELERATION = slice(3, 6)
 """The accelerometer's reading, m/s², in the device's axes as mounted, zeroed at rest."""
 TRUE_ACCELERATION = slice(6, 9)

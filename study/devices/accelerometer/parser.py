@@ -30,7 +30,7 @@ LAYOUT = np.dtype(
 
 
 def crc_of(rows: Bytes) -> npt.NDArray[np.uint16]:
-    """Of each row of bytes, shape (n, k): shape (n,)."""
+    """Checksum of each row of bytes, shape (n, k): shape (n,)."""
     crc = np.full(len(rows), START, dtype=np.uint16)
     for column in rows.T:
         crc = (crc << 8) ^ _TABLE[(crc >> 8) ^ column]
@@ -77,15 +77,15 @@ class Samples:
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Since the beginning."""
+    """Samples since the beginning."""
 
     packets: int = 0
     lost: int = 0
-    """By the gaps in the sequence numbers."""
+    """Lost packets, from the gaps in the sequence numbers."""
     spoiled_bytes: int = 0
-    """That belonged to no whole packet."""
+    """Bytes that belonged to no complete packet."""
     restarts: int = 0
-    """How often the microcontroller began anew."""
+    """Number of restarts of the microcontroller."""
 
 
 class PacketParser:
@@ -133,7 +133,7 @@ class PacketParser:
 
 
 def _whole_packets(stream: Bytes) -> Indices:
-    """Where packets with the right check sum begin."""
+    """Positions at which packets with a correct checksum begin."""
     last = len(stream) - SIZE + 1
     if last <= 0:
         return np.zeros(0, dtype=np.intp)
@@ -150,7 +150,7 @@ def _packets_at(stream: Bytes, starts: Indices) -> npt.NDArray[np.void]:
 
 
 def _without_overlaps(starts: Indices, packets: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
-    """Which of them to keep, (n,)."""
+    """Mask of the candidates to keep, (n,)."""
     kept = np.ones(len(starts), dtype=bool)
     if (np.diff(starts) >= SIZE).all():
         return kept

@@ -1,4 +1,4 @@
-"""The accelerometer as the rig wants it: a thread reads the serial line, and the newest sample is there at any time."""
+"""Accelerometer on a serial line: a thread reads it, so that the newest sample is available at any time."""
 
 import contextlib
 import threading
@@ -13,23 +13,24 @@ from study.devices.accelerometer.parser import Counts, PacketParser
 from study.errors import DeviceError
 
 FRESH_S = 0.05
-"""A sample that is older is none: fifty ticks, and longer than a busy computer leaves a thread waiting."""
+"""Age up to which the newest sample is used: fifty ticks, more than a busy computer delays a thread."""
 
 ZEROING_S = 0.5
-"""At rest, when it is opened: gravity, and the drift of the bias since the calibration."""
+"""Time at rest, on opening, over which the reading is averaged and then subtracted: gravity, and the drift of the bias
+since the calibration."""
 
 AT_ONCE = 4096
 """Bytes: 0.1 s at 2 kHz."""
 
 WAIT_S = 0.01
-"""For a byte, on a silent line: so long until a reader hears that it is to end."""
+"""Timeout for a byte on a silent line, and so the longest time until the thread notices `close`."""
 
 
 class Port(Protocol):
     """An open serial line."""
 
     def read(self, size: int) -> bytes:
-        """At most size bytes, soon: fewer or none where no more came."""
+        """Read at most `size` bytes, with a short timeout: fewer or none if no more came."""
         ...
 
     def close(self) -> None: ...
@@ -52,7 +53,8 @@ class SerialAccelerometer:
         return self._parser.counts
 
     def zero(self, seconds: float = ZEROING_S) -> None:
-        """What it reads now, at rest, counts as none from now on. Raises `DeviceError` where it reads nothing."""
+        """Zero the reading: the present one, at rest, is subtracted from now on. Raises `DeviceError` without a
+        reading."""
         readings = []
         until_s = time.monotonic() + seconds
         while time.monotonic() < until_s:

@@ -27,9 +27,9 @@ class Acceptance:
     accepted_on: str
     """ISO 8601 date."""
     force_n: float
-    """That was held when the loop was stopped on purpose."""
+    """Force that was held when the loop was stopped on purpose."""
     gone_after_s: float
-    """Until the device said that it was off."""
+    """Time until the device reported that the force was off."""
     baseline: str = ""
     """Name of the recording beside this file with which the daily check compares; empty where none was made."""
     baseline_sha256: str = ""

@@ -34,7 +34,7 @@ LOCK_S = 0.002
 """A write lasts a tenth of that: what waits longer waits for a call that hangs."""
 
 REST_SHARE = 0.25
-"""Of the watchdog's time, between two zeros while nothing is played."""
+"""Share of the watchdog's time between two zeros while nothing is played."""
 
 
 class Accelerometer(Protocol):
@@ -124,7 +124,8 @@ class ForceDimensionRig:
             self._sending.release()
 
     def withhold(self, seconds: float) -> float:
-        """As if the loop had stopped: for so long nothing is sent, zeros neither. When the last force was sent, s."""
+        """Simulates a stopped loop: sends nothing for this long, not even zeros. Returns the time of the last force,
+        s."""
         with self._sending:
             self._withheld_until_s = time.monotonic() + seconds
             return self._sent_s

@@ -115,6 +115,6 @@ class Reply:
 
 
 Command = ShowHome | ShowSession | ShowDiagnosis | Begin | Resume | Analyze | Withdraw | Diagnose | AskBeside
-"""What the engine performs, one after another."""
+"""Commands that the engine carries out, one after another."""
 
 ToEngine = Command | Relay | LetGo | Heartbeat | Reply
