@@ -48,7 +48,7 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
         log = EventLog.reopen(folder.log)
         # Yesterday's stop must not end today's sitting; from now on requests are received. Nor is yesterday's live
         # state
-        # valid today, whatever its time.
+        # valid today at any time.
         RequestInbox(folder.path).clear()
         remove_live(folder.path)
         try:
