@@ -12,7 +12,7 @@ from analysis.diagnosis.result.ceiling_wording import (
 )
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.retuned_numbers import doubtful_sentences, retuned_sentence
+from analysis.diagnosis.result.retuned_parameters import doubtful_sentences, retuned_sentence
 from analysis.diagnosis.result.wording import (
     answer_of,
     device_of,

@@ -7,7 +7,7 @@ from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import estimate_text, noun_of, place_words
 from analysis.diagnosis.result.candidate_wording import candidate_numbers
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.retuned_numbers import all_numbers
+from analysis.diagnosis.result.retuned_parameters import all_numbers
 from analysis.diagnosis.result.wording import device_of
 from analysis.diagnosis.unit_wording import error_text, probability_text, share_text, value_text
 from analysis.reports.page import Table

@@ -3,7 +3,7 @@
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.simulation.interpolated_response import read_other_times
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray

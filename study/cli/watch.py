@@ -132,7 +132,7 @@ def _ask(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], .
 
 def _ask_for(session: "SessionFolder", request: "Request", said: str) -> None:
     from study.devices.clock import RealClock
-    from study.workflows.views.ask_session import ask_session
+    from study.workflows.views.send_request import send_request
 
-    ask_session(session, request, RealClock())
+    send_request(session, request, RealClock())
     typer.echo(said, err=True)

@@ -16,12 +16,13 @@ from equalizer.signals.signal import FloatArray
 
 
 def condition_laws(motions: Sequence[Motion], c: int, of: Scales) -> Iterator[Law]:
+    """Laws of one axis for every recorded condition. c: index of the axis, of: its ranges of motion."""
     for k, known in enumerate(motions[0].conditions):
         yield from _laws_of_condition(known, k, c, of)
 
 
 def _laws_of_condition(known: Condition, k: int, c: int, of: Scales) -> Iterator[Law]:
-    """k: its column."""
+    """Laws of one condition. k: its column in `Motion.condition`, c: index of the axis."""
     sharp, spans = friction_widths(of)
     for width in sharp:
         yield Law(

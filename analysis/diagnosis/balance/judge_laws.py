@@ -21,8 +21,8 @@ from analysis.diagnosis.balance.judged_law import (
     special_cases,
 )
 from analysis.diagnosis.balance.law import Law
-from analysis.diagnosis.balance.plainest_structure import numbers_of, plainest_structure
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
+from analysis.diagnosis.balance.simplest_structure import numbers_of, simplest_structure
 from analysis.diagnosis.balance.structures import Structure, StructureSearch, values_of
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
@@ -97,13 +97,13 @@ def judge_laws(search: StructureSearch) -> Balance:
     if not blocks_to_judge(regression):
         alone = float(np.sqrt(search.linear.error / _signal_power(regression)))
         return Balance(search, search.linear, (), (), alone, alone, alone, search.complete, tested=False)
-    judged = _judge_structure(search, plainest_structure(search))
+    judged = _judge_structure(search, simplest_structure(search))
     if judged.named or not _shares_friction(regression, judged.chosen.laws):
         return judged
     # Two frictions share the error that either could explain alone, so that neither would seem necessary.
     apart = tuple(each for each in search.ranked if not _shares_friction(regression, each.laws))
     best = min(apart, key=lambda each: each.error, default=search.linear)
-    single = _judge_structure(search, plainest_structure(replace(search, ranked=apart, best=best)))
+    single = _judge_structure(search, simplest_structure(replace(search, ranked=apart, best=best)))
     return single if single.named else judged
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from analysis.diagnosis.balance.blocks import blocks_of
 from analysis.diagnosis.balance.law import BaseTerms
 from analysis.diagnosis.balance.motion import Motion, filter_spectrum
-from analysis.diagnosis.balance.plainest_structure import plainest_structure
 from analysis.diagnosis.balance.regression import Regression, keep_laws, regression_of
+from analysis.diagnosis.balance.simplest_structure import simplest_structure
 from analysis.diagnosis.balance.structures import (
     Structure,
     StructureSearch,
@@ -83,7 +83,7 @@ def _error_without_each(motions: Sequence[Motion], axis: int, places: int) -> li
 def _extend_base(found: StructureSearch, beside: BaseTerms) -> BaseTerms:
     """The base with a delay and, where the plainest structure has a linear law, with as many linear laws as
     cross-validation supports. The delay is estimated before or after these laws, whichever gives the smaller error."""
-    regression, plain = found.regression, plainest_structure(found).laws
+    regression, plain = found.regression, simplest_structure(found).laws
     bent = [k for k in plain if not regression.laws[k].linear]
     delay_s = 0.0 if beside.delay_s else _find_delay_s(keep_laws(regression, bent))
     if not delay_s and len(bent) == len(plain):

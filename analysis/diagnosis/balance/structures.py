@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.given_base import GivenBase, regression_beside_model, takes_enough
 from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, scales_of
 from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
+from analysis.diagnosis.balance.model_base import GivenBase, regression_beside_model, takes_enough
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.balance.regression import Regression, append_laws, keep_laws, regression_of, replace_law
 from analysis.diagnosis.settings import FURTHER_LAW_ERRORS, FURTHER_LAW_GAIN, MOST_SUMMED_LAWS, STRUCTURES_BEAM

@@ -12,7 +12,7 @@ import numpy as np
 from analysis.diagnosis.balance.judge_laws import Balance, family_of
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_something
-from analysis.diagnosis.confirm.laws_to_play import (
+from analysis.diagnosis.confirm.laws_for_simulation import (
     CONSTANT,
     can_be_played,
     constants_of,

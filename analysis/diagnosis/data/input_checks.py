@@ -6,10 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
-from analysis.diagnosis.data.as_recorded import weight_problems
 from analysis.diagnosis.data.driven_response import response_significance
-from analysis.diagnosis.data.growth import free_motion_rates, growth_rate
+from analysis.diagnosis.data.growth_rate import free_motion_rates, growth_rate
 from analysis.diagnosis.data.observed_parts import samples_to_fit
+from analysis.diagnosis.data.recorded_conditions import weight_problems
 from analysis.diagnosis.settings import (
     ANSWER_DEVIATIONS,
     CYCLES_SHARE,

@@ -1,4 +1,4 @@
-"""Makes the error measure of recordings and a model: by the rule of `measure_rule`, or as a user asks."""
+"""Makes the error measure of recordings and a model: by the rule of `error_measure_rule`, or as a user asks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,8 +11,8 @@ from analysis.diagnosis.data.observed import Observed, error_units
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.error_measure_rule import UNTIMED, Choice, choose_measure, samples_to_settle
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.measure_rule import UNTIMED, Choice, choose_measure, samples_to_settle
 from analysis.diagnosis.errors.windows import windows_of
 from analysis.diagnosis.forces.force_views import force_views
 from analysis.diagnosis.noise.noise_floor import NoiseFloor, noise_floor

@@ -6,9 +6,9 @@ from typing import Self
 
 import numpy as np
 
-from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.unexplained_motion import evidence_of
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.errors.evidence_from_residuals import evidence_of
 from equalizer.effects.effect import AxisForce, Effect, JointForce, PlacedEffect
 from equalizer.effects.simulation.simulator import Measurement, SimulationResult, simulate_mechanism, simulate_response
 from equalizer.effects.starts.evidence import Evidence

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.data.growth import is_unstable_within
+from analysis.diagnosis.data.growth_rate import is_unstable_within
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.tuning import Tuning

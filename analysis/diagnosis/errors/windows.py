@@ -10,11 +10,11 @@ from typing import Self
 
 import numpy as np
 
-from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motion
 from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.errors.evidence_from_residuals import without_gaps
 from analysis.diagnosis.errors.free_simulation import predicted_channels
-from analysis.diagnosis.errors.unexplained_motion import without_gaps
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
 from equalizer.effects.simulation.along_motion import actuator_force
 from equalizer.effects.simulation.bodies import Restarts, bodies_of

@@ -6,7 +6,7 @@ does. So forces are balanced with both signs, with mass and damping non-negative
 accepted where it has a clearly smaller error on held-out folds. A spring alone does not determine the sign.
 
 A recording's `meta` lists the reversed commands, and a model of the device is written for the commands as they were
-recorded: see `as_recorded`.
+recorded: see `recorded_conditions`.
 """
 
 from collections.abc import Sequence

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.as_recorded import add_mass
+from analysis.diagnosis.data.recorded_conditions import add_mass
 from analysis.diagnosis.document import NextExperiment
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import MOVED, Fitted

@@ -9,7 +9,7 @@ import numpy as np
 from analysis.diagnosis.data.measured_motion import is_quasi_static
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.measure_rule import IN_SAMPLES
+from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.first_model.reversed_commands import as_recorded
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, learned_sentence

@@ -24,7 +24,7 @@ from analysis.diagnosis.result.ceiling_wording import (
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import impact_sentence
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.retuned_numbers import (
+from analysis.diagnosis.result.retuned_parameters import (
     MovedNumber,
     better_alone,
     better_model,

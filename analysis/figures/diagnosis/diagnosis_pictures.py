@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
+from analysis.diagnosis.result.residual_spectrum import remainder_spectra
 from analysis.diagnosis.search.guard import Guard, Part
 from analysis.figures.diagnosis.held_out import held_out_picture
 from analysis.figures.diagnosis.mismatch_map import driving_inputs, mismatch_map_picture

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from equalizer.effects.effect import ALL_SITES
-from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.simulation.interpolated_response import read_other_times
 from equalizer.effects.starts.command_starts import best_on_grid
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from equalizer.tracking.lqr.changing_direction import TurningTransient, normal_transient
 from equalizer.tracking.lqr.lqr import stored_gains
 from equalizer.tracking.lqr.padding import CAUSAL, Padding, band_spectrum
 from equalizer.tracking.lqr.rotation import RotationBasis, every_normal, normal_basis
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem
-from equalizer.tracking.lqr.turning import TurningTransient, normal_transient
 
 
 @dataclass(frozen=True, slots=True, eq=False)

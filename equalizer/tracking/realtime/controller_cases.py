@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from equalizer.tracking.lqr.changing_direction import play
 from equalizer.tracking.lqr.tracking_problem import TrackingError
-from equalizer.tracking.lqr.turning import play
 from equalizer.tracking.realtime.realtime_controller import RealtimeController
 
 OF_CAP = 0.9

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import ANSWER, DIED, RECORDING, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
-from study.store.disk.carried_folder import Files, read_files, write_files
+from study.store.disk.folder_contents import Files, read_files, write_files
 from study.store.disk.text_file import read_text, write_text
 from study.workflows.pieces import finished_pieces
 

@@ -12,7 +12,7 @@ from study.errors import DeviceError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
 from study.session.views.handle_notice import BeforeMoving, free_handle_notice
 from study.workflows.equalizer.models_for_playing import ModelsForPlaying
-from study.workflows.equalizer.spring_beside_model import spring_outside_model
+from study.workflows.equalizer.spring_not_in_model import spring_outside_model
 
 SPRING_HZ = 3.5
 """Spring of the shipped recordings, for a model that does not state its spring."""

@@ -23,7 +23,7 @@ from study.store.disk.atomic_write import write_atomically
 from study.store.disk.provenance import sha256_of
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.sessions.archive import SessionFolder
-from study.workflows.equalizer.spring_beside_model import spring_outside_model
+from study.workflows.equalizer.spring_not_in_model import spring_outside_model
 
 MODEL_NAME = "model.h5"
 NEAR_M = 0.02

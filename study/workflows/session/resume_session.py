@@ -46,9 +46,8 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
     close_to_others(folder.path, inside=True)  # an earlier version left its files to everyone
     with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
-        # Yesterday's stop must not end today's sitting; from now on requests are received. Nor is yesterday's live
-        # state
-        # valid today at any time.
+        # A stop request of the interrupted sitting must not end this one, and its live state is outdated; from now on
+        # requests are received.
         RequestInbox(folder.path).clear()
         remove_live(folder.path)
         try:

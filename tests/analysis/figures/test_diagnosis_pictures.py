@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.text import Annotation
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
+from analysis.diagnosis.result.residual_spectrum import remainder_spectra
 from analysis.figures.diagnosis.held_out import draw_held_out, find_excerpt
 from analysis.figures.diagnosis.mismatch_map import draw_mismatch_map, mismatch_map_picture
 from analysis.figures.diagnosis.remainder import draw_remainder

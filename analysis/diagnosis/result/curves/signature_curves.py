@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.diagnosis.errors.unexplained_motion import EXPECTED
+from analysis.diagnosis.errors.evidence_from_residuals import EXPECTED
 from analysis.diagnosis.forces.missing_force import missing_force
 from analysis.diagnosis.result.curves.law_curves import law_signature
 from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, running_rms

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.as_recorded import add_carried_weight, add_mass, has_carried_weight
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, add_mass, has_carried_weight
 from analysis.diagnosis.errors.choose_measure import measure_of
 from equalizer.effects.simulation.simulator import simulate_mechanism
 

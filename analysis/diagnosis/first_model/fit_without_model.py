@@ -7,10 +7,10 @@ import numpy as np
 
 from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.balance.motion import NoMotionError
-from analysis.diagnosis.data.as_recorded import has_carried_weight
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, is_read_as_free
-from analysis.diagnosis.first_model.model_of_balance import FirstModel, plain_model
+from analysis.diagnosis.data.recorded_conditions import has_carried_weight
+from analysis.diagnosis.first_model.model_from_balance import FirstModel, plain_model
 from analysis.diagnosis.first_model.model_structures import (
     HELD_FIXED,
     Kind,
@@ -55,8 +55,8 @@ def first_model_of(
     map_: Mapper = map,
 ) -> FirstModel:
     """The first model, from the force balance where that names laws along the motion of one body per command; else by a
-    fit to spectra, which takes longer. recordings: in the form of `plain_form`. Raises NothingToDiagnose where no model
-    can be fitted."""
+    fit to spectra, which takes longer. recordings: in the form of `one_motion_per_force`. Raises NothingToDiagnose
+    where no model can be fitted."""
     _require_no_weight(recordings)
     on_progress("weighing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(without), time_left, map_)

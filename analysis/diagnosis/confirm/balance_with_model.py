@@ -11,16 +11,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.given_base import GivenBase
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
+from analysis.diagnosis.balance.model_base import GivenBase
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.structures import search_structures
-from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.forces.needed_force import band_motion, needed_force
+from analysis.diagnosis.forces.inverse_dynamics import band_motion, required_force
 from analysis.diagnosis.settings import LAW_OF_SIGNAL, MOTION_OVERSAMPLED
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import PlacedEffect, Structure
@@ -83,7 +83,7 @@ def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
     known = under_conditions(place_recorded_effects(model, recording), recording)
     at = _structure(add_carried_weight(model, recording), known)
-    whole = needed_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
+    whole = required_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     course = whole.axis_position, whole.axis_velocity, whole.axis_acceleration
     entered = actuator_force(model, motion.force, rate_hz, known, recording.hold)
     added = force_along(at, known, course, (motion.force, entered - whole.force), rate_hz)
@@ -126,7 +126,7 @@ def _mode_columns(
     moved = band_motion(seen, motion.rate_hz, motion.band_hz)
     steps = MOVED * np.eye(len(tuning.names))[first:]
     here, *there = (
-        needed_force(_structure(add_carried_weight(tuning.tune(step), recording), known), moved).force
+        required_force(_structure(add_carried_weight(tuning.tune(step), recording), known), moved).force
         for step in (0 * steps[0], *steps)
     )
     yield from ((each - here) / MOVED for each in there)

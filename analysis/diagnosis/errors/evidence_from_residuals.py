@@ -1,4 +1,4 @@
-"""Converts the residual of a simulation to a missing force along each axis, with its motion."""
+"""Converts the residuals of a simulation to evidence for starting values: the missing force along each axis."""
 
 import numpy as np
 
@@ -46,10 +46,12 @@ def evidence_of(
     )
 
 
-def without_gaps(measured: FloatArray, left: FloatArray, played: SimulationResult) -> tuple[FloatArray, FloatArray]:
+def without_gaps(
+    measured: FloatArray, residuals: FloatArray, played: SimulationResult
+) -> tuple[FloatArray, FloatArray]:
     """Measured and predicted signals, (n, c) each, without gaps: missing samples are replaced by the simulation in
     both, so that their difference is zero."""
     known = np.isfinite(measured)
-    course = np.hstack([played.response, played.position])[:, : measured.shape[1]]
-    predicted = np.where(known, measured - left, course)
+    simulated = np.hstack([played.response, played.position])[:, : measured.shape[1]]
+    predicted = np.where(known, measured - residuals, simulated)
     return np.where(known, measured, predicted), predicted

@@ -12,7 +12,7 @@ HEARD_WITHIN_S = 3.0
 LOOK_EVERY_S = 0.02
 
 
-def ask_session(folder: SessionFolder, request: Request, clock: Clock) -> bool:
+def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
     """Returns whether the session received it; a note that is not received yet stays in the inbox.
 
     Raises StudyError where nothing runs, or where a stop or pause was not received.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.tracking.bands.two_models import TwoModels
+from equalizer.tracking.bands.narrow_and_wide_models import TwoModels
 
 NARROW = IdentifiedModel(
     np.zeros((3, 3)), np.eye(3), np.eye(3), np.zeros((3, 3)), 1000.0, (5.0, 35.0), "N", "m/s^2",

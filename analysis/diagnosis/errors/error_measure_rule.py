@@ -25,7 +25,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
-from analysis.diagnosis.data.growth import is_unstable_within
+from analysis.diagnosis.data.growth_rate import is_unstable_within
 from analysis.diagnosis.data.measured_motion import has_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.windows import WINDOW_S

@@ -21,7 +21,7 @@ from equalizer.effects.effect import Effect
 THERE_BEFORE = "the clean recordings are predicted better with it, too: it did not come since"
 
 
-def search_beside_reference(
+def search_with_reference(
     context: SearchContext,
     learned: LearnedError,
     catalogue: Sequence[Effect],

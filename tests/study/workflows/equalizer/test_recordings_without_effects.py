@@ -17,8 +17,8 @@ from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import read_recording, write_recording
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
-from study.workflows.equalizer.freed_recordings import excitation_band_hz
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
+from study.workflows.equalizer.recordings_without_effects import excitation_band_hz
 
 pytestmark = pytest.mark.usefixtures("sketched")
 

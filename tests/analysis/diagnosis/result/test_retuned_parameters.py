@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from analysis.diagnosis.result.retuned_numbers import MovedNumber, doubtful_sentences, retuned_sentence
+from analysis.diagnosis.result.retuned_parameters import MovedNumber, doubtful_sentences, retuned_sentence
 
 MOVED = MovedNumber("damping fx", 0.35, "N s/m", 2.1)
 

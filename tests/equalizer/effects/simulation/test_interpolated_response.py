@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.simulation.interpolated_response import read_other_times
 
 RATE_HZ = 1000.0
 ALL = (0, 1, 2)

@@ -15,8 +15,8 @@ _NEARLY_STILL_HZ = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NeededForce:
-    """Needed force and axis motion within a band; each (n, m)."""
+class RequiredForce:
+    """Required force and axis motion within a band; each (n, m)."""
 
     force: FloatArray
     axis_position: FloatArray
@@ -56,47 +56,51 @@ def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> 
     return BandMotion(position, sample_rate_hz, band_hz, (x, v, a), (mean_x, mean_v, mean_a))
 
 
-def needed_force(model: MechanicalModel, motion: BandMotion) -> NeededForce:
-    """Mean of the needed force over one sample period around each instant, without actuator, sensor and effects. Raises
-    numpy.linalg.LinAlgError where the first m outputs do not determine the model's motion."""
+def required_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
+    """Mean of the required force over one sample period around each instant, without actuator, sensor and effects.
+
+    Raises numpy.linalg.LinAlgError where the first m outputs do not determine the model's motion."""
     if model.coordinates == model.inputs:
         return _force_of_square_model(model, motion)
     position, sample_rate_hz = motion.position, motion.sample_rate_hz
-    m, learned = model.inputs, inverse_of(model, len(position), sample_rate_hz / 2)
+    m, inverse_at = model.inputs, inverse_of(model, len(position), sample_rate_hz / 2)
 
     def gain(frequency_hz: FloatArray) -> ComplexArray:
         within = low_pass_gain(frequency_hz, motion.band_hz)[:, None, None]
-        inverse = learned(frequency_hz)
+        inverse = inverse_at(frequency_hz)
         inverse[:, :m] *= np.sinc(frequency_hz / sample_rate_hz)[:, None, None]
         wave = 2j * np.pi * frequency_hz[:, None, None]
         axes = inverse[:, m:]
         return np.asarray(within * np.concatenate([inverse[:, :m], axes, wave * axes, wave**2 * axes], axis=1))
 
     found = filter_by_gain(position, sample_rate_hz, gain) + _force_along_line(model, position, sample_rate_hz)
-    return NeededForce(*(found[:, part * m : (part + 1) * m] for part in range(4)))
+    return RequiredForce(*(found[:, part * m : (part + 1) * m] for part in range(4)))
 
 
-def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> NeededForce:
+def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
     """For a model whose every coordinate is measured: the derivatives suffice, without another Fourier transform."""
-    moved = np.linalg.inv(model.output[: model.inputs])
-    pushed = np.linalg.inv(model.input)
+    to_coordinates = np.linalg.inv(model.output[: model.inputs])
+    to_commands = np.linalg.inv(model.input)
     matrices = model.stiffness, model.damping, model.mass
     force = sum(
-        (derivative @ (pushed @ matrix @ moved).T for derivative, matrix in zip(motion.around, matrices, strict=True)),
+        (
+            derivative @ (to_commands @ matrix @ to_coordinates).T
+            for derivative, matrix in zip(motion.around, matrices, strict=True)
+        ),
         np.zeros_like(motion.position),
     )
-    along = (driven_axes(model).T @ moved).T
-    return NeededForce(force, *(derivative @ along for derivative in motion.at))
+    to_axes = (driven_axes(model).T @ to_coordinates).T
+    return RequiredForce(force, *(derivative @ to_axes for derivative in motion.at))
 
 
 def _force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
-    """(n, 4 m): needed force and motion for the straight line between first and last position, in the steady state. The
-    Fourier transform is applied to the rest only."""
+    """(n, 4 m): required force and motion for the straight line between first and last position, in steady
+    state. The Fourier transform is applied to the rest only."""
     m = model.inputs
     line = end_to_end_line(position)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
     still = inverse_lines(model, np.array([0.0, _NEARLY_STILL_HZ]))
     static, rate = still[0].real, still[1].imag / (2 * np.pi * _NEARLY_STILL_HZ)
-    moved = line @ static.T + slope @ rate.T
-    along = np.broadcast_to(slope @ static[m:].T, (len(line), m))
-    return np.hstack([moved, along, np.zeros((len(line), m))])
+    force_and_position = line @ static.T + slope @ rate.T
+    velocity = np.broadcast_to(slope @ static[m:].T, (len(line), m))
+    return np.hstack([force_and_position, velocity, np.zeros((len(line), m))])

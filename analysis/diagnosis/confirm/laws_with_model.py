@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import PLAYED_AS, Balance
-from analysis.diagnosis.confirm.balance_beside_model import find_balances_beside_model
+from analysis.diagnosis.confirm.balance_with_model import find_balances_beside_model
 from analysis.diagnosis.confirm.confirm_laws import search_by_balance
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, held_out_gain
@@ -40,14 +40,14 @@ class ResultBesideModel:
     """Empty where nothing is missing, or no motion was measured."""
 
 
-def judge_beside_model(
-    recordings: Sequence[Recording], look: FittingMeasure, seen: SearchResult, time_left: TimeBudget
+def judge_with_model(
+    recordings: Sequence[Recording], fitting: FittingMeasure, seen: SearchResult, time_left: TimeBudget
 ) -> ResultBesideModel:
     """The result by held-out gain, and the balances beside the model. seen: the result of the search by simulation."""
     if seen.judgement.verdict not in ("unexplained", "partly_explained") or seen.found.statistic is not None:
         return ResultBesideModel(seen)
-    known_noise = all(floor.how == "repeats" for floor in look.chosen.floors)
-    balances = find_balances_beside_model(recordings, look.model, seen.context.barred, time_left)
+    known_noise = all(floor.how == "repeats" for floor in fitting.chosen.floors)
+    balances = find_balances_beside_model(recordings, fitting.model, seen.context.barred, time_left)
     near = float(np.nanmax(seen.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
     if seen.judgement.named or seen.found.barred:
         return ResultBesideModel(seen, balances)

@@ -10,7 +10,7 @@ WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
 """Laws whose only nonlinear number is the width of a smoothed sign."""
 
 
-def plainest_structure(search: StructureSearch) -> Structure:
+def simplest_structure(search: StructureSearch) -> Structure:
     """The structure with the fewest parameters whose cross-validated error is close to the smallest."""
     allowed = search.best.error + PLAINER_LEAVES * (search.linear.error - search.best.error)
     enough = [each for each in search.ranked if each.error <= allowed]

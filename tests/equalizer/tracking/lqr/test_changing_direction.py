@@ -3,11 +3,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from equalizer.tracking.lqr.changing_direction import (
+    initial_state,
+    normal_transient,
+    play,
+    restart,
+    step,
+    turning_transient,
+)
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.rotation import rotation_basis
 from equalizer.tracking.lqr.toeplitz import least_squares_forces
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
-from equalizer.tracking.lqr.turning import initial_state, normal_transient, play, restart, step, turning_transient
 
 N = 120
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.errors.measure_rule import choose_measure, is_self_stable
+from analysis.diagnosis.errors.error_measure_rule import choose_measure, is_self_stable
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import Signal
 from tests.analysis.diagnosis.errors.drifting_plant import RATE_HZ, model

@@ -11,9 +11,9 @@ from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.first_model.free_motion import read_free_motion
+from analysis.diagnosis.first_model.infer_quantity import name_motion
 from analysis.diagnosis.first_model.restore_sign import restore_sign
 from analysis.diagnosis.first_model.reversed_commands import reverse_commands
-from analysis.diagnosis.first_model.unnamed_motion import name_motion
 from analysis.diagnosis.settings import DEPENDENT_SIGNALS
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -31,7 +31,7 @@ Recordings = tuple[Recording, ...]
 Step = Callable[[Recordings], tuple[Recordings, str]]
 
 
-def plain_form(recordings: Sequence[Recording], turns: bool = True) -> tuple[Recordings, tuple[str, ...]]:
+def one_motion_per_force(recordings: Sequence[Recording], turns: bool = True) -> tuple[Recordings, tuple[str, ...]]:
     """The converted recordings, and a sentence for each change. recordings: alike in channels, units and rate. turns:
     commands that are counted against their motion are reversed; not where a model says already how they are counted."""
     found, said = tuple(recordings), []

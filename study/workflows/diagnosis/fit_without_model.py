@@ -5,8 +5,8 @@ from contextlib import contextmanager
 
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.diagnosis_settings import BALANCE
-from analysis.diagnosis.first_model import fitted_first
-from analysis.diagnosis.first_model.model_of_balance import FirstModel
+from analysis.diagnosis.first_model import fit_without_model
+from analysis.diagnosis.first_model.model_from_balance import FirstModel
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -23,7 +23,7 @@ def first_model_of(
     time_left, guard = bounds
 
     def weighed() -> FirstModel | None:
-        return fitted_first.first_model_of(found.recordings, without, time_left, on_progress, map_forked)
+        return fit_without_model.first_model_of(found.recordings, without, time_left, on_progress, map_forked)
 
     with _translate_refusals():
         first = guard.part(BALANCE, "the first model", weighed, None, (NothingToDiagnose,))
@@ -35,7 +35,7 @@ def fit_linear_model(
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """A linear model fitted to the spectra, and remarks, as in `analysis`. Raises StudyError."""
     with _translate_refusals():
-        return fitted_first.fit_first_linear_model(found.recordings, on_progress, whose)
+        return fit_without_model.fit_first_linear_model(found.recordings, on_progress, whose)
 
 
 @contextmanager
