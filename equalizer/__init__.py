@@ -1,6 +1,6 @@
-"""What the device is and how to drive it. Pure: values in, values out; knows neither protocols nor sessions.
+"""The device and its control. Pure: values in, values out; independent of protocols and sessions.
 
-Read in this order: `signals.signal` and `signals.recording` (the two values everything is about), `signals.lockin`,
+Read in this order: `signals.signal` and `signals.recording` (the two basic types), `signals.lockin`,
 `plant` (models of the device, the vocabulary of effects), `tracking.feedforward.equalizer` (the interface that a
 stimulus passes through).
 """

@@ -83,7 +83,7 @@ class Trial:
     """False: a person answered while no device moved. None: a simulated participant."""
     status: TrialStatus
     angle_deg: float | None = None
-    """Of the direction played, in the plane of the protocol's directions; does not depend on how they are labelled."""
+    """Angle of the direction played, in the plane of the protocol's directions; independent of the labels."""
     wanted_mps2: float | None = None
     """The acceleration that the level stands for. None where the level is the commanded force."""
     void_cause: VoidCause | None = None

@@ -1,12 +1,12 @@
-"""Doing it: the only package with side effects. Sessions, devices, files, people, screens.
+"""Sessions, devices, files, people, screens: the only package with side effects.
 
-Layers, each knowing only those after it: `cli`, `tui`, `workflows`, `devices`, then `store` and `participants`
+Layers, each importing only those after it: `cli`, `tui`, `workflows`, `devices`, then `store` and `participants`
 beside each other, then `session`, which is pure, then `regular_file` and `errors`.
 
-Read in this order: `session.facts.events` (the facts), `session.state.fold` (what they come to),
-`session.state.machine` (what is next), `workflows.session.run_session` and `workflows.trial.present_trial` (doing it),
-`devices.device` (the port) and `devices.governor.govern` (what keeps the force within its limits),
-`store.sessions.event_log` (on the disk before it is acted on).
+Read in this order: `session.facts.events` (the facts), `session.state.fold` (the state that follows
+from them), `session.state.machine` (the next action), `workflows.session.run_session` and
+`workflows.trial.present_trial` (its execution), `devices.device` (the port), `devices.governor.govern` (force limits)
+and `store.sessions.event_log` (facts are on disk before the program acts on them).
 
 Decisions:
 

@@ -1,4 +1,4 @@
-"""What changed between two measurements of a device, each number beside the accepted one and its limit."""
+"""Changes between two measurements of a device, each number beside the accepted one and its limit."""
 
 import math
 from collections.abc import Iterator
@@ -19,12 +19,13 @@ from equalizer.signals.signal import FloatArray
 @dataclass(frozen=True, slots=True)
 class ChangeLimits:
     step_db: float = 1.0
-    """Of gain and response: the finest step of the published staircases. A smaller change moves a threshold by less
-    than a step."""
+    """Limit of gain and response: the finest step of the published staircases. A smaller change moves a threshold by
+    less than a step."""
     friction_n: float = 0.12
     """The same step at the 1 N with which those staircases begin."""
     noise_factor: float = 2.0
-    """By hand: no threshold depends on the noise, a sensor that works loose or a broken shield has several times it."""
+    """Limit of the noise, chosen by hand: no threshold depends on the noise, and a loose sensor or broken shield
+    multiplies it."""
     deviations: float = 3.0
     """Standard errors beyond which a change is more than the scatter of the measurements."""
     band_octaves: float = 1 / 3
@@ -32,7 +33,7 @@ class ChangeLimits:
 
     @property
     def share(self) -> float:
-        """Of the accepted response."""
+        """`step_db` as a share of the accepted value."""
         return float(10 ** (self.step_db / 20) - 1)
 
 
@@ -49,14 +50,14 @@ class Change:
     error: float
     """Standard error of the difference."""
     limit: float
-    """Of the difference; for noise, of the ratio."""
+    """Limit of the difference; for noise, of the ratio."""
     unit: str
     changed: bool
     """Beyond the limit, and beyond the scatter of the measurements."""
     band_hz: tuple[float, float] | None = None
-    """Of a response: where it changed most."""
+    """Band in which a response changed most."""
     peaks_hz: tuple[float, float] | None = None
-    """Of a changed response: where it is strongest about there, then and now."""
+    """Frequencies of the peak of a changed response, then and now."""
     unclear: bool = False
     """Nothing was seen to change, and it was measured too inaccurately to see a change of the limit's size, or (today
     is NaN) not at all."""
@@ -172,7 +173,8 @@ def _worst_band(
 
 
 def _peak_hz(response: FrequencyResponse, band_hz: tuple[float, float], axis: int) -> float:
-    """Where the answer to the force along `axis` is strongest, within the band and half as much to either side."""
+    """Frequency of the strongest response to the force along `axis`, within the band extended by half on either
+    side."""
     wider = (band_hz[1] / band_hz[0]) ** 0.5
     lines = response.within(band_hz[0] / wider, band_hz[1] * wider)
     strength = np.linalg.norm(lines.response[:, :, axis], axis=1)

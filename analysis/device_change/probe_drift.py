@@ -1,16 +1,16 @@
-"""What drifts during a session: probes compared line by line with the first ones, in physical numbers.
+"""Drift of a device during a session: probes are compared line by line with the first ones, in physical parameters.
 
 A line drives one axis j with the force F; all axes answer with accelerations A. With A0, F0 of the first probes at the
-same level, and a mechanism that is reciprocal, all else that it does drops out of
+same level, and a mechanism that is reciprocal, its other properties cancel in
 
     (F A0_j - F0 A_j) / (A0_j A_j) = sum over k of (dM_k + dC_k / iw - dK_k / w^2) A0_k A_k / (A0_j A_j)
                                      - g_j F / A_j + iw T F / A_j + friction
 
-dM, dC, dK: what the hand adds now; g: relative change of the force that really comes; T: added delay. Friction: its
-shapes S (force of 1 N along the measured motion) times its change, dFc_k A0_k S_k / (A0_j A_j), and times its value at
-first, for the shape changes with the motion. That value shows in how the first answers depend on the level. Noise comes
-from how the first probes of a level differ. Of all causes and pairs of causes those are taken that explain most for
-their numbers.
+dM, dC, dK: change of the hand's mass, damping and stiffness; g: relative change of the delivered force; T: added delay.
+Friction: its shapes S (force of 1 N along the measured motion) times its change, dFc_k A0_k S_k / (A0_j A_j), and times
+its value at first, because the shape changes with the motion. That value is estimated from the level dependence of the
+first responses. The noise is estimated from the differences between the first probes of a level. Of all causes and
+pairs of causes, those with the best penalised fit are selected.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from equalizer.signals.signal import FloatArray
 
 AXES = "xyz"
 BASE_CYCLES = 2
-"""So often each level is played before anything is compared: their differences are the noise."""
+"""Number of probes at each level before anything is compared: their differences give the noise."""
 COST = 8.0
-"""Of one more number, in units of the squared misfit over noise: twice Akaike's and more, against false alarms."""
+"""Penalty per parameter, in units of the squared misfit over noise: more than twice Akaike's, against false alarms."""
 MOST = 2
 """Causes at a time: with more of them, what friction does beyond its law is taken for hand and motor."""
 SAME = 2.0
@@ -50,7 +50,7 @@ class TimedProbe:
     """One probe with a hand on the handle."""
 
     at_s: float
-    """Since the session began."""
+    """Time since the session began."""
     level_n: float
     lines: ProbeLines
 
@@ -69,7 +69,7 @@ class Drift:
     error: float
     """Standard error."""
     before: float | None
-    """Of friction: as it was at first; None where only the change is known."""
+    """Initial value of the friction; None where only the change is known."""
     rivals: tuple[str, ...] = ()
     """Causes that the probes cannot tell from this one."""
 
@@ -79,10 +79,8 @@ class Drift:
 
 
 def drifts(probes: Sequence[TimedProbe], period: int, causes: Sequence[str] = tuple(CAUSES)) -> tuple[Drift, ...]:
-    """What differs from the first probes in the newest one of each level. Empty while there are too few.
-
-    period: samples. Probes are ordered by time. causes: what may have changed; without a hand no grip.
-    """
+    """Differences of the newest probe of each level from the first ones. Empty with too few probes. period: samples.
+    Probes are ordered by time. causes: possible changes; without a hand no grip."""
     levels = sorted({probe.level_n for probe in probes})
     by_level = {level: [probe for probe in probes if probe.level_n == level] for level in levels}
     if not probes or min(len(found) for found in by_level.values()) < BASE_CYCLES + 1:
@@ -148,7 +146,8 @@ def _compare(probes: Sequence[TimedProbe], shapes: ComplexArray, levels: FloatAr
 def _columns(
     w: FloatArray, stiff: ComplexArray, axes: IntArray, products: tuple[ComplexArray, ComplexArray, ComplexArray]
 ) -> dict[tuple[str, int], ComplexArray]:
-    """What one unit of each number adds to the difference, (probes, lines). Delay is one for all axes, as axis 0."""
+    """Change of the difference per unit of each parameter, (probes, lines). The delay is the same for all axes, as axis
+    0."""
     motion, friction, both = products
     found: dict[tuple[str, int], ComplexArray] = {("delay", 0): 1j * w * stiff}
     for axis in range(3):

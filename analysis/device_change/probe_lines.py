@@ -17,7 +17,7 @@ ComplexArray = npt.NDArray[np.complex128]
 IntArray = npt.NDArray[np.int64]
 
 DRIVEN_SHARE = 0.1
-"""Of an axis' strongest line: what is weaker was not driven, but comes from rounding and spring."""
+"""Least amplitude of a driven line, relative to an axis's strongest: weaker ones are due to rounding and the spring."""
 
 FROM_HZ = 3.0
 """Integrated twice, what the accelerometer says below is drift."""
@@ -75,7 +75,7 @@ def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
 
 
 MASS_LINES_HZ = (30.0, 60.0)
-"""Where neither friction and springs nor the linkage's modes matter much."""
+"""Lines at which friction, springs and the linkage's modes matter little."""
 
 
 def apparent_mass_kg(lines: ProbeLines) -> float:

@@ -13,7 +13,7 @@ from analysis.diagnosis.confirm.confirm_laws import (
     search_by_balance,
 )
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure, choose_fitting_measure, list_fitting_measures
-from analysis.diagnosis.confirm.laws_beside_model import ResultBesideModel, judge_beside_model
+from analysis.diagnosis.confirm.laws_with_model import ResultBesideModel, judge_with_model
 from analysis.diagnosis.data.input_checks import is_too_short_to_name
 from analysis.diagnosis.data.observed_parts import names_of_parts
 from analysis.diagnosis.diagnosis_settings import BALANCE, DiagnosisSettings
@@ -56,14 +56,14 @@ def diagnose(
         balances = known if known is not None else _balances(recordings, settings, map_)
         if is_too_short_to_name(recordings):
             balances = tuple(balance.without_names(TOO_SHORT) for balance in balances)
-        for number, look in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
+        for number, fitting in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
             progress("fitting the named laws", 0.2 + 0.3 * number)
-            context = search_context_of(recordings[0], look, settings, map_)
-            repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
+            context = search_context_of(recordings[0], fitting, settings, map_)
+            repeats = all(floor.how == "repeats" for floor in fitting.chosen.floors)
             weigh = partial(search_by_balance, context, balances, repeats)
             found = settings.guard.part(BALANCE, "the fit of its laws", weigh, None)
-            if found is not None and not (look.narrow and leaves_open(found)):
-                return _assemble(recordings, settings, look, SearchOutcome(found, CleanFloor()), balances)
+            if found is not None and not (fitting.narrow and leaves_open(found)):
+                return _assemble(recordings, settings, fitting, SearchOutcome(found, CleanFloor()), balances)
     progress("measuring the noise", 0.3 if balances else 0.0)
     if settings.clean:
         return _diagnose_beside_clean(recordings, model, settings, map_, progress)
@@ -78,16 +78,16 @@ def _diagnose_by_model(
     progress: Progress,
     balances: tuple[Balance, ...] = (),
 ) -> Findings:
-    look = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
+    fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     if settings.fitted and is_too_short_to_name(recordings):
-        unsearched = SearchOutcome(_unsearched(recordings, look, settings, map_), CleanFloor())
-        return _assemble(recordings, settings, look, unsearched, balances)
-    seen = search_by_simulation(recordings, look, settings, map_, progress, balances)
+        unsearched = SearchOutcome(_unsearched(recordings, fitting, settings, map_), CleanFloor())
+        return _assemble(recordings, settings, fitting, unsearched, balances)
+    seen = search_by_simulation(recordings, fitting, settings, map_, progress, balances)
     if not settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.9)
-        seen, balances = _judge_beside_model(recordings, look, seen, settings)
+        seen, balances = _judge_with_model(recordings, fitting, seen, settings)
     progress("writing down what was found", 0.95)
-    return _assemble(recordings, settings, look, seen, balances)
+    return _assemble(recordings, settings, fitting, seen, balances)
 
 
 def _diagnose_beside_clean(
@@ -104,12 +104,12 @@ def _diagnose_beside_clean(
     from analysis.diagnosis.reference.learn_model_error import learn_model_floor
     from analysis.diagnosis.result.contrast_findings import add_contrast
 
-    look = FittingMeasure(model, measure_of(recordings, model))
+    fitting = FittingMeasure(model, measure_of(recordings, model))
     progress("comparing with the clean recordings", 0.1)
     contrast = contrast_of(recordings, settings.clean, frozenset(settings.without), settings.time_left)
     if is_too_short_to_name(recordings):
         contrast = contrast.without_name(TOO_SHORT)
-    if not settings.fitted and (noise_is_from_repeats(look.chosen) or predicts_clean(model, settings.clean)):
+    if not settings.fitted and (noise_is_from_repeats(fitting.chosen) or predicts_clean(model, settings.clean)):
         found_by_model = _diagnose_by_model(recordings, model, settings, map_, progress)
         said = found_by_model.diagnosis
         names = frozenset(name for effect in said.effects for name in (effect.effect, *effect.class_))
@@ -119,18 +119,18 @@ def _diagnose_beside_clean(
         unweighed = _search_beside_clean(recordings, model, settings, contrast.tested_effects, map_, progress)
         if unweighed is not None:
             return unweighed
-    found = _unsearched(recordings, look, settings, map_)
+    found = _unsearched(recordings, fitting, settings, map_)
     progress("writing down what was found", 0.95)
     floor = CleanFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
-    whole = _assemble(recordings, settings, look, SearchOutcome(found, floor), ())
+    whole = _assemble(recordings, settings, fitting, SearchOutcome(found, floor), ())
     return add_contrast(whole, contrast, recordings[0], FAULT_BEYOND)
 
 
 def _unsearched(
-    recordings: Sequence[Recording], look: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
+    recordings: Sequence[Recording], fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchResult:
     """The model as it is given, with nothing named."""
-    context = search_context_of(recordings[0], look, settings, map_)
+    context = search_context_of(recordings[0], fitting, settings, map_)
     given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     stands = context.with_test_score(context.candidate(given))
     return SearchResult(context, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
@@ -146,10 +146,10 @@ def _search_beside_clean(
 ) -> Findings | None:
     """Findings by the search beside clean recordings. weighed: effects that the comparison tested, and did not find.
     None where the search names nothing else, or cannot be done."""
-    look = choose_fitting_measure(recordings, model, settings.clean, settings.compared)
+    fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared)
     rest = replace(settings, without=(*settings.without, *weighed))
     try:
-        seen = search_by_simulation(recordings, look, rest, map_, progress, ())
+        seen = search_by_simulation(recordings, fitting, rest, map_, progress, ())
     except (NothingLearned, np.linalg.LinAlgError):
         return None
     context = seen.result.context
@@ -157,7 +157,7 @@ def _search_beside_clean(
     result = require_enough_gain(replace(seen.result, found=found, errors=None), False)
     if not (result.judgement.named and result.found.steps):
         return None
-    return _assemble(recordings, settings, look, replace(seen, result=result), ())
+    return _assemble(recordings, settings, fitting, replace(seen, result=result), ())
 
 
 def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper) -> tuple[Balance, ...]:
@@ -168,10 +168,10 @@ def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_
     return settings.guard.part(BALANCE, "its weighing", weighed, ())
 
 
-def _judge_beside_model(
-    recordings: Sequence[Recording], look: FittingMeasure, seen: SearchOutcome, settings: DiagnosisSettings
+def _judge_with_model(
+    recordings: Sequence[Recording], fitting: FittingMeasure, seen: SearchOutcome, settings: DiagnosisSettings
 ) -> tuple[SearchOutcome, tuple[Balance, ...]]:
-    weigh = partial(judge_beside_model, recordings, look, seen.result, settings.time_left)
+    weigh = partial(judge_with_model, recordings, fitting, seen.result, settings.time_left)
     beside = settings.guard.part(BALANCE, "its weighing", weigh, ResultBesideModel(seen.result))
     return replace(seen, result=beside.result), beside.balances
 
@@ -179,15 +179,15 @@ def _judge_beside_model(
 def _assemble(
     recordings: Sequence[Recording],
     settings: DiagnosisSettings,
-    look: FittingMeasure,
+    fitting: FittingMeasure,
     seen: SearchOutcome,
     balances: Sequence[Balance],
 ) -> Findings:
     result, names = seen.result, names_of_parts(recordings, settings.names)
     found = result.found if result.judgement.named else replace(result.found, after=result.found.retuned)
-    whole = assemble_findings(replace(result, found=found), look.chosen.floors, names, seen.floor)
+    whole = assemble_findings(replace(result, found=found), fitting.chosen.floors, names, seen.floor)
     channels = recordings[0].command.channels
-    found_too = unconfirmed_candidates(result.unconfirmed, whole.black_box, recordings[0], look.model)
+    found_too = unconfirmed_candidates(result.unconfirmed, whole.black_box, recordings[0], fitting.model)
     if settings.fitted:
         diagnosis = with_balances(whole.diagnosis, balances, channels, found_too)
     else:
@@ -196,7 +196,7 @@ def _assemble(
     maps: tuple[StateMaps, ...] = settings.guard.part("the map of states", "its making", drawn, ())
     early = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
     linear = linear_remarks(balances, channels, not recordings[0].is_timed) if settings.fitted else ()
-    remarks = tuple(dict.fromkeys((*early, *look.chosen.remarks, *result.remarks, *linear, *whole.remarks)))
+    remarks = tuple(dict.fromkeys((*early, *fitting.chosen.remarks, *result.remarks, *linear, *whole.remarks)))
     reached = balance_errors(diagnosis, balances, channels)
     named = {effect.effect for effect in diagnosis.effects}
     curves = tuple(curve for curve in whole.signatures if curve.effect in named)

@@ -1,6 +1,6 @@
-"""What a diagnosis says, as a document: the content of `diagnosis.json`, format `hapteq-diagnosis`, version 1.
+"""Document of a diagnosis: the content of `diagnosis.json`, format `hapteq-diagnosis`, version 1.
 
-Shares and probabilities lie in 0 to 1. Errors are normalised root-mean-square over the channels.
+Shares and probabilities are in 0 to 1. Errors are normalised root-mean-square over the channels.
 """
 
 import json
@@ -210,7 +210,7 @@ def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
 def diagnosis_from_json(document: dict[str, Any]) -> Diagnosis:
     """document: without format and version. Raises DiagnosisError with every problem, by its place."""
     try:
-        # By way of JSON: strict checking then takes a list for a tuple, but no text for a number.
+        # Through JSON: strict checking then accepts a list for a tuple, but no text for a number.
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
         raise DiagnosisError(

@@ -1,4 +1,4 @@
-"""Plain words for the effects of the vocabulary: their nouns, their places, and how their parameters are read out."""
+"""Plain words for the effects of the vocabulary: nouns, places, and how their parameters are printed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,9 +15,10 @@ _BARE = "{}"
 class EffectWords:
     noun: str
     numbers: Mapping[str, str] = field(default_factory=dict)
-    """By parameter, in the order of reading; a parameter that is not here is not read out. Empty: the main one."""
+    """Words by parameter, in the order of printing; other parameters are not printed. Empty text: the main
+    parameter."""
     shares: tuple[str, ...] = ()
-    """Parameters that are read as per cent."""
+    """Parameters that are printed in per cent."""
 
 
 EFFECT_WORDS: Mapping[str, EffectWords] = {
@@ -172,16 +173,16 @@ LAW_WORDS: Mapping[str, LawWords] = {
     "sensor_play": LawWords(EffectWords("play before the sensor", {"gap": "a gap of {}"}), {}, place="sensor"),
     "sensor_asymmetry": LawWords(EffectWords("a sensor that reads more to one side (square)"), place="sensor"),
 }
-"""Laws of the force balance, and faults beside clean recordings, that the catalogue has no effect for."""
+"""Laws of the force balance, and faults found by comparison with clean recordings, that the catalogue lacks."""
 
 PLAYED_AS_FORMULA = (
     "actuator_curve", "condition_dependent_friction", "condition_dependent_damping", "condition_dependent_stiffness",
     "condition_dependent_force",
 )  # fmt: skip
-"""Those of them that simulations play as a discovered law."""
+"""Those of them that are simulated as a discovered law."""
 
 OF_THE_WHOLE = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", "logger_offset", "lost_samples")
-"""Faults of the whole sensor or logger, which need no place where all channels share them."""
+"""Faults of the whole sensor or logger, for which no place is named where all channels share them."""
 
 
 def noun_of(effect: str) -> str:

@@ -31,7 +31,7 @@ def found_law(law: Law) -> FoundLaw:
 
 
 def law_text(law: FoundLaw) -> str:
-    """ "F = -4.1*abs(vy)**1.5*sign(vy) N": what a law adds, or what it puts in the place of its command or reading."""
+    """ "F = -4.1*abs(vy)**1.5*sign(vy) N": the force that a law adds, or the command or reading that it replaces."""
     if law.acts_on == "force":
         return f"F = {law.expression} N"
     replaced = "command" if law.acts_on == "command" else "reading"

@@ -1,8 +1,8 @@
-"""Prepares recordings for the comparison with a model, alike for files, real recordings and values.
+"""Prepares recordings for the comparison with a model, the same for files, real recordings and values.
 
-In this order: segments are found where a recording states none, commands and responses are brought into the form that
-a force balance needs (only where no model says what they are), motions become force-driven, gaps in commands are left
-out; then what cannot be compared is refused, and positions that say nothing are left out.
+In this order: segments are found where a recording states none, commands and responses are brought into the form that a
+force balance needs (only where no model says what they are), motions become force-driven, gaps in commands are left
+out; then unsuitable recordings are refused, and constant positions are left out.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from analysis.diagnosis.data.command_gaps import bridge_gaps
 from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.found_segments import find_segments
 from analysis.diagnosis.data.input_checks import require_different, require_something
-from analysis.diagnosis.first_model.plain_form import plain_form
+from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from analysis.wording import begin_sentence, conjoin
 from equalizer.signals.recording import Recording
 
@@ -39,7 +39,7 @@ def prepare(
     told = [(name, text) for name, (_, text) in zip(names, found, strict=True) if text]
     repeats = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in told)
     read = tuple(each for each, _ in found)
-    formed, said = plain_form(read) if plain else (read, ())
+    formed, said = one_motion_per_force(read) if plain else (read, ())
     driven, gaps = bridge_gaps(all_as_force_driven(formed), names)
     kept = comparable(driven, names, plain if short is None else short)
     return PreparedRecordings(kept.recordings, (*repeats, *said, *gaps, *kept.remarks))

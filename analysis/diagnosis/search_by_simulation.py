@@ -1,4 +1,4 @@
-"""The search by simulation: which effects to try, beside which measure, and what is made of the search."""
+"""The search by simulation: the effects to try, the error measure, and the use of its result."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,31 +27,31 @@ from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
 from equalizer.signals.recording import Recording
 
 TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
-"""Laws of the command that a force balance tests: what it does not name is absent."""
+"""Laws of the command that a force balance tests: those that it does not name are absent."""
 GAINS = ("force_gain", "sensor_gain")
-"""A model fitted to the recordings contains these: only against a calibrated one can a gain be wrong."""
+"""Effects that a model fitted to the recordings absorbs: only with a calibrated model can a gain be found wrong."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchOutcome:
     result: SearchResult
     floor: CleanFloor
-    """What was learned from clean recordings; empty without any."""
+    """Model error of the clean recordings; empty without any."""
 
 
 def search_context_of(
-    recording: Recording, look: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
+    recording: Recording, fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchContext:
     """The shared state of the search. recording: as given; where forces are compared, the measure's own differ."""
-    measure = look.chosen.measure
-    model = with_units_of(look.model, recording.command.units, recording.response.units, time_unit(recording))
+    measure = fitting.chosen.measure
+    model = with_units_of(fitting.model, recording.command.units, recording.response.units, time_unit(recording))
     tuning = tuning_of(model, recording.command.channels)
     return SearchContext(measure.shorten(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
 
 
 def search_by_simulation(
     recordings: Sequence[Recording],
-    look: FittingMeasure,
+    fitting: FittingMeasure,
     settings: DiagnosisSettings,
     map_: Mapper,
     progress: Progress,
@@ -59,18 +59,18 @@ def search_by_simulation(
 ) -> SearchOutcome:
     """The result of the search by simulation. balances: where they name a law of the motion, nothing else is tried;
     where they name none, only effects of actuator and sensor are."""
-    chosen, context = look.chosen, search_context_of(recordings[0], look, settings, map_)
+    chosen, context = fitting.chosen, search_context_of(recordings[0], fitting, settings, map_)
     catalogue = _catalogue(settings, recordings[0], context.barred)
     may_be_named = [effect for effect in catalogue if effect.name not in context.barred]
     if balances:
         named = any(balance.named for balance in balances)
         imposed = bool(recordings[0].meta.get("imposed"))
-        catalogue = [] if named else [e for e in catalogue if _beside_motion(e.name, place_of_effect(e), imposed)]
+        catalogue = [] if named else [e for e in catalogue if _unseen_by_balance(e.name, place_of_effect(e), imposed)]
         may_be_named = []
     if settings.clean:
         observable = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
-        found = _search_beside_learned_error(
-            recordings, look.model, (context, catalogue, observable), settings, progress
+        found = _search_with_learned_error(
+            recordings, fitting.model, (context, catalogue, observable), settings, progress
         )
     else:
         found = _search(context, catalogue, settings, progress)
@@ -90,7 +90,7 @@ def search_by_simulation(
     return found
 
 
-def _search_beside_learned_error(
+def _search_with_learned_error(
     recordings: Sequence[Recording],
     model: MechanicalModel,
     given: tuple[SearchContext, Sequence[Effect], Sequence[Effect]],
@@ -101,12 +101,12 @@ def _search_beside_learned_error(
     effects to try, and those that sensor faults may be named of. Raises NothingLearned."""
     from analysis.diagnosis.reference.learn_model_error import learn_model_error
     from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
-    from analysis.diagnosis.reference.search_beside_reference import search_beside_reference
+    from analysis.diagnosis.reference.search_with_reference import search_with_reference
 
     context, catalogue, observable = given
     learned = learn_model_error(settings.clean, model, recordings, context.map_, progress)
     context = replace(context, certain=find_sensor_faults(recordings, settings.clean, observable))
-    found = search_beside_reference(context, learned, catalogue, progress, settings.time_left)
+    found = search_with_reference(context, learned, catalogue, progress, settings.time_left)
     return SearchOutcome(found, learned.floor)
 
 
@@ -114,7 +114,7 @@ def _search(
     context: SearchContext, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
 ) -> SearchOutcome:
     def beyond(seen: SearchResult) -> SearchResult:
-        # A low hum is no answer: the search is repeated without it.
+        # Low-frequency hum is not accepted as an answer: the search is repeated without it.
         if not settings.discovery or settings.fitted or hums_low(seen.found):
             return seen
         from analysis.diagnosis.discovery.add_laws import add_laws
@@ -133,8 +133,8 @@ def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozen
     return catalogue + [effect for effect in CATALOGUE if effect.name in refined & barred]
 
 
-def _beside_motion(name: str, place: str, imposed: bool) -> bool:
-    """Whether an effect of the actuator or sensor cannot be seen by a force balance. Where a motion is imposed, no
+def _unseen_by_balance(name: str, place: str, imposed: bool) -> bool:
+    """Whether a force balance cannot observe an effect of the actuator or sensor. Where a motion is imposed, no
     actuator drives it."""
     driven = not imposed and name != "body_on_actuator" and name not in TESTED_BY_BALANCE
     return place == "sensor" or (place == "actuator" and driven)

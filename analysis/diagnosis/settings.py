@@ -41,7 +41,7 @@ AT_REST = 0.02  # of the range of a response, within which it rests where a part
 LONGEST_TAIL = 0.05  # of a part, which may rest at its end without another split; where it rests is told from it
 STILL_SHARE = 0.01  # of the mean square of the motion that is fitted, below which what is held out tests nothing
 
-# Which error measure suits (`measure_rule`, `closed_loop`). By hand.
+# Which error measure suits (`error_measure_rule`, `closed_loop`). By hand.
 FED_BACK_SHARE = 0.1  # of the command's rms that must differ from the recorded excitation: then the loop is closed
 FORETOLD_SHARE = 0.05  # of what its own past leaves of a command that the responses may leave (test of Granger 1969)
 DIES_OUT_SHARE = 1 / 3  # of the longest record, within which a plant that holds itself comes to rest
@@ -210,7 +210,7 @@ BALANCE_FOLDS = 8  # blocks of the samples to fit, and as many of those to test 
 # samples that numbers are fitted to at most, and as many to test by: the first ones of each block
 BALANCE_MOST_SAMPLES = 20000
 
-# Which sums of laws are tried, and which is the plainest (`structures`, `plainest_structure`, `linear_part`). By hand.
+# Which sums of laws are tried, and which is the plainest (`structures`, `simplest_structure`, `linear_part`). By hand.
 MOST_SUMMED_LAWS = 3
 STRUCTURES_BEAM = 5  # structures of each size that are taken further
 FURTHER_LAW_GAIN = 0.02  # share of the cross-validated error power that a further law must take

@@ -20,13 +20,13 @@ _NEARER = 0.01
 @dataclass(frozen=True, slots=True)
 class Agreement:
     factor: float
-    """Of the second to the first; below 0 where the sign is turned."""
+    """Gain of the second signal relative to the first; negative where the sign is reversed."""
     spread: float
     """Standard deviation of the logarithm of single lines' factors."""
     lag_samples: float
     """Above 0 where the second is later."""
     share: float
-    """Of the second's power, in the lines that were compared."""
+    """Share of the second signal's power in the lines that were compared."""
 
 
 def agreement(spectra: CrossSpectra, first: int, second: int, gain: FloatArray | None = None) -> Agreement | None:

@@ -10,12 +10,12 @@ Level = Literal["fine", "notice", "wrong"]
 @dataclass(frozen=True, slots=True)
 class Check:
     name: str
-    """What was checked: "clipping"."""
+    """Name of the check: "clipping"."""
     level: Level
     seen: str
     """One sentence, with numbers and units."""
     do: str = ""
-    """What to do about it; empty where there is nothing to do."""
+    """Advice; empty where there is nothing to do."""
 
 
 def fine_if_none(name: str, found: tuple[Check, ...], seen: str) -> tuple[Check, ...]:

@@ -59,7 +59,7 @@ def count_clipped_samples(samples: FloatArray) -> int:
     width = max(step, 1e-3 * float(np.ptp(known)))
     tolerance = max(0.5 * step, 1e-9 * float(np.ptp(known)))
     at_top = filled >= top - tolerance
-    # As wide as the top's own bin, so that a rounded signal is compared step by step.
+    # With the bin width of the top value, so that a rounded signal is compared step by step.
     next_below = int(np.sum((filled < top - tolerance) & (filled >= top - tolerance - width)))
     if at_top.sum() < LEAST_SAMPLES or at_top.sum() < _CROWDED * next_below / max(1.0, width / max(step, width)):
         return 0

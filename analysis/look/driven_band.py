@@ -36,7 +36,7 @@ class ResponseCoherence:
     multiple: FloatArray
     """(lines,): share of its power that all commands together explain linearly, 0 to 1."""
     share: float
-    """Of its power in the driven band."""
+    """Share of its power in the driven band."""
     lowest_hz: float
     """Middle of the worst octave there, of those that hold some of its power."""
     lowest: float

@@ -65,7 +65,7 @@ def _half_cycles(values: FloatArray) -> int:
 
 
 def _misfit(values: FloatArray, count: int) -> float:
-    """Of one stretch (m,), by so many terms; the samples that fit worst, at corners, are left out."""
+    """Error of a fit of one stretch (m,) by a number of terms; the samples that fit worst, at corners, are left out."""
     if len(values) < _BLOCKS // 2:
         return 1.0
     squared = ((values[4:] - values[:-4]) / 4) ** 2

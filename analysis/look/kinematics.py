@@ -80,7 +80,7 @@ def _compare_derivative(
 
 
 def derivative(samples: FloatArray, order: int, rate_hz: float) -> FloatArray:
-    """By central differences, without shift in time; NaN at both ends. order: 1 or 2."""
+    """Derivative by central differences, without time shift; NaN at both ends. order: 1 or 2."""
     found = np.full(len(samples), np.nan)
     if order == 1:
         found[1:-1] = (samples[2:] - samples[:-2]) * (rate_hz / 2)

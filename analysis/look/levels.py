@@ -20,7 +20,7 @@ EVEN, UNEVEN = 0.05, 0.3
 @dataclass(frozen=True, slots=True)
 class SegmentLevel:
     number: int
-    """From 1; 0 for a recording without segments."""
+    """Number of the segment from 1; 0 for a recording without segments."""
     kind: str
     role: str
     start_s: float

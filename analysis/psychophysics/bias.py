@@ -23,7 +23,7 @@ CRITERION_WORDS = "c = −(z(H) + z(F)) / 2 with answer 1 as the hit; positive: 
 @dataclass(frozen=True, slots=True)
 class ResponseBias:
     d_prime: float
-    """Over all levels of the run, so it describes the run and is no threshold."""
+    """d' over all levels of the run: it describes the run and is not a threshold."""
     criterion: float
     """c. 0: no tendency. Positive: to answer 2; negative: to answer 1."""
 

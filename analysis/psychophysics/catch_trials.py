@@ -41,7 +41,7 @@ def catch_tallies(trials: Iterable[Trial]) -> tuple[CatchTally, ...]:
 
 
 def wilson_interval(wrong: int, given: int) -> tuple[float, float]:
-    """Of a rate. Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212."""
+    """Wilson interval of a rate. Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212."""
     interval = binomtest(wrong, given).proportion_ci(CONFIDENCE, method="wilson")
     return float(interval.low), float(interval.high)
 

@@ -35,7 +35,7 @@ class MomentEllipsoid:
     semi_axes_mps2: tuple[float, float, float]
     """Root mean square along the principal axes, largest first."""
     tilt_deg: float
-    """Of the largest axis from the test direction, 0 to 90."""
+    """Angle of the largest axis from the test direction, 0 to 90."""
     turn_deg: float
     """The same in the plane of the first two axes of the frame, with sign, -90 to 90: for drawing."""
 

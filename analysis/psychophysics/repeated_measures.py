@@ -75,14 +75,14 @@ class RepeatedMeasures:
     epsilon: float | None
     """Greenhouse-Geisser: 1 under sphericity, at least 1 / (conditions - 1)."""
     p: float | None
-    """With both degrees of freedom times epsilon: the one to report."""
+    """p-value with both degrees of freedom times epsilon: the one to report."""
     p_lower_bound: float | None
-    """With the smallest epsilon there can be."""
+    """p-value with the smallest possible epsilon."""
     partial_eta_squared: float | None
     generalized_eta_squared: float | None
     notes: tuple[str, ...]
     epsilon_huynh_feldt: float | None = None
-    """At most 1. Less conservative than Greenhouse-Geisser's."""
+    """Huynh and Feldt's epsilon, at most 1. Less conservative than Greenhouse-Geisser's."""
     p_huynh_feldt: float | None = None
     mauchly_w: float | None = None
     """1 under sphericity. None where there are too few participants for it."""

@@ -33,7 +33,7 @@ class Run:
     """The trials that moved the staircase, in order; catch trials among them are not here."""
     spoiled_trials: int
     state: StaircaseState
-    """Where the staircase stands after the last of them."""
+    """Level of the staircase after the last of them."""
     complete: bool
     """Whether the run has all reversals of its rule; one that ran out of trials has not."""
     presentations: int = 0

@@ -44,7 +44,7 @@ class PracticeRun:
     """Answered and counted."""
     right: int
     right_of_last: int
-    """Of the last trials that the criterion looks at."""
+    """Correct answers among the last trials that the criterion covers."""
     passed: bool
     over: bool
     """False: broken off before it was passed or out of trials."""
@@ -96,16 +96,17 @@ class StudyAnalysis(Summarised):
     within: RepeatedMeasures
     ranks: Friedman
     difference: str
-    """What separates the published one-way analysis from the one within participants, here."""
+    """Reason for the difference between the published one-way analysis and the one within participants, in this
+    study."""
     primary: PrimaryAnalysis | None
     """The hierarchical model of all answers. None below two participants, and below two frequencies with answers."""
     mean_contrasts: tuple[Contrast, ...]
     """Reversal means in dB against the lowest frequency with answers, within participants."""
     declared: str
-    """What the protocol declared before the data, in words."""
+    """The protocol's declaration before the data, in words."""
     declared_result: DeclaredResult
     compared: str
-    """Where the published and the primary analysis differ, in words."""
+    """Differences between the published and the primary analysis, in words."""
     warnings: tuple[str, ...]
     detection: tuple[Threshold, ...]
     """One per detection run."""
@@ -114,7 +115,7 @@ class StudyAnalysis(Summarised):
     practice: tuple[PracticeRun, ...]
     cues: tuple[CueFinding, ...]
     cue_gaps: tuple[CueGap, ...]
-    """What else than the direction differed as delivered, and whether answers followed it."""
+    """Differences between the directions as delivered, and whether answers followed them."""
 
     def summary(self) -> Summary:
         table = self.table

@@ -54,7 +54,8 @@ def study_warnings(
 def side_warnings(
     catches: Sequence[CatchTally], detection: Sequence[Threshold], table: ThresholdTable, felt: ThresholdTable
 ) -> tuple[str, ...]:
-    """Of catch trials and detection runs. table: thresholds of direction, felt: of detection, both in newtons."""
+    """Warnings about catch trials and detection runs. table: thresholds of direction, felt: of detection, both in
+    newtons."""
     broken = [_run_text(row) for row in detection if not row.complete]
     cut = [_run_text(row) for row in detection if row.complete and row.censored]
     candidates = (

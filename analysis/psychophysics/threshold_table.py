@@ -22,7 +22,7 @@ class ThresholdTable:
     stopped: tuple[tuple[bool, ...], ...]
     """Same shape: True where there is no value because the trial limit ended every run."""
     notes: tuple[str, ...]
-    """What was left out, in sentences."""
+    """What was left out, as sentences."""
 
     def groups(self) -> dict[str, tuple[float | None, ...]]:
         """The values of each frequency, named like "35 Hz", one entry per participant."""
@@ -31,7 +31,7 @@ class ThresholdTable:
 
     @property
     def cut(self) -> int:
-        """How many values are cut by the cap."""
+        """Number of values that are cut by the cap (censored)."""
         return sum(map(sum, self.censored))
 
     @property

@@ -14,7 +14,7 @@ from protocols.trial import Phase, Trial
 
 
 class RunEnd(StrEnum):
-    """What ended a run."""
+    """Reason for the end of a run."""
 
     REVERSALS = "reversals"
     """All reversals of the rule: there is a threshold."""
@@ -43,7 +43,7 @@ class Threshold:
     reversals: int
     trials: int
     cap_reversals: int
-    """How many of the averaged reversals are peaks at the cap."""
+    """Number of averaged reversals that are peaks at the cap."""
     trials_at_cap: int
     pushes_against_cap: int
     complete: bool
@@ -59,9 +59,9 @@ class Threshold:
     threshold_mm: float | None
     """Mean displacement amplitude, as measured in the same trials."""
     measured_reversals: int
-    """How many of the averaged reversals have a measured acceleration."""
+    """Number of averaged reversals with a measured acceleration."""
     ended: RunEnd | None = None
-    """What ended the run; None in tables of before this was written."""
+    """Reason for the end of the run; None in tables of older versions."""
     repeats_at_will: int = 0
     """Presentations of the run that the participant made void; catch trials among them."""
     repeat_rate: float = 0.0
@@ -120,7 +120,7 @@ def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
 
 
 def _at_level(trial: Trial, measured: float | None) -> float | None:
-    """What was measured, as it would be at the staircase's level: in proportion, where that level was roved."""
+    """Measured value scaled to the staircase's level, where that level was roved."""
     return None if measured is None else measured * trial.staircase_n / trial.level_n
 
 

@@ -29,7 +29,7 @@ NEAR_PUBLISHED_CAP = (
 
 
 def declaration_text(declared: AnalysisSettings) -> str:
-    """What the protocol fixed before the data, and what it did not, as text."""
+    """The protocol's declarations before the data, and what it left open, as text."""
     if declared == AnalysisSettings():
         return NOTHING_DECLARED
     named = {"hierarchical": "the hierarchical model of all answers", "published": "the published one-way analysis"}
@@ -72,7 +72,7 @@ def comparison_text(
 
 
 def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast]) -> str:
-    """How far differences by the model and by reversal means are apart, as text."""
+    """Difference between the results by the model and by reversal means, as text."""
     by_frequency = {contrast.frequency_hz: contrast for contrast in means}
     against = f"{primary.frequencies_hz[0]:g} Hz"
     pairs = [(contrast, by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]

@@ -50,13 +50,13 @@ def _trend_paragraphs(cells: Sequence[Distortion]) -> tuple[str, ...]:
     groups: dict[tuple[Kind, str], list[LevelTrend]] = {}
     for trend in level_trends(heard):
         if trend.present:
-            groups.setdefault((trend.kind, trend.course), []).append(trend)
+            groups.setdefault((trend.kind, trend.level_dependence), []).append(trend)
     if not groups:
         return ("No distortion stands out of the noise: from repeats and silent lines the device looks linear.",)
     return tuple(
-        f"{_WORDS[kind]}{' distortion' if kind != 'varying' else ''} {_COURSES[course]}: "
+        f"{_WORDS[kind]}{' distortion' if kind != 'varying' else ''} {_COURSES[series]}: "
         f"{conjoin([f'{each.output} driven by {each.input}' for each in trends])}."
-        for (kind, course), trends in groups.items()
+        for (kind, series), trends in groups.items()
     )
 
 
@@ -103,7 +103,7 @@ def _is_heard(cell: Distortion, cells: Sequence[Distortion]) -> bool:
 
 def _noise_rms(found: Findings) -> dict[tuple[str, str], float]:
     """Rms by channel and quantity."""
-    if found.floor is None or not found.courses:
+    if found.floor is None or not found.time_series:
         return {}
     rms = [*found.floor.response_rms, *(() if found.floor.position_rms is None else found.floor.position_rms)]
     keys = dict.fromkeys((cell.output, cell.quantity) for cell in found.local.distortions.cells)

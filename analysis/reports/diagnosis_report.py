@@ -12,7 +12,7 @@ from analysis.diagnosis.result.ceiling_wording import (
 )
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.retuned_numbers import doubtful_sentences, retuned_sentence
+from analysis.diagnosis.result.retuned_parameters import doubtful_sentences, retuned_sentence
 from analysis.diagnosis.result.wording import (
     answer_of,
     device_of,
@@ -139,7 +139,7 @@ def _effect_section(found: Findings, number: int, pictures: Sequence[Picture]) -
 
 
 def _signature_pictures(found: Findings, effect: NamedEffect, pictures: Sequence[Picture]) -> tuple[Picture, ...]:
-    """Of the effect at its own axis, where it stands at several."""
+    """Signatures of the effect: only those at its own axis where it has one there."""
     mine = [number for number, signature in enumerate(found.signatures, start=1) if signature.effect == effect.effect]
     there = [number for number in mine if found.signatures[number - 1].axis == effect.axis]
     names = {f"signature-{number}" for number in (there or mine)}

@@ -7,7 +7,7 @@ from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import estimate_text, noun_of, place_words
 from analysis.diagnosis.result.candidate_wording import candidate_numbers
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.retuned_numbers import all_numbers
+from analysis.diagnosis.result.retuned_parameters import all_numbers
 from analysis.diagnosis.result.wording import device_of
 from analysis.diagnosis.unit_wording import error_text, probability_text, share_text, value_text
 from analysis.reports.page import Table
@@ -69,7 +69,7 @@ def candidate_table(found: Findings) -> Table | None:
 
 
 def error_table(found: Findings) -> Table:
-    """Of both records, over all channels."""
+    """Errors of both records, over all channels."""
     rows = tuple(
         (f"On {_PARTS[part]}", *(_stage_error_text(errors, stage) for stage, _ in _STAGES), error_text(errors.noise))
         for part, errors in (("fit", found.diagnosis.fit.fit), ("test", found.diagnosis.fit.test))
@@ -79,10 +79,10 @@ def error_table(found: Findings) -> Table:
 
 
 def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None:
-    """In each channel's unit, with the multiple of the noise; None where no course tells the channels."""
-    if not found.courses:
+    """In each channel's unit, with the multiple of the noise; None where no series tells the channels."""
+    if not found.time_series:
         return None
-    names, units, noises = found.courses[0].channels, found.courses[0].units, found.noise_rms
+    names, units, noises = found.time_series[0].channels, found.time_series[0].units, found.noise_rms
     statistic, what = found.explanation.statistic, "noise"
     if statistic is not None:
         units, noises, what = ("1",) * len(names), dict(zip(names, statistic.chance.tolist(), strict=True)), "chance"

@@ -35,7 +35,7 @@ class Page:
     title: str
     summary: str
     banner: str
-    """What must not be overlooked; empty = none."""
+    """Important warnings; empty = none."""
     sections: tuple[Section, ...]
     generated: str
     """When, by the clock of the place, with its offset."""

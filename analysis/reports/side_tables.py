@@ -49,7 +49,7 @@ def detection_run_table(analysis: StudyAnalysis) -> Table:
 
 
 def delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
-    """Of what was wanted, where stimuli were accelerations."""
+    """Share of the wanted acceleration, where stimuli were accelerations."""
     rows = tuple(
         (
             f"{delivery.frequency_hz:g} Hz",

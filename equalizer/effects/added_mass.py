@@ -11,7 +11,7 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _GUESS = 0.1
-"""Of the model's own mass, where re-tuning has hidden the rest."""
+"""Start value as a share of the model's own mass, used where re-tuning has absorbed the missing mass."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:

@@ -11,7 +11,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _GUESS = 1.3
-"""Ratio of the two levels to start from, where the data do not tell it."""
+"""Starting ratio of the two levels where the data do not determine it."""
 
 
 @compile_law
@@ -26,7 +26,7 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     motion = sliding_motion(evidence, axis)
     forward = np.asarray(motion.velocity > 0, dtype=np.float64)
-    # A constant beside them would be the asymmetry itself.
+    # Without a constant force in the regression, which would absorb the asymmetry.
     positive, negative = regress_beside_linear(motion, constant=False).fit(-forward, 1 - forward).strengths.tolist()
     mean = (positive + negative) / 2
     if mean <= 0:

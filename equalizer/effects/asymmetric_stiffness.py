@@ -13,7 +13,7 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """The mean of the force at the step's start and end, where the position at its end depends on it."""
+    """Mean of the force at the step's start and end; the position at the end depends on the force (implicit step)."""
     half, start = 0.5 * numbers[0], at[X] ** 2
     force = -half * (start + at[X_FREE] ** 2)
     for _ in range(4):

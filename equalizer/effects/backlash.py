@@ -17,24 +17,24 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
 
 STEPS = 20
-"""Per sample: a contact lasts a millisecond."""
+"""Integration steps per sample: a contact lasts about a millisecond."""
 MOTOR_SHARE, CONTACT_HZ, CONTACT_RATIO = 0.3, 300.0, 0.03
 """Defaults for what a file leaves out: the motor's share of the moving mass; natural frequency of the motor on its
 contact; damping ratio of that contact."""
 GAPS, TRIED_S, BAND_S = np.geomspace(0.02, 3.0, 14), 2.0, 0.128
-"""Gaps that are tried, relative to the travel of the motor alone; seconds of the record that are simulated; length of a
-spectrum's window in seconds."""
+"""Gaps that are tried, relative to the travel of the motor alone; seconds of the recording that are simulated; length
+of a spectrum's window in seconds."""
 
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Spring and damper of the contact, between their force at the step's start and end; it pushes apart only."""
+    """Force of the contact's spring and damper, averaged over the step; the contact only pushes, it never pulls."""
     half, stiffness, rate = 0.5 * numbers[0], numbers[1], numbers[2] / at[STEP_S]
     for way in (1.0, -1.0):
         start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
         if start <= 0 and end <= 0:
             continue
-        # Towards the force at the end for a contact that is too stiff for the step, which would kick otherwise.
+        # Weighted towards the force at the end where the contact is too stiff for the step: the mean would overshoot.
         slack = stiffness * at[X_PER_N]
         late = (0.5 + slack) / (1 + slack)
         push = stiffness * ((1 - late) * start + late * end) + rate * (end - start)
@@ -49,7 +49,7 @@ def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _motor_and_contact(model: MechanicalModel, axis: int, values: Values) -> tuple[float, float, float]:
-    """Its mass, and the contact's stiffness and damping."""
+    """Mass of the motor's side, and stiffness and damping of the contact."""
     known = value_along(model.mass, driven_axes(model)[:, axis])
     mass = min(values.get("motor_mass", MOTOR_SHARE * known), 0.9 * known)
     stiffness = values.get("contact_stiffness", mass * (2 * np.pi * CONTACT_HZ) ** 2)
@@ -101,7 +101,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _weakest_and_strongest_part(evidence: Evidence, axis: int) -> list[slice]:
-    """The excerpt in which the axis is driven most weakly, and that in which it is driven most strongly."""
+    """Two excerpts: where the axis is driven most weakly, and where most strongly."""
     length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
     power = np.cumsum(np.append(0.0, evidence.command[:, axis] ** 2 * evidence.used))
     firsts = np.arange(0, len(evidence.command) - length + 1, max(length // 4, 1))

@@ -41,6 +41,6 @@ EFFECT = Effect(
     ),
     acts=Structure(_change),
     starts=_starts,
-    # Of one axis, and damped so little that it rings.
+    # An extra mode is the special case of one axis and light damping.
     simpler=("extra_mode",),
 )

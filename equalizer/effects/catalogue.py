@@ -59,6 +59,6 @@ CATALOGUE: tuple[Effect, ...] = tuple(
         sensor_offset, sensor_drift, quantization, mains_hum, clock_drift, logger_offset, lost_samples,
     )
 )  # fmt: skip
-"""In the vocabulary's order."""
+"""Effects in the order of `equalizer.plant.effect_vocabulary`."""
 
 EFFECTS: dict[str, Effect] = {effect.name: effect for effect in CATALOGUE}

@@ -3,14 +3,14 @@
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.simulation.interpolated_response import read_other_times
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 WINDOW_S, LEAST_WINDOWS = 2.0, 4
 LONGEST_S = 0.1
-"""Largest lateness of a window that is searched for."""
+"""Largest time shift (s) of a window that is searched for."""
 LARGEST_PPM = 2e4
 LEAST_SIGMA = 5.0
 
@@ -26,8 +26,8 @@ def _read_position(position: FloatArray, sample_rate_hz: float, values: Values) 
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """The slope of the response's lateness over time, window by window. Linear interpolation lowers peaks, as a real
-    clock does not: both kinds are tried."""
+    """The slope of the response's time shift over time, window by window. Linear interpolation lowers peaks, which a
+    real clock error does not: linear and band-limited interpolation are both tried."""
     slope = _lateness_per_second(evidence) if channel <= 0 else None
     if slope is None:
         return ()
@@ -44,7 +44,8 @@ def _misfit(evidence: Evidence, values: Values) -> float:
 
 
 def _position_drifts_along(evidence: Evidence, slope: float) -> float:
-    """1 where the measured position drifts along, 0 where the commands' clock reads it."""
+    """1 where the measured position has the same clock error as the response, 0 where it is read by the commands'
+    clock."""
     if evidence.position is None or evidence.predicted_position is None or evidence.position_noise is None:
         return 1.0
     noise = evidence.position_noise
@@ -61,7 +62,7 @@ def _lateness_per_second(evidence: Evidence) -> float | None:
 
 
 def _lateness_slope(evidence: Evidence, measured: FloatArray, predicted: FloatArray) -> tuple[float, float] | None:
-    """Slope of the lateness over time (Theil-Sen), and its standard error; None where too few windows tell it."""
+    """Slope of the time shift over time (Theil-Sen estimator), and its standard error; None with too few windows."""
     rate = evidence.sample_rate_hz
     length = int(WINDOW_S * rate)
     if LONGEST_S * rate < 1:
@@ -74,7 +75,7 @@ def _lateness_slope(evidence: Evidence, measured: FloatArray, predicted: FloatAr
             late.append(lateness(measured[inside], predicted[inside], int(LONGEST_S * rate)) / rate)
     if len(at) < LEAST_WINDOWS:
         return None
-    # Windows in which nearly nothing moved are off by anything: pairwise slopes have a median that does not mind.
+    # Windows with almost no motion give arbitrary shifts; the median of pairwise slopes is robust against them.
     when, by = np.array(at), np.array(late)
     first, second = np.triu_indices(len(when), 1)
     slope = float(np.median((by[second] - by[first]) / (when[second] - when[first])))

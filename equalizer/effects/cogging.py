@@ -11,15 +11,15 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 CELLS = 4096
-"""Histogram cells over the travel."""
+"""Cells of the histogram of positions over the travel."""
 PITCHES = 3
-"""How many pitches are tried, the strongest first."""
+"""Number of pitches that are tried, strongest peak of the periodogram first."""
 _FINER = 8
 
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """The mean of the force at the step's start and end, where the position at its end depends on it."""
+    """Mean of the force at the step's start and end; the position at the end depends on the force (implicit step)."""
     start, force = np.sin(numbers[1] * at[X] + numbers[2]), 0.0
     for _ in range(4):
         force = 0.5 * numbers[0] * (start + np.sin(numbers[1] * (at[X_FREE] + at[X_PER_N] * force) + numbers[2]))
@@ -39,7 +39,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _likely_pitches(motion: AxisMotion, beside: PartialRegression) -> list[float]:
-    """By a periodogram of the missing force over the position."""
+    """Starting values from a periodogram of the missing force over the position."""
     way = float(np.ptp(motion.position))
     if way == 0:
         return []
@@ -47,7 +47,7 @@ def _likely_pitches(motion: AxisMotion, beside: PartialRegression) -> list[float
     force = np.bincount(cell, beside.force, CELLS)
     density = np.bincount(cell, minlength=CELLS).astype(float)
     smooth = np.convolve(density, np.ones(9) / 9, "same")
-    # Where the axis stays most of the time, its noise would drown what is seen elsewhere.
+    # Cells are weighted alike: noise from where the axis dwells would otherwise hide the pattern.
     weight = 1 / np.sqrt(np.maximum(smooth, 1.0))
     power = np.abs(np.fft.rfft(force * weight, CELLS * _FINER)) ** 2
     power[: 2 * _FINER] = 0

@@ -1,4 +1,4 @@
-"""A force that is always there: weight, a pulling cable."""
+"""Constant force: the same force at all times, such as weight or a pulling cable."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     motion = axis_motion(evidence, axis)
-    # The spring may have been re-tuned, but not so as to pull at the place of rest.
+    # Re-tuning may have changed the stiffness, but it must not have moved the equilibrium.
     beside = PartialRegression(motion.force, linear_part(motion, constant=False))
     force = float(beside.fit(np.ones_like(motion.force)).strengths[0])
     mean = float(np.mean(motion.force))

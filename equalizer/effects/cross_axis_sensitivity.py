@@ -13,7 +13,7 @@ LEAST = 1e-4
 
 
 def _next_channels(channel: int, channels: int) -> list[int]:
-    """The one or two channels that follow this one, cyclically."""
+    """Indices of the one or two channels that follow this one, cyclically."""
     return [(channel + ahead) % channels for ahead in range(1, min(channels, 3))]
 
 

@@ -34,17 +34,17 @@ _TAKEN = {
     *(prefix + letter for letter in LETTERS for prefix in (*DERIVATIVES, COMMAND)),
 }
 LARGEST, STEEPEST = 1e15, 20.0
-"""Of a free number; of an exponent."""
+"""Largest magnitude of a free number, and of an exponent."""
 
 
 @dataclass(frozen=True, slots=True)
 class Channels:
-    """What a recording calls its commands and responses."""
+    """Channel names of a recording's commands, responses and conditions."""
 
     inputs: tuple[str, ...] = ("fx", "fy", "fz")
     outputs: tuple[str, ...] = ("ax", "ay", "az")
     quantity: str = "acceleration"
-    """Of the response."""
+    """Quantity of the response."""
     conditions: tuple[str, ...] = ()
 
 
@@ -56,7 +56,8 @@ def law_channels(recording: Recording) -> Channels:
 
 
 def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
-    """To be placed at the axis (force, command) or channel (response) that `law.axis` names. Its values are p0, p1, …
+    """The effect of a law, to be placed at the axis (force, command) or channel (response) that `law.axis` names. Its
+    values are p0, p1, …
 
     Signals are called by axis and quantity (x, vx, ax, fx; y, …) or as the recording's channels are. Where these do not
     end in x, y, z, the axes are called so in their order. Raises LawError for a signal that is not there.
@@ -81,8 +82,8 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
 
 
 def condition_names(channels: Channels) -> tuple[str, ...]:
-    """Names of recorded conditions in a formula: their channels' names where the language of laws and the recording's
-    other channels have them as names of nothing else, else c1, c2, … in their order."""
+    """Names by which a formula calls the recorded conditions: their channel names where these are valid and not taken
+    by another signal, else c1, c2, … in their order."""
     conditions, others = channels.conditions, (*channels.inputs, *channels.outputs)
     return tuple(
         name if _is_free(name) and name not in others and conditions.count(name) == 1 else f"c{place}"
@@ -96,7 +97,7 @@ def _is_free(name: str) -> bool:
 
 
 def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ...]:
-    """Units of the law's free numbers: those that it states, else as far as dimensional analysis tells them."""
+    """Units of the law's free numbers: those that it states, else those that dimensional analysis determines."""
     if law.units:
         return law.units
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity, 0)
@@ -105,7 +106,7 @@ def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ..
     for letter in LETTERS:
         signals |= {prefix + letter: orders[number] for number, prefix in enumerate(DERIVATIVES)}
         signals[COMMAND + letter] = FORCE
-    # Conditions are counted in their own unit, which a formula divides by.
+    # A formula divides a condition by its own unit, so conditions are counted in that unit.
     signals = dict.fromkeys(law.variables, NONE) | signals
     return units_of(law.tree, law.numbers, signals, orders[order] if law.acts_on == "response" else FORCE, system)
 
@@ -125,7 +126,7 @@ def law_parameters(law: Law) -> tuple[Parameter, ...]:
 
 
 def _adds_to_signal(tree: Node) -> bool:
-    """Whether it is a signal plus terms: without these it changes nothing."""
+    """Whether the formula is the signal itself plus terms: with all terms zero, it changes nothing."""
     while isinstance(tree, Apply) and tree.name in ("+", "-"):
         tree = tree.parts[0]
     return isinstance(tree, Variable)
@@ -173,7 +174,7 @@ def reading_names(channels: Channels) -> tuple[str, ...]:
 
 
 def force_signals(channels: Channels) -> dict[str, int]:
-    """Column of each signal among those of the compiled law."""
+    """Column of each signal in the compiled law's input."""
     names = condition_names(channels)
     first = 1 + PER_AXIS * len(channels.inputs)
     conditions = {name: place for place, name in enumerate(names, first)}

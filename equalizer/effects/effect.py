@@ -16,13 +16,14 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 Values = Mapping[str, float]
-"""By parameter name, SI."""
+"""Values by parameter name, in SI units."""
 
 STEPS = 4
-"""Per sample, where a force depends on the motion or a command moves between samples."""
+"""Default number of integration steps per sample, where a force depends on the motion or a command changes between
+samples."""
 
 ALL_SITES = -1
-"""Stands for the site where starting values are asked for all axes or channels together."""
+"""Placeholder for the site when starting values are asked for all axes or channels together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,51 +34,54 @@ class Parameter:
     lower: float
     upper: float
     none: float | None
-    """Value at which the effect vanishes, if all parameters that have such a value are at it; None: does not count."""
+    """Value at which the effect vanishes, provided that all parameters with such a value are at theirs; None: this
+    parameter does not matter for that."""
     scale: Literal["log", "linear", "signed"] = "log"
-    """signed: either sign, and the size is not known beforehand; a fit moves it by a share of its start."""
+    """signed: of either sign, order of magnitude unknown; a fit varies it by a share of its starting value."""
     step: float = 0.01
-    """How far a fit moves it to see what it does: relative, but in its own unit on a linear scale."""
+    """Step of a finite difference in a fit: relative; on a linear scale, in the parameter's own unit."""
     fixed: bool = False
-    """Read off the recording by its starting value; a fit does not move it."""
+    """The starting value is read off the recording, and a fit does not change it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """Another linear model: masses, dampers, springs, couplings."""
+    """Changes the linear model: masses, dampers, springs, couplings."""
 
     change: Callable[[MechanicalModel, int, Values], MechanicalModel]
-    """Model, driven axis, values."""
+    """From model, index of the driven axis and values to the changed model."""
 
 
 @dataclass(frozen=True, slots=True)
 class AxisForce:
-    """A force along a driven axis, from its motion."""
+    """A force along a driven axis that depends on the motion."""
 
     law: Any
-    """Compiled: law(numbers, memory, at) gives newtons; `equalizer.effects.simulation.instant` says what `at` holds."""
+    """Compiled function law(numbers, memory, at) -> force in N; `equalizer.effects.simulation.instant` documents
+    `at`."""
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
     """The law's `numbers` from model, axis and values."""
     memory: int = 0
-    """How many numbers the law keeps between instants; they start at zero."""
+    """Number of state variables that the law keeps between steps; they start at zero."""
     steps: int = STEPS
-    """At least so many per sample."""
+    """Least number of integration steps per sample."""
     acceleration: bool = False
-    """The law asks for accelerations, which are not computed otherwise."""
+    """Whether the law reads accelerations, which are computed only then."""
     sees: bool = False
-    """The law asks for the motion of all driven axes and for the commands, which it is not shown otherwise."""
+    """Whether the law reads the motion of all driven axes and the commands, which are passed only then."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointForce:
-    """A force between two bodies, or within one that the model takes for stiff, from how they move to each other."""
+    """A force between two bodies, or within a body that the model takes as rigid, that depends on their relative
+    motion."""
 
     change: Callable[[MechanicalModel, int, Values], tuple[MechanicalModel, FloatArray]]
-    """The structure with the joint in it, whose further coordinates come last; and the direction (n,) in its
+    """The structure with the joint in it (its additional coordinates come last), and the direction (n,) in these
     coordinates along which the joint moves and its force acts."""
     law: Any
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
-    """Of the model before the change."""
+    """The law's `numbers`; the model is that before `change`."""
     memory: int = 0
     steps: int = STEPS
     acceleration: bool = False
@@ -85,43 +89,44 @@ class JointForce:
 
 @dataclass(frozen=True, slots=True)
 class OnCommand:
-    """What becomes of one channel of the command."""
+    """Changes one channel of the command."""
 
     change: Callable[[FloatArray, float, Values], FloatArray]
-    """Samples (n,), the seconds between them, values. A sample is the mean over its time."""
+    """Arguments: samples (n,), sample period in seconds, values. A sample is the mean over its period."""
     fine: bool = False
-    """It moves between samples, so that it must be followed more finely than they come."""
+    """Whether the force changes between samples, so that it is computed in several steps per sample."""
     at_end: Callable[[FloatArray, float, Values], FloatArray] | None = None
-    """The force at the end of each step from the same means, where it moves between samples; else `change` gives
-    both."""
+    """The force at the end of each step, computed from the same means, where it changes between samples; None: `change`
+    gives both."""
     of_all: Callable[[FloatArray, int, float, Values], tuple[FloatArray, FloatArray]] | None = None
-    """Instead of the above where it depends on other channels too: samples (n, m), channel, seconds, values; returns
-    the force (n,), mean over each step and at its end."""
+    """Used instead of `change` and `at_end` where the force depends on other channels too. Arguments: samples (n, m),
+    channel, sample period in seconds, values. Returns two arrays (n,): mean over each step, and value at its end."""
 
 
 @dataclass(frozen=True, slots=True)
 class OnResponse:
-    """What becomes of the response."""
+    """Changes the response."""
 
     change: Callable[[FloatArray, float, tuple[int, ...], Values], FloatArray]
-    """Samples (n, p), sample rate, the affected channels, values."""
+    """Arguments: samples (n, p), sample rate in Hz, indices of the affected channels, values."""
     after_filter: bool = True
-    """Comes after the sensor's own low pass."""
+    """Whether it is applied after the sensor's low pass."""
     stage: int = 0
-    """Orders those on the same side of the low pass: alignment, range, what is added, numbers, clock."""
+    """Order among the effects on one side of the low pass: alignment, range, added signals, number format, clock."""
     shared: bool = False
-    """It cannot affect a single channel alone."""
+    """It affects all channels; it cannot affect a single one."""
     of_whole: bool = False
-    """It depends on the recording's length, which must therefore be known for an excerpt."""
+    """Whether it depends on the recording's length, which must then be given for an excerpt."""
     bandwidth_hz: Callable[[float, Values], float] | None = None
-    """Of its channels' low pass, from what the model says it is; 0 = none."""
+    """Bandwidth of the channels' low pass in Hz, from the model's bandwidth and the values; 0 = no low pass."""
     on_position: Callable[[FloatArray, float, Values], FloatArray] | None = None
-    """What becomes of the positions (n, p) where the same clock reads them: sample rate, values."""
+    """Changes the positions (n, p) where they are read by the same clock. Arguments: samples, sample rate in Hz,
+    values."""
     given: Callable[[FloatArray, FloatArray, FloatArray, tuple[int, ...], Values], FloatArray] | None = None
     """For a random effect, the response conditioned on a measurement: samples (n, p), measured (n, p), its noise (p,),
     channels, values. Without a measurement `change` draws a realisation."""
     given_position: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray] | None = None
-    """The same of the position: response before and after, position (n, p), as measured (n, p)."""
+    """Likewise for the position. Arguments: response before and after, position (n, p), measured position (n, p)."""
 
 
 Acts = Structure | AxisForce | JointForce | OnCommand | OnResponse
@@ -129,7 +134,8 @@ Acts = Structure | AxisForce | JointForce | OnCommand | OnResponse
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)
 class Effect:
-    """A catalogue entry. Its name, place, units and reported parameters stand in the vocabulary."""
+    """A catalogue entry. Its name, place, units and reported parameters are listed in
+    `equalizer.plant.effect_vocabulary`."""
 
     name: str
     equation: str
@@ -139,22 +145,22 @@ class Effect:
     parameters: tuple[Parameter, ...]
     acts: Acts
     starts: Callable[[Evidence, int], tuple[Values, ...]]
-    """Values worth trying at an axis or channel, the likeliest first; none where the data speak against it."""
+    """Starting values at an axis or channel, the likeliest first; empty where the data speak against the effect."""
     sites: tuple[Literal["one", "all", "each"], ...] = ("one",)
-    """One axis or channel; all with the same numbers; all, each with its own."""
+    """At how many places it can act: one axis or channel; all with the same parameters; all, each with its own."""
     simpler: tuple[str, ...] = ()
-    """Effects that it contains as a special case."""
+    """Names of effects that it contains as special cases."""
     report: Callable[[Values], Values] = dict
-    """The vocabulary's parameters from the fitted ones, where those are more than a reader needs."""
+    """The reported parameters of the vocabulary from the fitted ones, where these are more than are reported."""
     alike: Callable[[Values], tuple[Values, ...]] = lambda values: ()
-    """Other values with almost the same effect, at which a fit may have ended by mistake."""
+    """Other values with almost the same effect, at which a fit may have converged by mistake."""
     law: Law | None = None
-    """Of an effect that has no name of its own: its formula."""
+    """Formula of an effect that has no name in the vocabulary."""
     of_time: bool = False
-    """It depends on time within a recording, or on rare events: no excerpt represents the whole recording."""
+    """Depends on time within a recording, or on rare events: no excerpt represents the whole recording."""
     with_conditions: Callable[[FloatArray, float], Acts] | None = None
-    """Of an effect that depends on recorded conditions: how it acts under these, (n, q) at a rate in Hz, from a
-    simulation's first sample on."""
+    """For an effect that depends on recorded conditions: the effect under given conditions (n, q), sampled at a rate in
+    Hz from a simulation's first sample on."""
 
     def __post_init__(self) -> None:
         _living[id(self)] = self

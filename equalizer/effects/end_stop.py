@@ -11,20 +11,20 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 SHARES, FINER = np.linspace(0.3, 0.98, 18), np.linspace(-0.04, 0.04, 9)
-"""Positions of a stop that are tried: shares of the farthest position, then offsets around the likeliest."""
+"""Stop positions that are tried: shares of the farthest position, then offsets around the best of these."""
 
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """The mean of the force at the step's start and end; a stop pushes back only, and how far one is in it at the end
-    depends on the force."""
+    """Mean of the force at the step's start and end. A stop only pushes, and its penetration at the end depends on its
+    force (implicit step)."""
     force = last = 0.0
     for side in range(2):
         way = numbers[2 + side]
         stiffness = numbers[1] if side == 0 else numbers[1] * numbers[4]
         start = max(way * at[X] - numbers[0], 0.0)
         end = way * (at[X_FREE] + at[X_PER_N] * force) - numbers[0]
-        # Towards the force at the end for a stop that is too stiff for the step, which would kick otherwise.
+        # Weighted towards the force at the end where the stop is too stiff for the step: the mean would overshoot.
         slack = stiffness * at[X_PER_N]
         late = (0.5 + slack) / (1 + slack)
         push = stiffness * ((1 - late) * start + late * end) / (1 + late * slack)

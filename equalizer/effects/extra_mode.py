@@ -42,7 +42,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
                 seen, axis, (each.natural_hz * FINER).tolist(), (each.damping_ratio * COARSER).tolist()
             )
             starts.append(_mode_values(near[0], axis, evidence.model.inputs))
-            # The next is looked for in what this one leaves.
+            # The next mode is searched for in the residual of this one.
             seen = subtract_oscillator(seen, near[0])
     return tuple(starts)
 

@@ -11,12 +11,12 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 LEAST_TRAVEL_RAD = 0.5
-"""Over a smaller travel it cannot be told from a spring."""
+"""Least travel in radians: below it, gravity torque and a spring cannot be distinguished."""
 
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """The mean of the torque at the step's start and end, where the angle at its end depends on it."""
+    """Mean of the torque at the step's start and end; the angle at the end depends on the torque (implicit step)."""
     start, torque = np.sin(at[X] + numbers[1]), 0.0
     for _ in range(4):
         torque = -0.5 * numbers[0] * (start + np.sin(at[X_FREE] + at[X_PER_N] * torque + numbers[1]))

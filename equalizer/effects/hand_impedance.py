@@ -11,7 +11,7 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _GUESS = 0.1
-"""Of the model's own, where the data show none."""
+"""Starting values as shares of the model's own mass, damping and stiffness, used where the data show none."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
@@ -43,7 +43,7 @@ EFFECT = Effect(
     signature="the device is heavier, more damped and stiffer than the model along every axis, at every level; nothing "
     "appears at silent lines",
     parameters=(
-        # The response is all but linear in them, so that a fit may step right to zero and back.
+        # The response is almost linear in these values, so that a step of a fit may reach zero and come back.
         Parameter("mass", 0.0, 1e6, none=0.0, scale="signed"),
         Parameter("damping", 0.0, 1e6, none=0.0, scale="signed"),
         Parameter("stiffness", 0.0, 1e9, none=0.0, scale="signed"),

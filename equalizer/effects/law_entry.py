@@ -30,10 +30,10 @@ from equalizer.signals.signal import FloatArray
 class LawEntry:
     name: str
     law: Law
-    """With the numbers that a fit starts from, and the axis whose signals its formula calls by their letter."""
+    """The law with its starting numbers, and the axis whose signals its formula calls by their letter."""
     source: str
     signature: str
-    """What a reader sees in the data where it is the cause."""
+    """How the law shows in the data."""
 
 
 def kept_effects(entries: Sequence[LawEntry], recording: Recording) -> tuple[Effect, ...]:
@@ -78,7 +78,7 @@ def _rename_signals(node: Node, names: Mapping[str, str]) -> Node:
 
 
 def _make_starts(law: Law, site: int) -> Callable[[Evidence, int], tuple[Values, ...]]:
-    """Starting values at one axis. Of a force, its factors by linear regression on the missing force, with the other
+    """Starting values at one axis. For a force: its factors by linear regression on the missing force, the other
     numbers as they were found."""
     factors = [place for place, role in roles(law.tree).items() if role == "factor"]
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.simulation.interpolated_response import read_other_times
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
@@ -24,7 +24,7 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     late = lateness(evidence.response * weight, evidence.predicted * weight, longest)
     if abs(late) <= LEAST_SAMPLES:
         return ()
-    # A straight line between samples loses height where another start does not: both are tried.
+    # Linear interpolation between samples lowers peaks where band-limited interpolation does not: both are tried.
     starts = [{"offset": late / evidence.sample_rate_hz, "interpolated": straight} for straight in (0.0, 1.0)]
     return tuple(sorted(starts, key=lambda values: _misfit(evidence, values)))
 

@@ -18,25 +18,27 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 STEPS = 8
-"""Per sample."""
+"""Integration steps per sample."""
 GAPS, STIFFNESSES, SLIPS = (0.2, 0.5, 1.2, 3.0, 8.0), (0.05, 0.2, 0.6), (0.01, 0.1, 0.4)
-"""Values that are tried: gaps relative to the joint's rms travel in the model; stiffnesses relative to its own; slips
-relative to the product of the two."""
+"""Starting values that are tried: gaps relative to the joint's rms travel in the model; stiffnesses relative to the
+model's; slip forces relative to the product of both."""
 TRIED_S, SETTLING, FINER = 2.0, 4, 4
-"""Seconds of the record that are simulated; its first 1/SETTLING is left out, because it did not begin at rest; how
-many of the best pairs are tried with every slip."""
+"""Seconds of the recording that are simulated; divisor of the share left out at the beginning because it is not at
+rest; number of the best pairs of gap and stiffness that are tried with every slip force."""
 _FAST: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """The spring beyond the gap, between its force at the step's start and end; then what friction can stop."""
+    """Spring force beyond the gap, averaged over the step, then as much friction as is needed to stop the motion, up to
+    its limit."""
     half, stiffness, slip = 0.5 * numbers[0], numbers[1], numbers[2]
     spring = last = 0.0
     for way in (1.0, -1.0):
         start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
         if start > 0 or end > 0:
-            # Towards the force at the end for a spring that is too stiff for the step, which would kick otherwise.
+            # Weighted towards the force at the end where the spring is too stiff for the step: the mean would
+            # overshoot.
             slack = stiffness * at[X_PER_N]
             late = (0.5 + slack) / (1 + slack)
             push = stiffness * ((1 - late) * start + late * end) / (1 + late * slack)

@@ -14,7 +14,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 CLEAR = 4.0
-"""Times the noise by which two samples must differ to tell which of them was read."""
+"""Difference of two samples, in units of the noise, above which it is clear which of them was read."""
 LEAST_EVENTS = 8
 LARGEST = 0.3
 ROUNDS = 4
@@ -61,7 +61,8 @@ def _repeat_by_likelihood(
 def _lose_positions_as_measured(
     before: FloatArray, after: FloatArray, position: FloatArray, measured: FloatArray
 ) -> FloatArray:
-    """Repeat positions where the response repeats, if the measured position shows that the same logger read it."""
+    """Repeats positions where the response repeats, provided that the measured position shows that the same logger read
+    it."""
     lost = np.any(after != before, axis=1)
     if not lost.any():
         return position
@@ -82,8 +83,8 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 
 def _estimate_fraction(evidence: Evidence, which: list[int], forwards: int) -> float | None:
-    """Share of lost samples among those where it can be told; backwards (-1), of those that equal the next one. None
-    for too few events."""
+    """Share of lost samples among those where both cases can be distinguished; backwards (-1), of those that equal the
+    next one. None for too few events."""
     samples, measured = evidence.predicted[::forwards, which], evidence.response[::forwards, which]
     noise, used = evidence.noise[which], evidence.used[::forwards] > 0
     apart = np.sum((np.diff(samples, axis=0, prepend=samples[:1]) / noise) ** 2, axis=1) > CLEAR**2

@@ -11,11 +11,11 @@ from equalizer.signals.signal import FloatArray
 
 MAINS_HZ = (45.0, 65.0)
 ABOVE = 12.0
-"""Times the spectrum's local median (power) that a tone must have."""
+"""Least ratio of a tone's power to the spectrum's local median."""
 NEIGHBOURS_HZ = 3.0
 ROUNDS = 4
 BLOCKS, STEADY = 12, 0.8
-"""Parts of a recording in which a tone must have the same amplitude and phase, and how nearly."""
+"""Number of blocks in which a tone must have the same amplitude and phase, and the least constancy (0 to 1)."""
 PLAYED = 0.1
 """Amplitude of a tone in a command, over its rms, from which the tone counts as commanded."""
 MAINLY, MOST_TIMES = 0.5, 9
@@ -31,7 +31,8 @@ def _add_tone(response: FloatArray, sample_rate_hz: float, channels: tuple[int, 
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """The line that all channels share, between 45 and 65 Hz and anywhere, with this channel's amplitude and phase."""
+    """Starting values: the line that all channels share, between 45 and 65 Hz and anywhere, with this channel's
+    amplitude and phase."""
     residual = (evidence.response - evidence.predicted) * evidence.used[:, None]
     power = np.sum(np.abs(np.fft.rfft(residual / evidence.noise, axis=0)) ** 2, axis=1)
     lines_hz = np.fft.rfftfreq(len(residual), 1 / evidence.sample_rate_hz)
@@ -91,7 +92,7 @@ def _steadiness(residual: FloatArray, evidence: Evidence, frequency_hz: float) -
 def _fit_tone(residual: FloatArray, evidence: Evidence, frequency_hz: float) -> Values:
     """Least squares for amplitude and phase; the phase's drift then corrects the frequency."""
     time_s = np.arange(len(residual)) / evidence.sample_rate_hz
-    # About the middle of the recording, so that frequency and phase do not compete.
+    # Time counts from the middle of the recording, where estimates of frequency and phase are uncorrelated.
     middle = float(time_s.mean())
     cosine = sine = 0.0
     for _ in range(ROUNDS):

@@ -13,7 +13,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, sugge
 from equalizer.signals.recording import Recording
 
 SHORT = 2
-"""Longest channel name that is quantity and axis alone, such as `fx`."""
+"""Longest channel name that consists of quantity and axis alone, such as `fx`."""
 
 
 class PlacingError(ValueError):
@@ -59,7 +59,8 @@ def _model_effect(placed: PlacedEffect, axis: str | None) -> ModelEffect:
 
 
 def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
-    """'x' of 'fx' where no two channels end alike and none has a word for a name, else the channel's whole name."""
+    """The letter of a channel name ('x' of 'fx') where no two channels end alike and no name is a word, else the whole
+    name."""
     ends = [name[-1:] for name in channels]
     short = all(len(name) <= SHORT or name[-1:] in "xyz" for name in channels)
     return channel[-1:] if short and len(set(ends)) == len(ends) and all(end.isalpha() for end in ends) else channel

@@ -17,7 +17,7 @@ LAGRANGE = 0.5
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """With the step's mean acceleration, which itself depends on the force."""
+    """Uses the step's mean acceleration, which depends on the force itself (implicit step)."""
     middle, speed = 0.5 * (at[X] + at[X_FREE]), 0.5 * (at[V] + at[V_FREE])
     more = numbers[0] * middle
     free, per_newton = (at[V_FREE] - at[V]) / at[STEP_S], at[V_PER_N] / at[STEP_S]

@@ -12,13 +12,13 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 BENDS = np.geomspace(3e-4, 1.0, 15)
-"""Deflections at which the bristle slips that are tried, over the rms position."""
+"""Slip deflections of the bristle that are tried, relative to the rms position."""
 
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Dahl's bristle, bent by the travel that its own force allows. Its force is between that of the step's middle,
-    exact for a soft bristle, and that of its end, stable for a stiff one. memory: the bend."""
+    """Dahl's bristle, deflected by the travel that its own force allows (implicit step). The force is weighted between
+    the step's middle, exact for a soft bristle, and its end, stable for a stiff one. memory: deflection."""
     if numbers[0] <= 0:
         return 0.0
     stiffness, longest, start = numbers[1], numbers[0] / numbers[1], memory[0]
@@ -30,7 +30,7 @@ def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     for _ in range(20):
         full = longest * np.sign(travel)
         bend = full + (start - full) * np.exp(-abs(travel) / longest)
-        # Of the bend by the travel.
+        # Derivative of the deflection with respect to the travel.
         rate = 1 - bend * np.sign(travel) / longest
         off = travel - allowed + slack * ((1 - late) * start + late * bend)
         step = off / (1 + slack * late * max(rate, 0.0))

@@ -13,7 +13,8 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """The mean of the drag at the step's start and end, where the velocity at its end depends on it."""
+    """Mean of the drag at the step's start and end. The velocity at the end solves a quadratic equation (implicit
+    step)."""
     reach = 0.5 * numbers[0] * at[V_PER_N]
     aim = at[V_FREE] - reach * at[V] * abs(at[V])
     end = 2 * aim / (1 + np.sqrt(1 + 4 * reach * abs(aim)))

@@ -1,8 +1,9 @@
 """Quantization: the response takes only whole multiples of a converter's step.
 
-Where the recording itself lies on such a lattice, what was read before rounding is known to half a step. The residual
-is then the quantile of the noise at which it must have been (Dunn and Smyth 1996, J. Comput. Graph. Stat. 5:236), so
-that noise which dithers the steps is not taken for a misfit. Otherwise noise came after, and the prediction is rounded.
+Where the recording itself lies on such a lattice, the reading before rounding is known to half a step, and the residual
+is computed as the quantile of the noise (Dunn and Smyth 1996, J. Comput. Graph. Stat. 5:236), so that noise which
+dithers the steps is not taken for a misfit. Otherwise the noise was added after rounding, and the prediction is
+rounded.
 """
 
 import numpy as np
@@ -15,7 +16,7 @@ from equalizer.effects.starts.response_starts import channels_of
 from equalizer.signals.signal import FloatArray
 
 FAR = 1e-12
-"""Probability beyond which a quantile is not looked up."""
+"""Probability beyond which a quantile is not computed: its digits are lost."""
 
 
 def _round_response(
@@ -42,7 +43,7 @@ def _round_as_measured(
 def _quantile_response(response: FloatArray, measured: FloatArray, noise: float, step: float) -> FloatArray:
     """The prediction for which the residual is the noise's quantile (randomised quantile residual)."""
     missing = measured - response
-    # From the side of the shorter tail, where probabilities keep their digits.
+    # Computed from the shorter tail, whose probabilities keep their digits.
     side = np.where(missing > 0, -1.0, 1.0)
     low, high = ndtr((side * missing - step / 2) / noise), ndtr((side * missing + step / 2) / noise)
     chance = np.random.default_rng(len(response)).random(len(response))

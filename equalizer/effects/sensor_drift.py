@@ -9,7 +9,7 @@ from equalizer.signals.signal import FloatArray
 
 LEAST_SIGMA = 5.0
 STEEPEST = 3.0
-"""Largest bend and start, as shares of the total."""
+"""Bounds of the quadratic term and of the offset at the beginning, as shares of the total drift."""
 
 
 def _drift_shape(samples: int, bend: float, start: float = 0.0) -> FloatArray:
@@ -30,7 +30,7 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     total, middle, first = shares_of(residual, basis, evidence.used).tolist()
     straight, zero = shares_of(residual, basis[:, [0, 2]], evidence.used).tolist()
     size = float(np.sqrt(np.mean((residual - straight * basis[:, 0] - zero)[evidence.used > 0] ** 2)))
-    # The slope's standard error, beside an offset, is that of a mean times the root of 12.
+    # The standard error of a slope fitted beside an offset is that of a mean times sqrt(12).
     if abs(straight) * np.sqrt(evidence.used.sum() / 12) < LEAST_SIGMA * size:
         return ()
     return (

@@ -11,13 +11,13 @@ from equalizer.effects.starts.response_starts import likeliest_reading
 from equalizer.signals.signal import FloatArray
 
 SLOWEST, FASTEST = 0.002, 1.5
-"""Bandwidths worth a try, as shares of the sample rate."""
+"""Bandwidths that are tried, as shares of the sample rate."""
 
 
 def _keep_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """The response as it is: the model's own low pass takes the other bandwidth."""
+    """Returns the response unchanged: the sensor model's own low pass takes the other bandwidth."""
     return response
 
 

@@ -28,7 +28,7 @@ def _rotate_response(
 
 
 def _rotation_degrees(values: Values) -> list[float]:
-    """Rotation vector, degrees about each axis; about the last one where only the angle is known."""
+    """Rotation vector, degrees about each axis; about the last axis where only the angle is known."""
     about = [values.get(name, 0.0) for name in ABOUT]
     return about if any(name in values for name in ABOUT) else [0.0, 0.0, values["degrees"]]
 

@@ -20,7 +20,7 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     predicted = evidence.predicted[:, channels]
     residual = ((evidence.response[:, channels] - predicted) * weight).ravel()
     basis = np.column_stack([(predicted**3 * weight).ravel(), (predicted * weight).ravel()])
-    # A share of the response itself is what re-tuned parameters can take up.
+    # Re-tuned parameters can absorb what is proportional to the response itself.
     cubic = float(shares_of(residual, basis, np.repeat(evidence.used, len(channels)))[0])
     return ({"cubic": cubic},) if cubic != 0 and np.isfinite(cubic) else ()
 

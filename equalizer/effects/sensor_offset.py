@@ -7,7 +7,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST_SIGMA = 4.0
-"""Standard errors of a mean below which there is no offset to speak of."""
+"""Least offset, in standard errors of the mean."""
 
 
 def _add_offset(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:

@@ -11,9 +11,9 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 SELDOM = (0.3, 0.5, 0.75)
-"""Rates to start from, as shares of the command's fastest change, where a limit is seldom reached."""
+"""Starting rates for a limit that is seldom reached, as shares of the command's fastest change."""
 ERRS = 1.05
-"""RMS residual of a channel, over its noise, from which these guesses are tried."""
+"""Rms residual of a channel, over its noise, from which these starting values are tried."""
 
 
 def limit_slew(
@@ -54,7 +54,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     likeliest = () if rate is None else ({"rate": rate},)
     if not _has_unexplained_error(evidence):
         return likeliest
-    # Seldom exceeded, a limit hides in what re-tuning did: then it must be tried.
+    # A limit that is seldom exceeded may be absorbed by re-tuning: then it is tried by simulation.
     return likeliest + tuple({"rate": share * fastest} for share in (SELDOM if axis == ALL_SITES else SELDOM[1:2]))
 
 

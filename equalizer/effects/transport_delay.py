@@ -11,8 +11,8 @@ from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05
 BEYOND = 0.15
-"""Of the hold time. An acceleration follows a force at once, so that the misfit jumps where the delay passes a whole
-number of hold times: a gradient search does not cross from one side to the other."""
+"""Share of the hold time. An acceleration follows a force without delay, so that the misfit jumps where the delay
+passes a whole number of hold times, which a gradient search does not cross."""
 
 
 def _delay_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:

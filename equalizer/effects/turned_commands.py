@@ -1,7 +1,8 @@
-"""A mechanical model of the same device whose commands are counted the other way round.
+"""A mechanical model of the same device with the sign of chosen commands reversed.
 
-An axis points where its command pushes, so that with the command its coordinate turns round, and every force along it:
-F(x, v) becomes -F(-x, -v). Most laws are the same both ways; the table says which numbers of the others turn.
+An axis points where its command pushes. With the command, the sign of its coordinate and of every force along it
+reverses: F(x, v) becomes -F(-x, -v). Most laws are odd and stay the same; the table lists the parameters of the others
+that change.
 """
 
 from collections.abc import Mapping, Sequence
@@ -72,7 +73,7 @@ def _turned_numbers(effect: ModelEffect, site: int, way: FloatArray) -> dict[str
 
 
 def _turned_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]) -> Law:
-    """With the signals of turned axes negated, and what it gives, where its own axis is turned."""
+    """The formula with the signals of reversed axes negated, and its value too where its own axis is reversed."""
     inputs, outputs = channels
     letters, against = axis_names(inputs), set[str]()
     for axis in np.flatnonzero(way < 0):

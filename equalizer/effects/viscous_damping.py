@@ -11,7 +11,7 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _GUESS = 0.3
-"""Of the model's own damping, where re-tuning has hidden the rest."""
+"""Starting value as a share of the model's own damping, used where re-tuning has absorbed the missing damping."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:

@@ -13,9 +13,9 @@ from equalizer.signals.signal import FloatArray
 
 def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> FloatArray:
     """(n,): the law's value at each sample. columns: (n,) each, by the signals' names, SI; `t` is counted from the
-    first sample where it is not among them. Between samples signals go on straight lines; what a law remembers begins
-    as if its signals had always been what they are first, integrals at zero. Outside its domain a function gives NaN or
-    inf.
+    first sample where it is not among them. Between samples signals are interpolated linearly. Operators with memory
+    start in the steady state of the signals' first values, integrals at zero. Outside its domain a function gives NaN
+    or inf.
 
     Raises LawError for a signal that is not there.
     """
@@ -27,7 +27,7 @@ def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float)
 
 def evaluate_held(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> FloatArray:
     """(2, n): at the start and at the end of each step, over which the signals (n,) are held, as commands are. Before
-    the first all was zero. Raises LawError."""
+    the first sample all signals are zero. Raises LawError."""
     program, signals = _bind_signals(law, columns, sample_rate_hz)
     values, memory = np.empty((2, len(signals))), np.zeros(program.memory)
     memory[0] = FROM_ZERO

@@ -1,7 +1,7 @@
 """Stack machine that runs a law's program at one instant or along samples, compiled.
 
-A step has a start and an end. Between them signals that are remembered go on a straight line; at a start they may jump
-(a command does). What is remembered moves on when a step is kept.
+A step has a start and an end. Between them the signals of operators with memory are straight lines; at a start they may
+jump, as commands do. The memory advances when a step is kept.
 """
 
 import numpy as np
@@ -12,8 +12,8 @@ from equalizer.signals.signal import FloatArray
 
 START, END = 0, 1
 SETTLED, BEGUN, FROM_ZERO = 0.0, 1.0, 2.0
-"""State of the memory, its first number: empty, and signals are taken to have always had their first value; begun;
-empty, and signals are taken to have been zero."""
+"""First number of the memory: empty, to be started in the steady state of the signals' first values; started; empty, to
+be started with all signals zero."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 _NUMBER, _VARIABLE = CODE["number"], CODE["variable"]
@@ -23,7 +23,7 @@ _NEGATE, _ABS, _SIGN, _SQRT = CODE["neg"], CODE["abs"], CODE["sign"], CODE["sqrt
 _SIN, _COS, _EXP, _LOG, _TANH, _ATAN = (CODE[name] for name in ("sin", "cos", "exp", "log", "tanh", "atan"))
 _LAG, _PLAY, _DELAY, _INTEGRAL = (CODE[name] for name in ("lag", "play", "delay", "integral"))
 _SAME = 1e-9
-"""Relative to the delay: instants closer than this are equal but for rounding."""
+"""Tolerance for equal instants, relative to the delay (rounding)."""
 _RING = (KEPT["delay"] - 4) // 2
 
 
@@ -113,9 +113,9 @@ def _play(signal: float, half_width: float, memory: FloatArray, at: int, phase: 
 def _interpolate_delayed(
     signal: float, delay_s: float, memory: FloatArray, at: int, phase: int, time_s: float
 ) -> float:
-    """The signal at time_s - delay_s, interpolated in the ring buffer. memory: how many instants were written, the
-    first that still counts, their times and values; then the last signal and delay, which are not written yet. At a
-    jump, a step starts after it and ends before it."""
+    """The signal at time_s - delay_s, interpolated in the ring buffer. memory: number of instants written, index of the
+    oldest that counts, their times and values; then the last signal and delay, which are not written yet. At a jump, a
+    step starts after it and ends before it."""
     times, values, wanted = at + 2, at + 2 + _RING, time_s - delay_s
     first, last = int(memory[at + 1]), int(memory[at]) - 1
     passed = wanted + (_SAME if phase == START else -_SAME) * delay_s

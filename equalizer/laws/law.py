@@ -16,15 +16,16 @@ class Law:
     """Raises LawError where the formula is not in the language, or its numbers do not fit it."""
 
     expression: str
-    """A template, its free numbers called p0, p1, …: '-p0*abs(vy)**p1*sign(vy)'. Numbers in it are part of the form."""
+    """Template with free numbers p0, p1, …: '-p0*abs(vy)**p1*sign(vy)'. Literal numbers in it are part of the form."""
     numbers: tuple[float, ...]
-    """Of p0, p1, …; SI."""
+    """Values of p0, p1, … in SI units."""
     units: tuple[str, ...]
-    """Of the numbers; empty where they are not known."""
+    """Units of the numbers; empty where not known."""
     acts_on: ActsOn
-    """force: it is added to the force at the axis; command, response: it replaces that of the axis."""
+    """What the law acts on. force: it is added to the force at the axis; command, response: it replaces that of the
+    axis."""
     axis: str
-    """Its letter ('y') or channel."""
+    """Letter of the axis ('y'), or name of the channel."""
 
     def __post_init__(self) -> None:
         if self.acts_on not in KINDS:
@@ -44,17 +45,17 @@ class Law:
 
     @property
     def text(self) -> str:
-        """With its numbers written in, to five digits."""
+        """The formula with its numbers, to five digits."""
         return format_formula(self.tree, self.numbers)
 
     @property
     def exact_text(self) -> str:
-        """The same with all digits: `law_of` reads the same numbers back."""
+        """The formula with all digits: `law_of` reads the same numbers back."""
         return format_formula(self.tree, self.numbers, None)
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Signals that it needs, sorted."""
+        """Signals in the formula, sorted."""
         return tuple(sorted({node.name for node in nodes(self.tree) if isinstance(node, Variable)} - {"pi"}))
 
     def with_numbers(self, numbers: Sequence[float]) -> "Law":

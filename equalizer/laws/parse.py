@@ -20,11 +20,11 @@ FUNCTIONS: Mapping[str, int] = {
     "minimum": 2, "maximum": 2,
     "lag": 2, "play": 2, "delay": 2, "integral": 1,
 }  # fmt: skip
-"""How many arguments each takes."""
+"""Number of arguments of each function."""
 MEMORY = ("lag", "play", "delay", "integral")
 """Operators with memory: lag(s, tau_s), play(s, half_width), delay(s, delay_s), integral(s)."""
 LONGEST, LARGEST = 2000, 200
-"""Characters; parts of a formula."""
+"""Most characters and most parts of a formula."""
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"
 }  # fmt: skip
@@ -32,7 +32,7 @@ ALLOWED = "allowed are numbers, signals, pi, + - * / ** and " + ", ".join(FUNCTI
 
 
 class LawError(ValueError):
-    """A formula that is not in the language. Says what, and where it stands."""
+    """The text is not a formula of this language. The message says what is wrong, and where."""
 
 
 @dataclass(slots=True)
@@ -130,7 +130,7 @@ def _not_python(text: str, error: BaseException) -> str:
 
 
 def _column(text: str, node: ast.expr) -> int:
-    """In characters; Python counts bytes, line by line."""
+    """Column in characters; Python's syntax tree counts bytes, line by line."""
     lines = text.splitlines(keepends=True)
     before = sum(len(line) for line in lines[: node.lineno - 1])
     return before + len(lines[node.lineno - 1].encode()[: node.col_offset].decode(errors="replace"))

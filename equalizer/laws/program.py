@@ -16,24 +16,24 @@ CODES = (
 )  # fmt: skip
 CODE: Mapping[str, int] = {name: number for number, name in enumerate(CODES)}
 CELLS = 256
-"""A delayed signal is remembered at so many instants over the delay, or at all if they are fewer."""
+"""Most instants over which a delayed signal is stored."""
 KEPT: Mapping[str, int] = {"lag": 4, "play": 2, "delay": 4 + 2 * (2 * CELLS + 8), "integral": 4}
-"""How many numbers each operator remembers."""
+"""Size of each operator's memory."""
 DEEPEST = 32
-"""Numbers on the stack."""
+"""Largest depth of the stack."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
     codes: FloatArray
-    """(k, 2): what to do, and with which number, signal or place in the memory."""
+    """(k, 2): operation, and its number, column of a signal, or index in the memory."""
     free: tuple[tuple[int, int], ...]
-    """Rows whose number is free, and which free number."""
+    """Rows whose number is free, and index of that free number."""
     memory: int
-    """How many numbers are remembered; the first says whether it has begun."""
+    """Size of the memory; its first number is its state, see `equalizer.laws.kernel`."""
 
     def with_numbers(self, numbers: Sequence[float]) -> FloatArray:
-        """(2 k,): flat, with the free numbers written in."""
+        """(2 k,): the flat program with the free numbers inserted."""
         codes = self.codes.copy()
         for row, place in self.free:
             codes[row, 1] = numbers[place]
@@ -41,7 +41,7 @@ class Program:
 
 
 def program_of(tree: Node, signals: Mapping[str, int]) -> Program:
-    """signals: column of each. Raises LawError for one that is not there, and for a formula that is too deep."""
+    """signals: column of each signal. Raises LawError for an unknown signal, and for a formula that is too deep."""
     program = _append_formula(tree, Program(np.empty((0, 2)), (), 1), signals)
     _check_depth(program.codes[:, 0])
     return program

@@ -5,7 +5,7 @@ from typing import Literal
 from equalizer.laws.tree import Apply, Free, Node
 
 Role = Literal["factor", "exponent", "positive", "phase", "offset"]
-"""factor: the law's terms go with it; positive: a width, a time, a pitch; phase: of a sine, rad; offset: anything
+"""factor: terms are proportional to it; positive: a width, a time, a pitch; phase: of a sine, rad; offset: anything
 else."""
 _SECOND: dict[str, Role] = {
     "**": "exponent",
@@ -38,7 +38,7 @@ def _collect_roles(node: Node, role: Role, found: dict[int, Role]) -> None:
 
 
 def _first_part_role(name: str, role: Role) -> Role:
-    """Of an operator's first part, or of each."""
+    """Roles that an operator gives to its first argument, or to each."""
     if name in ("+", "-", "neg"):
         return role
     if name in ("*", "/"):

@@ -5,19 +5,19 @@ from dataclasses import dataclass
 
 _SUM, _PRODUCT, _SIGN, _POWER, _ATOM = 1, 2, 3, 4, 5
 DIGITS = 5
-"""Significant digits of the numbers that a reader is shown."""
+"""Significant digits of displayed numbers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """Part of the form: no fit moves it."""
+    """A number that is part of the form: no fit changes it."""
 
     value: float
 
 
 @dataclass(frozen=True, slots=True)
 class Free:
-    """A number that a fit may move: `p0`, `p1`, …"""
+    """A number that a fit may change: `p0`, `p1`, …"""
 
     place: int
 
@@ -30,7 +30,7 @@ class Variable:
 @dataclass(frozen=True, slots=True)
 class Apply:
     name: str
-    """+ - * / **, `neg`, or a function."""
+    """An operator + - * / **, `neg`, or a function, with its arguments."""
     parts: tuple["Node", ...]
 
 
@@ -38,7 +38,7 @@ Node = Number | Free | Variable | Apply
 
 
 def nodes(tree: Node) -> Iterator[Node]:
-    """From left to right as it is written, each before its parts."""
+    """All nodes in the order of the text, each before its parts."""
     yield tree
     for part in tree.parts if isinstance(tree, Apply) else ():
         yield from nodes(part)
@@ -70,7 +70,7 @@ def _format_node(tree: Node, numbers: Sequence[float] | None, digits: int | None
 
 
 def _format_free_number(value: float, digits: int | None) -> str:
-    """With a point or an exponent, which say that it is free; see `equalizer.laws.law.law_of`."""
+    """The number with a point or an exponent, which mark it as free; see `equalizer.laws.law.law_of`."""
     return repr(float(value) if digits is None else float(f"{value:.{digits}g}"))
 
 

@@ -6,7 +6,7 @@ from equalizer.laws.tree import Apply, Free, Node, Number, Variable
 from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 Dimension = tuple[float, float, float]
-"""Powers of the force's unit, of the position's, of the second."""
+"""Powers of the unit of force, of position, and of the second."""
 NONE: Dimension = (0.0, 0.0, 0.0)
 FORCE: Dimension = (1.0, 0.0, 0.0)
 SECOND: Dimension = (0.0, 0.0, 1.0)
@@ -24,9 +24,10 @@ def units_of(
     wanted: Dimension,
     system: UnitSystem = LINEAR,
 ) -> tuple[str, ...]:
-    """Of p0, p1, … ; `?` where the formula leaves one open, as of one of two factors. wanted: of the law's value."""
+    """Units of p0, p1, …; `?` where the formula does not determine one, such as that of one of two factors. wanted:
+    unit of the law's value."""
     reader = _Reader(numbers, signals)
-    for _ in range(2):  # what is found on the right may tell of the left
+    for _ in range(2):  # A second pass: what the right side determined may determine the left side.
         reader.assign(tree, wanted)
     symbols = (system.force, system.length, system.time)
     return tuple(
@@ -74,7 +75,7 @@ class _Reader:
         self.found: dict[int, Dimension] = {}
 
     def dimension_of(self, node: Node, literal: Dimension | None = NONE) -> Dimension | None:
-        """literal: dimension of a number that the formula states; None = unknown, as of one with a unit of its own."""
+        """literal: dimension of numbers in the formula; None = not known, since a number may have a unit of its own."""
         match node:
             case Number() | Variable("pi"):
                 return literal
@@ -131,8 +132,8 @@ class _Reader:
                 self._assign_arguments(name, parts, wanted)
 
     def _tells_more(self, part: Node, factor: Node) -> bool:
-        """Whether the signals in a sum tell its dimension better than what is wanted of the product: the number by
-        which the sum is multiplied is part of the form, and may have a unit."""
+        """Whether the signals in a sum determine its dimension better than the dimension wanted of the product: a
+        number that multiplies the sum is part of the form, and may have a unit."""
         is_sum = isinstance(part, Apply) and part.name in ("+", "-", "minimum", "maximum", "**")
         stated = self.dimension_of(factor, None) is None and self.dimension_of(factor) is not None
         return is_sum and stated and self.dimension_of(part, None) is not None

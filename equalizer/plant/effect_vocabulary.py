@@ -1,9 +1,9 @@
 """Names of physical effects that a model may lack: a vocabulary shared with every file, data alone.
 
-What an effect does is written elsewhere, one physics per file; here is only what it is called, where it sits and
-which numbers it has. Meanings: `gap` is the total play, `width` half the dead band, `gain` a factor (1 = none),
-`degrees` the total rotation angle, `ppm` > 0 takes the response at t (1 + ppm 1e-6), `per_m` is M (1 + per_m x);
-`total` and the hum's `amplitude` are those of the largest channel, where all share the effect.
+Here are only the name, the place and the parameters of each effect; its physics is in `equalizer.effects`, one file
+each. Meanings: `gap` is the total play, `width` half the dead band, `gain` a factor (1 = none), `degrees` the total
+rotation angle, `ppm` > 0 takes the response at t (1 + ppm 1e-6), `per_m` is M (1 + per_m x); `total` and the hum's
+`amplitude` are those of the largest channel, where all share the effect.
 """
 
 from dataclasses import dataclass
@@ -15,17 +15,17 @@ Place = Literal["mechanism", "hand", "actuator", "sensor"]
 PLACES: tuple[Place, ...] = get_args(Place)
 
 RESPONSE = "response"
-"""Stands for the response's unit, in `EffectParameter.unit`."""
+"""Placeholder for the response's unit in `EffectParameter.unit`."""
 
 
 @dataclass(frozen=True, slots=True)
 class EffectParameter:
     name: str
     unit: str
-    """SI, of a translational model; with RESPONSE for the response's own."""
+    """SI unit in a translational model; RESPONSE stands for that of the response."""
     rotational_unit: str
     optional: bool = False
-    """A file may leave it out; needed to play an effect again just as it was fitted."""
+    """Optional in a file, but needed to reproduce an effect exactly as it was fitted."""
 
     def unit_in(self, system: UnitSystem, response_unit: str) -> str:
         """The unit in a model of these units whose response is in `response_unit`."""
@@ -42,7 +42,7 @@ class EffectName:
     name: str
     place: Place
     parameters: tuple[EffectParameter, ...]
-    """The main one first."""
+    """Parameters, the main one first."""
 
     @property
     def main(self) -> EffectParameter:
@@ -74,7 +74,7 @@ def _mass(name: str) -> EffectParameter:
 
 
 MATRIX_UNITS = {"mass": _mass("mass"), "damping": _damping("damping"), "stiffness": _stiffness("stiffness")}
-"""Of a model's matrices."""
+"""Units of the entries of a model's matrices."""
 
 
 def matrix_unit(part: str, system: UnitSystem) -> str:
@@ -188,9 +188,9 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
 )
 
 DISCOVERED_LAW = "discovered_law"
-"""A law that has no name: a formula, whose numbers p0, p1, … are its own; see `equalizer.laws`. Not one of those above:
-where it acts, the law says."""
+"""A law without a name: a formula with free numbers p0, p1, …; see `equalizer.laws`. Its place follows from what it
+acts on."""
 LAW_PLACES: dict[str, Place] = {"force": "mechanism", "command": "actuator", "response": "sensor"}
-"""Where a law sits, by what it acts on."""
+"""Place of a law, by what it acts on."""
 
 EFFECTS_BY_NAME: dict[str, EffectName] = {effect.name: effect for effect in EFFECT_NAMES}

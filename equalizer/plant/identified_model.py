@@ -24,7 +24,7 @@ class IdentifiedModelError(ValueError):
 class IdentifiedModel(Summarised):
     """Sampled as recordings are: y[k] is taken just before u[k] is written, so D is zero for a causal device.
 
-    Raises IdentifiedModelError when built from what cannot be. An unstable model can be built: see `spectral_radius`.
+    Raises IdentifiedModelError for inconsistent values. An unstable model is allowed: see `spectral_radius`.
     """
 
     A: FloatArray
@@ -34,26 +34,26 @@ class IdentifiedModel(Summarised):
     C: FloatArray
     """(p, n)"""
     D: FloatArray
-    """(p, m); not zero in a model of a band, which uses it for what lies outside."""
+    """(p, m); not zero in a model of a limited band, where it represents the modes outside."""
     sample_rate_hz: float
     band_hz: tuple[float, float]
-    """Where the fit was made; the model says nothing outside."""
+    """Band of the fit in Hz; the model is not valid outside."""
     input_unit: str | tuple[str, ...]
-    """SI; one for all channels, or one per channel."""
+    """SI units; one for all channels, or one per channel."""
     output_unit: str | tuple[str, ...]
     input_channels: tuple[str, ...]
     output_channels: tuple[str, ...]
     delay_samples: float = 0.0
-    """From a command's row to the first row that can answer it. For information: A, B, C, D include the delay."""
+    """Samples from a command to the first row that it can change. For information: A, B, C, D include the delay."""
     place_m: tuple[float, float, float] | None = None
-    """Where in the workspace the handle was; None = not known."""
+    """Position of the handle in the workspace (m); None = not known."""
     covariance: FloatArray | None = None
-    """(k, k), of `parameters`."""
+    """(k, k), covariance of `parameters`."""
     samples: FloatArray | None = None
     """(draws, k): draws of `parameters` from their uncertainty."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     quality: ModelQuality | None = None
-    """By what was measured; None = not known."""
+    """Errors of the model, by what was measured; None = not known."""
 
     def __post_init__(self) -> None:
         for name in ("A", "B", "C", "D", "covariance", "samples"):
@@ -84,7 +84,7 @@ class IdentifiedModel(Summarised):
 
     @property
     def spectral_radius(self) -> float:
-        """Below 1 the model is stable."""
+        """Largest magnitude of A's eigenvalues; below 1 the model is stable."""
         return float(np.abs(np.linalg.eigvals(self.A)).max()) if self.order else 0.0
 
     def summary(self) -> Summary:

@@ -11,7 +11,8 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearSteps:
-    """State (q, v), 2n numbers; inputs are the m commands and forces at r ports, the driven axes first."""
+    """Matrices of one step. State (q, v), 2n numbers; inputs are the m commands and forces at r ports, the driven axes
+    first."""
 
     step_s: float
     advance: FloatArray
@@ -27,7 +28,7 @@ class LinearSteps:
     motion_by_axis_force: FloatArray
     """(3 r, r)"""
     response: FloatArray
-    """(p, 2n), of the quantity that the model answers with."""
+    """(p, 2n): the response, in the quantity of the model."""
     response_by_command: FloatArray
     """(p, m)"""
     response_by_axis_force: FloatArray
@@ -43,8 +44,8 @@ def driven_axes(model: MechanicalModel) -> FloatArray:
 
 
 def linear_steps(model: MechanicalModel, step_s: float, ports: FloatArray | None = None) -> LinearSteps:
-    """Actuator, sensor and effects apart. ports: (n, r), the directions in the coordinates along which forces act and
-    motion is looked at; the driven axes where none are given."""
+    """Discretises the structure without actuator, sensor and effects. ports: (n, r), the directions in the coordinates
+    along which forces act and motion is output; the driven axes where none are given."""
     n, m = model.coordinates, model.inputs
     axes = driven_axes(model) if ports is None else ports
     inputs = np.asarray(np.linalg.solve(model.mass, np.hstack([model.input, axes])), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""A mechanical model: masses, dampers and springs that a force drives and a sensor sees, with known effects added.
+"""A mechanical model: masses, dampers and springs between a driving force and a sensor, with known effects added.
 
 M a + D v + K q = B u, y = C q (or its rate of change, by `quantity`); plus sensor, actuator and effects.
 """
@@ -20,7 +20,7 @@ DERIVATIVE_OF_QUANTITY = {
     "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2,
     "angular velocity": 1, "angular speed": 1, "angular acceleration": 2, "voltage": 0,
 }  # fmt: skip
-"""What a model's response may be, as the order of the coordinates' time derivative."""
+"""Quantities that a response may have, as the order of the coordinates' time derivative."""
 
 
 class MechanicalModelError(ValueError):
@@ -33,7 +33,7 @@ class MechanicalModelError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class SensorLimits:
-    """0 = none."""
+    """Bandwidth of the sensor's low pass; 0 = none."""
 
     bandwidth_hz: float = 0.0
     """One pole per channel, discrete at the sample rate: y += (1 - exp(-2 pi f / rate)) (x - y)."""
@@ -43,7 +43,7 @@ class SensorLimits:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorLimits:
-    """0 = none."""
+    """Bandwidth of the actuator's low pass; 0 = none."""
 
     delay_s: float = 0.0
     bandwidth_hz: float = 0.0
@@ -53,37 +53,35 @@ class ActuatorLimits:
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """One standard deviation of what was calibrated, at each driven axis; None = not stated.
-
-    Rotational models: kg m^2, N m s/rad, N m/rad.
-    """
+    """Calibration uncertainty: one standard deviation at each driven axis; None = not stated. Rotational models: kg
+    m^2, N m s/rad, N m/rad."""
 
     mass_kg: float | None = None
     damping_n_s_per_m: float | None = None
     stiffness_n_per_m: float | None = None
     modes: float | None = None
-    """Relative, of modal frequencies and masses."""
+    """Relative standard deviation of modal frequencies and masses."""
 
 
 @dataclass(frozen=True, slots=True)
 class ModelEffect:
-    """One entry of the vocabulary with its numbers."""
+    """An effect of the vocabulary with its parameters."""
 
     kind: str
     axis: str | None
-    """The command's or response's axis or channel name; None where all share it."""
+    """Axis or channel name of the command or response; None where all share the effect."""
     parameters: Mapping[str, float]
     law: Law | None = None
-    """Of a discovered law, whose numbers stand in it."""
+    """Formula of a discovered law, which contains its numbers."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class MechanicalModel(Summarised):
-    """Raises MechanicalModelError when built from what cannot be."""
+    """A mechanical model. Raises MechanicalModelError for inconsistent values."""
 
     name: str
     quantity: str
-    """Of the response; a key of DERIVATIVE_OF_QUANTITY."""
+    """Quantity of the response; a key of DERIVATIVE_OF_QUANTITY."""
     mass: FloatArray
     """(n, n), kg or kg m^2; symmetric and positive definite."""
     damping: FloatArray
@@ -101,7 +99,7 @@ class MechanicalModel(Summarised):
     rotational: bool = False
     provenance: Mapping[str, Any] = field(default_factory=dict)
     units: UnitSystem | None = None
-    """Of its numbers, where commands are currents, say; None = as `rotational` says."""
+    """Units of its numbers where these are not SI (commands that are currents); None = SI, by `rotational`."""
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness", "input", "output"):
@@ -143,8 +141,8 @@ class MechanicalModel(Summarised):
 def with_units_of(
     model: MechanicalModel, commands: Sequence[str], responses: Sequence[str], time: str = "s"
 ) -> MechanicalModel:
-    """The model with the units of its recordings: where its input and output convert nothing, its numbers are in them
-    as they are. commands, responses: their units."""
+    """The model with the units of its recordings: where its input and output matrices do not convert, its numbers are
+    in these units. commands, responses: units."""
     plain = all(np.isin(np.abs(matrix), (0.0, 1.0)).all() for matrix in (model.input, model.output))
     found = system_of(commands, responses, time)
     if model.units is not None or not plain or found.rotational is not None:
@@ -154,7 +152,7 @@ def with_units_of(
 
 def suggest_word(word: str, allowed: tuple[str, ...]) -> str:
     """A suggestion to append to an error, or nothing."""
-    close = get_close_matches(word[:60], allowed, n=1)  # longer ones would take minutes
+    close = get_close_matches(word[:60], allowed, n=1)  # for longer words the comparison takes minutes
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
@@ -193,7 +191,7 @@ def _matrix_problems(model: MechanicalModel) -> Iterator[str]:
 
 
 def _mass_problems(mass: FloatArray) -> Iterator[str]:
-    # Most are symmetric to the last digit, and to see that takes a tenth of the time.
+    # Most matrices are symmetric to the last digit, which is checked in a tenth of the time.
     exact = np.array_equal(mass, mass.T)
     if not exact and not np.allclose(mass, mass.T, rtol=1e-6, atol=1e-9 * float(np.abs(mass).max())):
         yield "model.mass is not symmetric; inertia acts alike both ways, so m[i][j] must equal m[j][i]"
@@ -202,7 +200,7 @@ def _mass_problems(mass: FloatArray) -> Iterator[str]:
 
 
 def effect_problems(effect: ModelEffect) -> Iterator[str]:
-    """What contradicts the vocabulary."""
+    """Contradictions to the vocabulary, as sentences."""
     if effect.kind == DISCOVERED_LAW:
         yield from _law_problems(effect)
         return

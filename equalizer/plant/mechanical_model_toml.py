@@ -28,7 +28,7 @@ _MODEL_KEYS = ("name", "quantity", *MATRICES, "rotational")
 _TABLES = ("model", "sensor", "actuator", "effect", "tolerance", "provenance", "rotational")
 
 UNITS = "units"
-"""Of the provenance: of the commands and the motion, where the model's numbers are not in SI."""
+"""Key of the provenance for the units of commands and motion, where the model's numbers are not in SI units."""
 
 Numbers = TypeVar("Numbers", SensorLimits, ActuatorLimits, Tolerance)
 
@@ -95,7 +95,7 @@ def mechanical_model_toml(model: MechanicalModel) -> str:
 
 
 def _read_units(origin: Mapping[str, Any]) -> UnitSystem | None:
-    """Of numbers that are not in SI, as a program of ours writes them down."""
+    """The provenance with the units of numbers that are not in SI, as this program writes it."""
     said = origin.get(UNITS)
     words = {key: value for key, value in said.items() if isinstance(value, str)} if isinstance(said, dict) else {}
     return (
@@ -232,7 +232,7 @@ def _format_key(key: str) -> str:
 
 
 def _format_text(text: str) -> str:
-    """A basic string: control characters, quotes and backslashes escaped, all else as it is."""
+    """A TOML basic string: control characters, quotes and backslashes escaped."""
     return '"' + re.sub(r'[\x00-\x1f\x7f"\\]', lambda match: f"\\u{ord(match[0]):04x}", text) + '"'
 
 

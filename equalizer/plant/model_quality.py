@@ -11,24 +11,25 @@ NOT_STORED = "Quality not stored: the model file is of an earlier version; ident
 
 @dataclass(frozen=True, slots=True)
 class ModelQuality:
-    """All errors are root mean squares in the model's band, relative to the response's. Raises ValueError for figures
-    that cannot be."""
+    """Root-mean-square errors in the model's band, relative to the response. Raises ValueError for impossible
+    figures."""
 
     expected_error: float
-    """Of the model against the device, in 95 % of cases not exceeded on recordings like these: not smaller than any of
-    those below, except the noise."""
+    """Error of the model against the device, exceeded in 5 % of cases on recordings like these; not smaller than any
+    error below except the noise."""
     misfit_error: float
-    """Against the lines that it was fitted to, beyond their noise."""
+    """Error against the fitted lines, beyond their noise."""
     scatter_error: float | None = None
-    """That the noise of those lines leaves in a model without misfit; None = no draws were made."""
+    """Error that the noise of the fitted lines causes in a model without misfit; None = no bootstrap draws were
+    made."""
     held_out_error: float | None = None
-    """Of its prediction of a record that the fit did not see, that record's noise included; None = there was none."""
+    """Error of the prediction of a held-out record, that record's noise included; None = there was none."""
     held_out_noise: float | None = None
-    """Of that record; None = not known."""
+    """Noise of the held-out record; None = not known."""
     held_out_s: float | None = None
-    """Its length."""
+    """Length of the held-out record."""
     remarks: tuple[str, ...] = ()
-    """Sentences: what the error comes from, as far as it is known."""
+    """Likely causes of the error, as sentences."""
 
     def __post_init__(self) -> None:
         for name in [field.name for field in fields(self) if field.name != "remarks"]:
@@ -48,7 +49,7 @@ def model_quality(
     remarks: tuple[str, ...] = (),
     most_misfit: float = 0.0,
 ) -> ModelQuality:
-    """held_out: error, noise, seconds; an error that a test showed is the least that is claimed. most_misfit: that the
+    """held_out: error, noise, seconds; the stated error is at least the held-out one. most_misfit: misfit that the
     noise of the fitted lines may hide."""
     own = float(np.hypot(max(misfit_error, most_misfit), scatter_error or 0.0))
     error, noise, seconds = held_out or (None, None, None)
@@ -56,7 +57,7 @@ def model_quality(
 
 
 def quality_sentence(quality: ModelQuality | None) -> str:
-    """What comes before every figure that a model predicts of itself."""
+    """Sentence to print before every figure that a model predicts about itself."""
     if quality is None:
         return NOT_STORED
     if quality.held_out_error is None:
@@ -73,12 +74,12 @@ def quality_sentence(quality: ModelQuality | None) -> str:
 
 
 def quality_document(quality: ModelQuality | None) -> dict[str, Any] | None:
-    """For a program's JSON; None = not stored."""
+    """As values for JSON output; None = not stored."""
     return None if quality is None else asdict(quality) | {"remarks": list(quality.remarks)}
 
 
 def quality_brief(quality: ModelQuality | None) -> str:
-    """For a list of models."""
+    """Short form for a list of models."""
     if quality is None:
         return "quality not stored"
     if quality.held_out_error is None:
@@ -87,6 +88,6 @@ def quality_brief(quality: ModelQuality | None) -> str:
 
 
 def worst_quality(found: tuple[ModelQuality | None, ...]) -> ModelQuality | None:
-    """Of several models: the largest expected error, or None where one of them is not known."""
+    """Largest expected error of several models, or None where that of one is not known."""
     known = [quality for quality in found if quality is not None]
     return max(known, key=lambda quality: quality.expected_error) if len(known) == len(found) and known else None

@@ -11,7 +11,7 @@ from equalizer.signals.signal import FloatArray
 def model_response(model: IdentifiedModel, frequency_hz: FloatArray) -> ComplexArray:
     """Frequency response C (zI - A)^-1 B + D on the unit circle, shape (lines, p, m). frequency_hz: (lines,)."""
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / model.sample_rate_hz)
-    # A = Q T Q^H, once: with T triangular a line takes n^2 operations instead of n^3.
+    # A = Q T Q^H, computed once: with triangular T, a line takes n^2 operations instead of n^3.
     T, Q = schur(model.A, output="complex")
     driven = Q.conj().T @ model.B
     states = np.empty((model.order, len(z), model.B.shape[1]), dtype=np.complex128)

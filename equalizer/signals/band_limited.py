@@ -16,7 +16,7 @@ LINES = 8192
 
 
 def low_pass_gain(frequency_hz: FloatArray, band_hz: float) -> FloatArray:
-    """Gain of the low pass at each frequency, in its shape: 1/2 at band_hz, because each pass takes half the power."""
+    """Gain of the low pass at each frequency: 1/2 at band_hz, because each of the two passes halves the power there."""
     return np.asarray(1 / (1 + (frequency_hz / band_hz) ** (2 * ORDER)))
 
 
@@ -30,15 +30,16 @@ def filter_by_gain(
     """
     whole = odd_extension(samples - end_to_end_line(samples))
     spectrum, lines = rfft(whole, axis=0), rfftfreq(len(whole), 1 / sample_rate_hz)
-    # Matrices of all lines at once would take a gigabyte for some minutes at 1 kHz.
+    # In blocks, because the matrices of all lines at once would take a gigabyte for some minutes at 1 kHz.
     pieces = [slice(first, first + LINES) for first in range(0, len(lines), LINES)]
     passed = np.concatenate([np.einsum("lrk,lk->lr", gain(lines[piece]), spectrum[piece]) for piece in pieces])
     return np.asarray(irfft(passed, len(whole), axis=0)[: len(samples)])
 
 
 def odd_extension(samples: FloatArray) -> FloatArray:
-    """One period, (> n, k), of samples (n, k) extended beyond both ends as an odd function. Zeros half way round, far
-    from both ends, bring it to a length of small prime factors: with a large one the FFT takes twenty times as long."""
+    """One period, (> n, k), of samples (n, k) extended beyond both ends as an odd function. Zeros half-way round, far
+    from both ends, pad it to a length with small prime factors: with a large prime factor the FFT takes twenty times as
+    long."""
     mirrored = -samples[-2:0:-1]
     exact, middle = len(samples) + len(mirrored), len(mirrored) // 2
     zeros = np.zeros((next_fast_len(exact, real=True) - exact, samples.shape[1]))

@@ -13,7 +13,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 LEAST_CORRELATION = 0.5
 RIVAL = 0.98
-"""A second peak as high as this share of the highest could as well be the right one."""
+"""Height of a second peak, relative to the highest, at which the offset is ambiguous."""
 
 
 class NoOffsetError(ValueError):
@@ -25,11 +25,12 @@ class ClockOffset:
     offset_s: float
     """Added to the other clock's time to give the reference's."""
     correlation: float
-    """At this offset; below 0 where one signal is the other with its sign turned."""
+    """Normalised cross-correlation at this offset; negative where one signal is inverted."""
 
 
 def offset_by_correlation(reference: Samples, other: Samples, about_s: float, within_s: float) -> ClockOffset:
-    """The offset between about_s - within_s and about_s + within_s at which the two agree best.
+    """The offset between about_s - within_s and about_s + within_s of the largest magnitude of the normalised
+    cross-correlation.
 
     Both are put onto one band-limited grid at twice the faster rate; the peak of the normalised cross-correlation is
     taken between its samples, along a spline. Raises NoOffsetError where nothing agrees, the best agreement is at the
@@ -66,7 +67,8 @@ def _resample_centred(samples: Samples, rate_hz: float) -> FloatArray:
 def _normalised_correlation(first: FloatArray, second: FloatArray) -> FloatArray:
     """Cross-correlation of (n,) and (m,) at each of the n + m - 1 lags, divided by the energy of both where they
     overlap."""
-    # Here and below: SciPy's signals and splines take longer to import than a diagnosis that does without them.
+    # Here and below: SciPy's signal and interpolation modules take longer to import than a diagnosis that does not need
+    # them.
     from scipy import signal as sg
 
     raw = sg.correlate(first, second, mode="full", method="fft")

@@ -11,10 +11,10 @@ ComplexArray = npt.NDArray[np.complex128]
 def phasors(samples: FloatArray, sample_rate_hz: float, frequency_hz: float, harmonics: int = 1) -> ComplexArray:
     """Least-squares amplitude phasors of the fundamental and its harmonics, offset and linear drift removed.
 
-    samples: (n, channels). Returns (harmonics, channels): row h - 1 is a with x(t) = Re(a exp(2 pi i h f t)).
-    Fitted rather than summed over periods, so that the samples need not hold a whole number of them, and rows with a
-    NaN (missed ticks) are left out. Raises ValueError when less than one period is left, or a harmonic lies at or
-    above half the rate.
+    samples: (n, channels). Returns (harmonics, channels): row h - 1 is a with x(t) = Re(a exp(2 pi i h f t)). Fitted
+    rather than summed over periods, so that the samples need not be a whole number of periods, and rows with a NaN
+    (missed ticks) are left out. Raises ValueError when less than one period is left, or a harmonic lies at or above
+    half the rate.
     """
     whole = np.isfinite(samples).all(axis=1)
     if not covers_a_period(int(whole.sum()), sample_rate_hz, frequency_hz):
@@ -34,5 +34,5 @@ def phasors(samples: FloatArray, sample_rate_hz: float, frequency_hz: float, har
 
 
 def covers_a_period(n: int, sample_rate_hz: float, frequency_hz: float) -> bool:
-    """Whether n samples hold one period, a last fraction of a sample apart."""
+    """Whether n samples hold one period, up to a fraction of a sample."""
     return n >= int(sample_rate_hz / frequency_hz)

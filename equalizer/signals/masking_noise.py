@@ -7,10 +7,10 @@ import scipy.fft
 from numpy.typing import NDArray
 
 SLOPE_DB_PER_OCTAVE = -3.0103
-"""Of the power density: the same power in every octave between the corners, none outside them."""
+"""Slope of the power density (1/f): the same power in every octave between the corners, none outside them."""
 
 HEADROOM_DB = 3.0
-"""The highest sample stays this far below full scale, for a converter that overshoots between samples."""
+"""Headroom of the highest sample below full scale, for converters that overshoot between samples."""
 
 FULL_SCALE = 2**15 - 1
 

@@ -1,7 +1,7 @@
 """Periodic multisines: sinusoids of equal size on whole lines, with random phases.
 
 Random phases, and not ones that were optimised for a low peak, because only over random phases does odd distortion
-average out of an estimate. The peak is kept sane by choosing the best of several draws. On three axes at once the
+average out of an estimate. The crest factor is kept low by taking the best of several draws. On three axes at once the
 experiments of a group are orthogonal (Dobrowiecki, Schoukens and Guillaume 2006): phases of its own for each axis, and
 from one experiment to the next axis a turns by a thirds of a circle.
 """
@@ -16,7 +16,8 @@ from equalizer.signals.signal import FloatArray
 IntArray = npt.NDArray[np.int64]
 
 DRAWS = 32
-"""Of phases, of which the best is kept: on one axis a peak of 2.8 to 3.5 times the rms; single draws reach 4.8."""
+"""Draws of the phases, of which the one with the lowest peak is kept: on one axis 2.8 to 3.5 times the rms; single
+draws reach 4.8."""
 
 
 def lines_between(from_hz: float, to_hz: float, n: int, sample_rate_hz: float, *, odd_only: bool) -> IntArray:

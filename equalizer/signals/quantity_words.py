@@ -1,7 +1,7 @@
-"""What a channel's name says that it measures: words of headers and maps, and the quantity of each.
+"""Measured quantities by the words in channel names, from headers and maps.
 
-Words for the same in another language are another entry of the table; those in other scripts are with the importing.
-French `tension` is left out: in English it is a force.
+Words of other languages are further entries of the table; those in other scripts are in `study.importing`. French
+`tension` is left out: in English it is a force.
 """
 
 import re
@@ -26,23 +26,23 @@ _QUANTITY = {word: quantity for quantity, words in QUANTITY_WORDS.items() for wo
 _LARGE, _SMALL = "A-ZÀ-ÖØ-Þ", "a-zß-öø-ÿ"
 _WORD = re.compile(f"[{_LARGE}]?[{_SMALL}]+|[{_LARGE}]+(?![{_SMALL}])")
 _OF_ANGLE = "rate"
-"""`yaw rate`: behind an angle the word says its derivative."""
+"""Word for a derivative behind an angle: `yaw rate`."""
 _OF_ANOTHER = frozenset(
     ["dot", "ddot", "d", "delta", "diff", "rate", "error", "gyro", "pedal", "time", "ratio", "mode", "limit"]
 )
-"""Words beside which another word says no more what is measured: `theta_dot`, `gyro pitch`, `travel time`."""
+"""Words that make the quantity ambiguous: `theta_dot`, `gyro pitch`, `travel time`."""
 SEVERAL_MEANINGS = frozenset(["spannung", "tensión", "yaw", "pitch", "roll"])
-"""Also a stress, a distance, a turning speed: where a unit is stated, it decides."""
+"""Words that also name a stress, a distance, a turning speed: a stated unit decides."""
 
 
 def words_in(name: str) -> list[str]:
-    """In small letters: of `Yaw_Rate`, `motorSpeed` and `load angle` two each."""
+    """Words of a name in lower case: two each of `Yaw_Rate`, `motorSpeed` and `load angle`."""
     return [word.lower() for word in _WORD.findall(unicodedata.normalize("NFC", name))]
 
 
 def quantity_in(name: str) -> str:
-    """By the last word that is one: a load angle is an angle. Empty where none is, or a word beside it changes what it
-    says."""
+    """The quantity, by the last word that names one: a load angle is an angle. Empty where no word does, or another
+    word makes it ambiguous."""
     words = words_in(name)
     last = max((place for place, word in enumerate(words) if word in _QUANTITY), default=None)
     if last is None:

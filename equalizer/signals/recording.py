@@ -14,7 +14,7 @@ from equalizer.signals.summary import Summarised, Summary
 
 
 class Hold(Enum):
-    """How the command moves between its samples."""
+    """How the command moves between its samples: held, or linearly interpolated."""
 
     ZERO_ORDER = "zero-order"
     BAND_LIMITED = "band-limited"
@@ -61,7 +61,7 @@ class Recording(Summarised):
     meta: Mapping[str, Any] = field(default_factory=dict)
     """JSON values: place, sensor and its frame, feedback, grip, operator, provenance."""
     condition: Signal | None = None
-    """(n, q): what was known beside, such as a temperature, a pressure, a setting."""
+    """(n, q): measured conditions, such as a temperature, a pressure, a setting."""
 
     @property
     def is_timed(self) -> bool:

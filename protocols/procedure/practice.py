@@ -10,7 +10,7 @@ class PracticeState:
     """State of a practice run before its next trial."""
 
     correct: tuple[bool, ...] = ()
-    """Of all answers so far, in order."""
+    """Whether each answer so far was correct, in order."""
 
 
 def add_answer(state: PracticeState, correct: bool) -> PracticeState:

@@ -35,7 +35,7 @@ class StaircaseState:
     trials: int = 0
     trials_at_cap: int = 0
     pushes_against_cap: int = 0
-    """How often the rule asked for a level above the cap."""
+    """Number of times the rule asked for a level above the cap."""
     reversals_at_cap: int = 0
 
     @property

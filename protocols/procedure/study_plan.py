@@ -22,7 +22,7 @@ class Participant:
     """The place in the balanced order, from 0; None where none was taken."""
     progress: Progress
     why: str = ""
-    """Of a participant who is left out: refused, excluded, withdrawn, unreadable."""
+    """Status of a participant who is left out: refused, excluded, withdrawn, unreadable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +49,11 @@ class StudyPlan:
     planned: int
     """The declared sample size; 0 where none is declared."""
     participants: tuple[Participant, ...]
-    """By their numbers, then those without."""
+    """Participants by their numbers, then those without."""
     cells: tuple[Cell, ...]
-    """Of one cycle, in the order in which they are given; empty where orders are drawn by lot or all are the same."""
+    """Orders of one cycle, as they are assigned; empty where orders are drawn at random or all are the same."""
     next_number: int
-    """Of the next participant."""
+    """Number of the next participant."""
 
     def count(self, progress: Progress) -> int:
         return sum(each.progress == progress for each in self.participants)

@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 FILES = {"import": "import_recording"}
-"""Where the name of a command is no name of a module."""
+"""Modules of commands whose names are keywords of Python."""
 
 COMMANDS: dict[str, dict[str, str]] = {
     "Study": {
@@ -87,7 +87,7 @@ class LoadedWhenCalled(Mapping[str, Any]):
 
 
 class CommandTable(TyperGroup):
-    """The commands above as one command line, with its groups in `--help` and each line whole."""
+    """All commands as one command line, with groups in `--help` and unwrapped lines."""
 
     @property
     def commands(self) -> Any:
@@ -95,7 +95,7 @@ class CommandTable(TyperGroup):
 
     @commands.setter
     def commands(self, registered: Any) -> None:
-        """Typer hands over what was registered with it: nothing here."""
+        """Required by Typer's interface; there are no further commands."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         return list(self.commands)

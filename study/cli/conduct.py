@@ -30,14 +30,14 @@ from study.workflows.trial.requests_port import QueuedRequests
 
 @dataclass(frozen=True, slots=True)
 class Sitter:
-    """Who takes the sitting."""
+    """Participant and options of a sitting."""
 
     observer: str | None
     """Name of the simulated participant; None for a person."""
     subject: str | None
     keys: AnswerKeys = DIGITS
     hands_off: bool = False
-    """The caller's word, where no terminal can confirm it, that a real device's handle is free."""
+    """Whether the caller declares, without a terminal to confirm it, that no hand is on a real device's handle."""
 
 
 def begin(

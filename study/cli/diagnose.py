@@ -90,7 +90,7 @@ def diagnose(
     with steps("Diagnosing") as show:
         answer = find_answer(plan, show)
     found = answer.findings
-    # Said before it is drawn: the page takes a while.
+    # Printed before drawing, because the page takes a while.
     typer.echo(json.dumps(summary(found), indent=2) if as_json else "\n".join(answer_lines(found)))
     with steps("Diagnosing") as show:
         complete = write_answer(answer, show)

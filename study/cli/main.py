@@ -63,7 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
     _settle_in()
     try:
         code = app(args=arguments, standalone_mode=False)
-        if code == ExitCode.INTERRUPTED:  # some versions of typer return what others raise
+        if code == ExitCode.INTERRUPTED:  # some versions of typer return exit codes that others raise
             raise KeyboardInterrupt
         return code if isinstance(code, int) else ExitCode.DONE
     except StudyError as error:
@@ -91,7 +91,7 @@ def _settle_in() -> None:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _leave)
     for library in ("OPENBLAS", "OMP", "MKL"):
-        # Our matrices are small: threads would wait for each other longer than they work. Heard before numpy loads.
+        # Matrices here are small: threads would cost more in waiting than they save. Read when numpy is loaded.
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
@@ -101,12 +101,12 @@ def say(error: StudyError) -> None:
     try:
         sys.stderr.write(f"{error.title}\n" + "".join(f"  {part}\n" for part in parts if part))
         sys.stderr.flush()
-    except OSError:  # a terminal that is gone hears nothing, and must not be told once more when Python ends
+    except OSError:  # a closed terminal receives nothing, and Python must not try to flush to it again at exit
         sys.stderr = io.StringIO()
 
 
 def as_typed(sentence: str) -> str:
-    """Commands in a sentence as they can be typed here: `make study` puts hapteq nowhere on the path."""
+    """Command names as they can be typed here: after `make study`, hapteq is not on the path."""
     started_as = Path(sys.argv[0])
     if shutil.which("hapteq") or started_as.name != "hapteq":
         return sentence

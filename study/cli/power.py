@@ -114,7 +114,8 @@ def _judged_words(plan: "PowerPlan") -> str:
 
 
 def _delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":
-    """Raises StudyError where the data tell nothing of a frequency."""
+    """Levels and answers of a pilot study. Raises StudyError where the data do not determine the threshold at a
+    frequency."""
     if data is None:
         return None
     from analysis.psychophysics.power.felt_delivery import felt_delivery
@@ -134,7 +135,7 @@ def _delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDeli
 
 
 def _with_habits(crowd: "Crowd", people: str, curve: str, lapse: float, repeats: int) -> "Crowd":
-    """Raises WrongUseError for an unknown curve or kind of people."""
+    """Population from the options. Raises WrongUseError for an unknown curve or kind of people."""
     from analysis.psychophysics.hierarchy.curve import Family
 
     habits: dict[str, Crowd] = {

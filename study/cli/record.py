@@ -70,7 +70,7 @@ def announce(notice: str, hands_off: bool, held: bool = False) -> None:
     require_confirmation(hands_off, held)
     if has_keys():
         typer.echo("Press Enter to begin. ", err=True, nl=False)
-        if not sys.stdin.readline():  # closed, as by Ctrl-D: that is no yes
+        if not sys.stdin.readline():  # closed, as by Ctrl-D, is not a confirmation
             raise KeyboardInterrupt
 
 

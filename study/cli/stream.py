@@ -30,7 +30,7 @@ def stream(
 
     def note(offset_s: float) -> None:
         text = f"LSL's clock was {offset_s:.6f} s ahead of the session's when that said {time.monotonic():.3f} s."
-        with contextlib.suppress(StudyError):  # the markers say it too
+        with contextlib.suppress(StudyError):  # the markers report it too
             inbox.send(NoteAsked("program", text))
 
     typer.echo(f"Streaming {folder.name}; Ctrl-C ends it, and not the session.", err=True)

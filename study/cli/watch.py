@@ -71,7 +71,7 @@ def _screen(folder: Path) -> None:
 
     feed = WatchFeed(str(folder))
     try:
-        # A stop goes straight to the session's folder: it must not depend on the process that reads.
+        # A stop is written directly to the session's folder: it must not depend on the reading process.
         WatchApp(feed, RequestInbox(folder).send).run()
     finally:
         feed.close()
@@ -98,7 +98,7 @@ def _once(folder: Path, as_json: bool) -> None:
 
 
 def _plain(folder: Path) -> None:
-    """Until the sitting is over."""
+    """Loop until the sitting is over."""
     from study.devices.clock import RealClock
     from study.session.watching.watch_view import ON
     from study.tui.watch.watch_lines import changes
@@ -132,7 +132,7 @@ def _ask(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], .
 
 def _ask_for(session: "SessionFolder", request: "Request", said: str) -> None:
     from study.devices.clock import RealClock
-    from study.workflows.views.ask_session import ask_session
+    from study.workflows.views.send_request import send_request
 
-    ask_session(session, request, RealClock())
+    send_request(session, request, RealClock())
     typer.echo(said, err=True)

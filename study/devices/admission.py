@@ -12,7 +12,7 @@ from study.session.stimulus.limits import Limits
 
 HAND_STIMULUS_CAP_N = 3.0
 HAND_TOTAL_CAP_N = 6.0
-"""With a hand on the handle nothing goes beyond these; without one, only settings that say so."""
+"""Upper limits with a hand on the handle; without one, settings may declare higher ones."""
 
 TOLERANCE = 1 + 1e-9
 """Rounding, when a stimulus is exactly at its cap."""
@@ -35,7 +35,7 @@ HIGHEST_PLAUSIBLE = {
     "stale_s": 5.0,
     "still_s": 60.0,
 }
-"""As in `protocols.definition.plausibility`: kept once more, for settings that come from no protocol."""
+"""As in `protocols.definition.plausibility`; repeated here for settings that come from no protocol."""
 
 RATES_HZ = (100.0, 10_000.0)
 
@@ -43,7 +43,7 @@ HEAVIEST_KG = 10.0
 """The spring's stiffness rests on the mass that the device says: no handle on a desk weighs so much."""
 
 LONGEST_DROP_S = 1.0
-"""For the hardware to let go when nothing writes any more."""
+"""Longest time after which the hardware must drop the force when nothing writes any more."""
 
 FADE_SHAPES = ("raised_cosine", "linear")
 

@@ -24,7 +24,8 @@ class DeviceInfo:
     sample_rate_hz: float
     max_force_n: float
     effective_mass_kg: float
-    """At the handle, centre of the workspace: what the virtual spring's natural frequency refers to."""
+    """Apparent mass at the handle in the centre of the workspace, to which the virtual spring's natural frequency
+    refers."""
     details: str = ""
     """Serial number, firmware, or the simulation's parameter set."""
     has_sensor: bool = True
@@ -33,7 +34,7 @@ class DeviceInfo:
 
 @dataclass(frozen=True, slots=True)
 class DeviceSettings:
-    """What holds from opening to closing: limits, spring, and how much of each stimulus is kept."""
+    """Settings from opening to closing: limits, spring, and recorded part of each stimulus."""
 
     limits: Limits
     spring_frequency_hz: float
@@ -43,7 +44,7 @@ class DeviceSettings:
     hand_on_handle: bool
     """Whether a hand holds the handle. A simulated device then carries a simulated hand."""
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where the spring is centred, x, y, z."""
+    """Centre of the spring, x, y, z."""
     beyond_hand_ceiling: bool = False
     """Without a hand on the handle: caps up to the device's own maximum, not only up to what a hand may feel. Never
     set by a protocol; refused with a hand."""
@@ -74,7 +75,7 @@ class Fault(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """What the safety layer counted since `hold` or `play`, in ticks."""
+    """Counters of the safety layer since `hold` or `play`, in ticks."""
 
     fault: Fault
     ticks: int
@@ -89,7 +90,7 @@ class Health:
     feedback_clipped: int = 0
     """Spring, damper, or both together were above their cap (a lean on the spring)."""
     late_ticks: int = 0
-    """Of a loop that does not wait: run, but their work ended after the next was due. Missed ones come on top."""
+    """Ticks of a real-time loop whose work ended after the next was due. Missed ticks are counted separately."""
     latest_s: float = 0.0
     """The longest from when a tick was due until its work, or that of the one that came in its place, was done."""
     sensor: SensorFacts | None = None
@@ -98,7 +99,7 @@ class Health:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Played:
-    """What the device did between `hold` and `release`, or during `play`."""
+    """Recording and counters of the device between `hold` and `release`, or during `play`."""
 
     recording: Recording | None
     """For `hold`: the last of the steady part, whole loops, at most `DeviceSettings.keep_s` long; of a loop longer
@@ -111,17 +112,17 @@ class Played:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What the handle does right now. Position and acceleration are both None where there is no reading."""
+    """Current state of the handle. Position and acceleration are both None without a reading."""
 
     position_m: tuple[float, float, float] | None
     """x, y, z; None where the encoders gave no numbers."""
     acceleration_mps2: tuple[float, float, float] | None
-    """As the accelerometer reads it, in the device's axes; None where it gave no numbers."""
+    """Acceleration by the accelerometer, in the device's axes; None without a valid reading."""
     sensor_clipped: bool
     buttons: frozenset[int]
-    """Of the device's own buttons those that are down, as its driver numbers them."""
+    """Numbers of the device's own buttons that are pressed, as its driver counts them."""
     missed_ticks: int
-    """Of the present stimulus; 0 while there is none."""
+    """Missed ticks of the present stimulus; 0 without one."""
 
 
 class Device(Protocol):
@@ -155,7 +156,7 @@ class Device(Protocol):
         ...
 
     def health(self) -> Health:
-        """What the safety layer counted since `hold`, so far. Cheap, as `fault` is."""
+        """Counters of the safety layer since `hold`, so far. Fast, like `fault`."""
         ...
 
     def release(self) -> Played:

@@ -47,7 +47,7 @@ class MaskingSound:
             self._stream, self.output = open_stream(rate_hz, self._fill)
 
     def start(self) -> None:
-        """From its beginning. Raises `DeviceError`."""
+        """Play from the beginning. Raises `DeviceError`."""
         self._next = 0
         with _as_device_error("cannot be played"):
             self._stream.start()

@@ -21,7 +21,7 @@ from protocols.definition.staircase_rule import STRICT
 from study.errors import DeviceError
 
 PATIENCE_S = 0.05
-"""For a pulse to go out; a healthy line takes well below a millisecond."""
+"""Timeout for a pulse; a healthy line takes well below a millisecond."""
 
 CLAIM, WRITE_DATA, RELEASE = 0x708B, 0x40017086, 0x708C
 """Requests of Linux' parallel port driver (ppdev)."""

@@ -29,10 +29,10 @@ REAL = tuple(MODELS)
 """Devices that move: they need the vendor's library, and real time."""
 
 STRONGEST_N = max(model.max_force_n for model in MODELS.values())
-"""What the strongest of them can give: more is a mistake in any use."""
+"""Largest force of the strongest of them: a higher one is a mistake."""
 
 DEVICES = (SIMULATED, *REAL)
-"""What a study or a recording may be made on."""
+"""Devices on which a study or a recording may be made."""
 
 FRICTIONLESS = "simulated-frictionless"
 """The simulated device with no friction in its drives: what friction costs is seen by comparing. Offered nowhere."""
@@ -179,7 +179,7 @@ def accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
 
 
 def proof_force_n() -> float:
-    """What `accept_device` pushes the handle with."""
+    """Force with which `accept_device` pushes the handle."""
     from study.devices.force_dimension.force_proof import FORCE_N
 
     return FORCE_N

@@ -18,7 +18,7 @@ from study.devices.device import DeviceInfo
 from study.session.facts.sensor_facts import SensorFacts
 
 POSITION = slice(0, 3)
-"""Where a reading holds the encoders' position of the handle, m."""
+"""Slice of a reading with the encoders' position of the handle, m."""
 ACCELERATION = slice(3, 6)
 """The accelerometer's reading, m/s², in the device's axes as mounted, zeroed at rest."""
 TRUE_ACCELERATION = slice(6, 9)

@@ -92,12 +92,12 @@ class Telemetry:
     """(n,) of its stimulus: 0 is the first of it, below 0 the handle is brought to rest."""
     position_m: FloatArray
     velocity_m_per_s: FloatArray
-    """As the damper uses it, low-passed at 50 Hz; NaN while the force is let go."""
+    """Velocity as the damper uses it, low-passed at 50 Hz; NaN while the force is released."""
     acceleration_mps2: FloatArray
     commanded_n: FloatArray
     """The stimulus, within its cap and with its fade."""
     applied_n: FloatArray
-    """What was sent to the device: with spring, damper, slew limit and total cap."""
+    """Force that was sent to the device: with spring, damper, slew limit and total cap."""
     phase: FloatArray
     """(n,) 0 still, 1 playing, 2 being released, 3 let go by the safety layer."""
     fault: FloatArray

@@ -28,18 +28,18 @@ _NAMED = 3
 
 
 class ImportNotes:
-    """Sentences about an import, each reported once: what holds for all parts is not repeated for each."""
+    """Sentences about an import, each reported once: those that hold for all parts are not repeated for each."""
 
     def __init__(self) -> None:
         self._parts: dict[str, list[str]] = {}
 
     def add(self, part: str, sentence: str) -> None:
         parts = self._parts.setdefault(sentence, [])
-        if part not in parts:  # channels of one name, in several roles
+        if part not in parts:  # channels of the same name, with several roles
             parts.append(part)
 
     def sentences(self, every_part: Sequence[str]) -> tuple[str, ...]:
-        """every_part: labels of all parts, to recognise what holds for all of them."""
+        """every_part: labels of all parts, to recognise sentences that hold for all of them."""
         return tuple(
             sentence if len(parts) == len(every_part) else f"{_abbreviate_list(parts)}: {sentence}"
             for sentence, parts in self._parts.items()
@@ -55,7 +55,7 @@ def _abbreviate_list(parts: Sequence[str]) -> str:
 class Built:
     recording: Recording
     notes: tuple[str, ...]
-    """Sentences: how signals were resampled, which clock was shifted, what is missing."""
+    """Sentences: how signals were resampled, which clock was shifted, which samples are missing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

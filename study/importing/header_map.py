@@ -37,8 +37,8 @@ _NAMED = 3
 
 
 def read_headed(path: Path) -> Arrays:
-    """A file that no map describes. Raises CannotReadError; ImportRefusedError, too, for a wrong field in a column
-    whose name says a role, a quantity or a time, or where no column is without."""
+    """A map for a file that no map describes. Raises CannotReadError; ImportRefusedError also for an invalid field in a
+    column whose name states a role, a quantity or a time, or where every column has one."""
     arrays = read_arrays(path, CsvMap())
     faulty = [name for name, array in arrays.by_name.items() if _fault(array)]
     columns = [name_signal(header) for header in arrays.by_name] if faulty else []
@@ -78,7 +78,7 @@ def header_map(arrays: Arrays) -> ImportMap | None:
 
 
 def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
-    """Sentences about what was taken from the header, what was left out, and what names leave open."""
+    """Sentences about what was taken from the header, what was left out, and what the names leave open."""
     table, _ = _table(arrays)
     told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
     parts = ", ".join(f"'{part.prefix.rstrip('/_')}'" for part in wanted.part)
@@ -89,7 +89,7 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     others = [
         name
         for name, array in arrays.by_name.items()
-        if not array.ndim and name != rate and not _fault(array)  # which its own remark names
+        if not array.ndim and name != rate and not _fault(array)  # it has a remark of its own
     ]
     left_out += [f"Left out: '{name}' is no column." for name in others]
     peaks = [f"'{channel.value}'" for channel in wanted.channel if is_peak_value(_bracketed(channel.value))]
@@ -113,8 +113,8 @@ def _direction_notes(table: Arrays, wanted: ImportMap) -> tuple[str, ...]:
 
 
 def _table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
-    """The columns, without single numbers and texts; of several tables that are alike, as sheets of a workbook, those
-    of the first, and the prefix of each."""
+    """The columns, without single numbers and texts; of several tables of the same form, such as sheets of a workbook,
+    those of the first, and the prefix of each."""
     columns = {name: array for name, array in arrays.by_name.items() if array.ndim}
     groups = groups_in(columns, LEAST_SAMPLES)
     members = len(groups.prefixes) * len(groups.names)
@@ -155,7 +155,7 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
 
 
 def _columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
-    """Time columns with their unit, and all others; without those that say nothing more."""
+    """Time columns with their unit, and all others; repeated time columns are left out."""
     surplus = surplus_arrays(arrays)
     columns = [name_signal(header) for header in arrays.by_name if header not in surplus]
     times = [
@@ -171,7 +171,7 @@ def _is_time(column: ParsedName) -> bool:
 
 
 def _rates(arrays: Arrays) -> list[str]:
-    """Expressions for the sample rate, from single numbers that say that they are hertz, or seconds of a step."""
+    """Expressions for the sample rate, from single numbers in hertz, or in seconds per step."""
     found = rates_in(arrays)
     stated = {rate: unit_in(name)[1] or unit_at_end(name)[1] for rate, name in found.items()}
     rates = [rate for rate, name in found.items() if rate == name and stated[rate] == "Hz"]

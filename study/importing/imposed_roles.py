@@ -1,4 +1,4 @@
-"""Which of force and place was commanded, where names leave it open: the one that follows a law of its own."""
+"""Finds which of force and position was commanded, where names leave it open, by a test for imposed motions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal

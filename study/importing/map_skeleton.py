@@ -26,12 +26,12 @@ from study.importing.surplus_arrays import (
 _FORCES = ("force", "torque")
 _NAMED = 4
 _SHARE = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
-"""Of a name: for which share of the data an array is, as in `u_test`."""
+"""Parts of a name that state the role of the data, as in `u_test`."""
 _TIME_UNITS = ("s", "ms", "us", "min")
 
 
 def map_skeleton(arrays: Arrays) -> str:
-    """TOML. What cannot be filled in is an empty text, which an import refuses by name."""
+    """The map as TOML. Values that cannot be filled in are empty texts, which an import refuses by name."""
     return "\n".join(_lines(arrays)) + "\n"
 
 
@@ -76,8 +76,8 @@ def _runs_beside(whole: Arrays, groups: Groups) -> list[str]:
 
 
 def _first_run(whole: Arrays, groups: Groups, beside: Sequence[str]) -> Arrays:
-    """Arrays of the first of several runs and those of none, without those of cells beside them; the time of a table,
-    [time, value ...], on its own."""
+    """Arrays of the first of several runs and those that belong to none, without those of cells beside them; the time
+    of a table [time, value ...] separately."""
     inside = [name for name in whole.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
     common = {name: array for name, array in whole.by_name.items() if name not in (*inside, *beside)}
     found = {**{name: whole.by_name[full] for name, full in groups.names.items()}, **common}
@@ -86,7 +86,8 @@ def _first_run(whole: Arrays, groups: Groups, beside: Sequence[str]) -> Arrays:
 
 
 def _clock_of(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
-    """Of those with as many samples, the clock whose name begins most alike; of equal clocks the one that is kept."""
+    """The clock with the same number of samples whose name has the longest common prefix; of equal clocks the one that
+    is kept."""
     fitting = [clock for clock in clocks if len(arrays.by_name[clock]) == max(arrays.by_name[name].shape, default=0)]
 
     def alike(clock: str) -> int:
@@ -136,7 +137,7 @@ def _line_0(array: Array) -> Array:
 
 
 def _roles(arrays: Arrays, others: list[str]) -> dict[str, str]:
-    """Roles by name, where names and units tell them; others: what is no channel."""
+    """Roles by name, where names and units determine them; others: arrays that are not channels."""
     channels = [name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in others]
     columns = [replace(name_signal(_stem(name)), header=name) for name in channels]
     return dict(zip(channels, turn_imposed(columns, arrays.by_name, propose_roles(columns)), strict=True))
@@ -151,7 +152,7 @@ def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
 
 
 def _cells_beside(beside: Sequence[str], groups: Groups) -> Iterator[str]:
-    """Runs of cells of another length, and how they are added where their names say which array each is."""
+    """Runs of cells of another length, and how to add them where their names identify the arrays."""
     if beside:
         shown = ", ".join(beside[:_NAMED]) + (" ..." if beside[_NAMED:] else "")
         yield f"\n# Also in the file, in cells of another length: {shown}"
@@ -184,7 +185,7 @@ def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
 
 
 def _table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
-    """A channel of each line; of [time, value] the value has the name and the role that the table's name says."""
+    """One channel per line; of [time, value], the value gets its name and role from the table's name."""
     timed = time_in_table(array)
     for number in range(int(timed), min(array.shape)):
         single = timed and min(array.shape) == 2

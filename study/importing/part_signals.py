@@ -29,7 +29,7 @@ class PartSignals:
 
     grid: Grid
     columns: Mapping[Key, FloatArray]
-    """By role and name, each (grid.count,); computed ones included."""
+    """Samples by role and name, each (grid.count,); computed ones included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,8 @@ def part_signals(
         for said in filter(None, (logger.base.gaps(), logger.base.wander())):
             say(said)
     for computed in wanted.computed:
-        named = {name: column for (_, name), column in reversed(columns.items())}  # of one name, the first counts
+        # Of several channels with the same name, the first counts.
+        named = {name: column for (_, name), column in reversed(columns.items())}
         columns[computed.role, computed.name] = _compute_channel(
             computed.name, computed.value, named, grid, loggers[0].names
         )
@@ -122,7 +123,7 @@ def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources
     if part.stop_s:
         end_s = min(end_s, begin_s + part.stop_s - (1 - SAME_INSTANT) / rate_hz)
     begin_s += np.ceil(part.start_s * rate_hz - SAME_INSTANT) / rate_hz
-    # On the samples of a clock that has this rate, so that its channels stay as they are.
+    # On the samples of a clock with this rate, so that its channels are not resampled.
     for logger in [logger for logger in loggers if logger.base.rate_hz == rate_hz][:1]:
         origin_s = float(logger.base.times_s(1)[0]) + logger.base.offset_s
         begin_s = origin_s + np.ceil((begin_s - origin_s) * rate_hz - SAME_INSTANT) / rate_hz

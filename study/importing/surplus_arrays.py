@@ -1,4 +1,4 @@
-"""Arrays that a proposed map leaves out: those without any number, and further columns of the same time."""
+"""Arrays that a proposed map leaves out: those without any number, and duplicates of the time column."""
 
 import re
 from collections.abc import Mapping
@@ -44,7 +44,7 @@ def surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
 
 @np.errstate(all="ignore")
 def is_growing_time(name: str, array: Array) -> bool:
-    """Whether an array is called a time and never falls; coarse stamps may repeat."""
+    """Whether an array is named as a time and never decreases; coarse stamps may repeat."""
     grows = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
     return (
         grows
@@ -63,12 +63,12 @@ def _words(plain: str) -> list[str]:
 
 
 def _last(name: str) -> str:
-    """Of a name of several levels (`data.fs`, `1-of-2/fs`), without its unit."""
+    """Last part of a name of several levels (`data.fs`, `1-of-2/fs`), without its unit."""
     return re.split(r"[./](?=\w)(?!k?Hz\b)", unit_in(name)[0])[-1]
 
 
 def rates_in(arrays: Arrays) -> Mapping[str, str]:
-    """Single numbers that are called a sample rate, or the step between samples, by the expression that gives the rate;
+    """Single numbers named as a sample rate, or as the step between samples, by the expression that gives the rate;
     rates first."""
     single = [name for name, array in arrays.by_name.items() if array.size == 1 and array.dtype.kind in "fiu"]
     rates = {name: name for name in single if _RATE.fullmatch(" ".join(_words(_last(name))))}
@@ -77,7 +77,7 @@ def rates_in(arrays: Arrays) -> Mapping[str, str]:
 
 
 def quote(name: str) -> str:
-    """An array in an expression."""
+    """Expression for an array."""
     return name if name.isidentifier() else f"array('{name}')"
 
 
@@ -93,7 +93,7 @@ def _is_index(name: str, array: Array) -> bool:
 
 
 def equal_clocks(arrays: Arrays) -> Mapping[str, str]:
-    """Time columns that repeat another, each with that one."""
+    """Time columns that repeat another, each with the other's name."""
     kept: list[str] = []
     found = {}
     clocks = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
@@ -108,19 +108,19 @@ def equal_clocks(arrays: Arrays) -> Mapping[str, str]:
 
 @np.errstate(all="ignore")
 def time_in_table(array: Array) -> bool:
-    """Whether the first row or column of a table, along its short side, grows as a time does: [time, value ...]."""
+    """Whether the first row or column of a table, along its short side, increases like a time: [time, value ...]."""
     if array.ndim != 2 or array.dtype.kind not in "fiu" or max(array.shape) < LEAST_SAMPLES:
         return False
     lines = array if array.shape[0] < array.shape[1] else array.T
     grows = [bool((line[1:] > line[:-1]).all()) for line in lines]
     steps = np.diff(lines[0].astype(float))
-    even = bool(np.ptp(steps) <= _EVEN * abs(np.median(steps)))  # beside a value that grows, too
+    even = bool(np.ptp(steps) <= _EVEN * abs(np.median(steps)))  # even where the values increase, too
     return len(lines) > 1 and grows[0] and (even or not all(grows))
 
 
 @np.errstate(all="ignore")
 def _is_same_clock(by_name: Mapping[str, Array], first: str, second: str) -> bool:
-    """Whether both grow alike; where one has no unit, in any usual one."""
+    """Whether both increase at the same rate; where one has no unit, in any usual unit."""
     one, other = (by_name[name].astype(float) for name in (first, second))
     if one.shape != other.shape or one.ndim != 1 or not np.isfinite([one[[0, -1]], other[[0, -1]]]).all():
         return False

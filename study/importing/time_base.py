@@ -16,17 +16,17 @@ from study.importing.map_format.map_errors import ImportProblemError
 IntArray = npt.NDArray[np.int64]
 
 UNEVEN = 0.02
-"""Stamps are uniform if each is within this fraction of a step of its place."""
+"""Tolerance for uniform stamps: largest deviation from the grid, as a fraction of a step."""
 LEFT_OUT = 0.02
 """A uniform logger skips at most this fraction of its rows; more indicates rounded stamps."""
 _MOST_DECIMALS = 6
 _BINARY = 1e-3
-"""Of a decimal: how far a stamp in binary, from a difference of large ones, may lie off it."""
+"""Tolerance of a decimal: deviation of a binary number that is the difference of large ones."""
 _USUAL_GAP = 3
-"""Median steps from which on stamps leave a gap."""
+"""Steps, in median steps, from which stamps have a gap."""
 _HOUR_S = 3600.0
 _COUNTERS = (2**16, 2**24, 2**31, 2**32, 10**6, 10**9)
-"""Counts at which the clocks of loggers begin anew, in units of the file."""
+"""Values at which the clocks of loggers wrap around, in units of the file."""
 _PLAIN_DIGITS = (4, 5, 6)
 NUMBERED_HZ = 1.0
 """Nominal rate of samples without known time."""
@@ -36,25 +36,25 @@ MOST_SAMPLES = 10**8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeBase:
-    """Of one clock in one part."""
+    """Time base of one clock in one part."""
 
     name: str
     rate_hz: float
-    """0 if stamps are not uniform."""
+    """Sample rate; 0 if stamps are not uniform."""
     stamps_s: Value | None
     """(n,) as logged; None for a clock with a rate only."""
     places: IntArray | None
     """(n,): sample indices of the stamps at the uniform rate; None if not uniform."""
     gap_s: float
     offset_s: float = 0.0
-    """Added to give the reference clock's time."""
+    """Offset that is added to give the reference clock's time."""
 
     @property
     def fastest_hz(self) -> float:
         return self.rate_hz or 1 / float(np.median(np.diff(self.times_s(0))))
 
     def times_s(self, count: int) -> Value:
-        """(count,) in the logger's own time; with stamps, as many as there are."""
+        """(count,) times by the logger's own clock; with stamps, as many as there are."""
         if self.stamps_s is None:
             return np.arange(count) / self.rate_hz
         if self.places is not None:
@@ -63,7 +63,7 @@ class TimeBase:
         return self.stamps_s
 
     def gaps(self) -> str:
-        """How many gaps the stamps have, and the key that says otherwise; empty where there are none."""
+        """Number of gaps in the stamps, and the key that declares otherwise; empty without gaps."""
         steps_s = np.diff(self.times_s(0)) if self.stamps_s is not None else np.zeros(0)
         wide_s = steps_s[steps_s > self.gap_s]
         if not len(wide_s):
@@ -76,7 +76,7 @@ class TimeBase:
         )
 
     def wander(self) -> str:
-        """How far stamps that were taken for even ones are from that; empty where it is not worth a word."""
+        """Deviation of stamps from the uniform grid that was fitted to them; empty where negligible."""
         if self.stamps_s is None or self.places is None:
             return ""
         off_s = float(np.max(np.abs(self.times_s(0) - self.stamps_s)))
@@ -88,12 +88,12 @@ class TimeBase:
         )
 
     def samples(self, values: Value) -> Samples:
-        """In the reference clock's time; rows skipped by a uniform logger are missing samples, unless the map calls no
-        step a gap."""
+        """Times by the reference clock. Rows skipped by a uniform logger are missing samples, unless the map says that
+        there are no gaps."""
         times_s = self.times_s(len(values)) + self.offset_s
         widest_s = 0.0 if self.places is None else float(np.max(np.diff(self.places))) / self.rate_hz
         if self.places is not None and self.places[-1] > len(self.places) - 1 and widest_s <= self.gap_s:
-            return Samples(times_s, values, 0.0, self.gap_s)  # the map says that nothing is missing between them
+            return Samples(times_s, values, 0.0, self.gap_s)  # the map declares that nothing is missing between them
         if self.places is None or self.places[-1] == len(self.places) - 1:
             return Samples(times_s, values, self.rate_hz, self.gap_s)
         every = np.full(self.places[-1] + 1, np.nan)
@@ -102,7 +102,7 @@ class TimeBase:
 
 
 def time_base(clock: ClockMap, names: Namespace) -> TimeBase:
-    """Without the offset to other clocks. Raises ImportProblemError."""
+    """Time base without the offset to other clocks. Raises ImportProblemError."""
     if clock.time:
         return _from_stamps(clock, names)
     rate_hz = NUMBERED_HZ if clock.unknown else clock.rate_hz or names.number(clock.rate)
@@ -144,7 +144,7 @@ def _as_expression(time: str, names: Namespace) -> str:
 
 
 def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
-    """Problem with the stamps, and the key that mends it; empty if they increase. time: an expression."""
+    """Problem with the stamps, and the key that corrects it; empty if they increase. time: an expression."""
     if not np.isfinite(stamps_s).all():
         first = int(np.argmax(~np.isfinite(stamps_s)))
         return f"is no number at sample {first}; time is never missing"
@@ -183,7 +183,7 @@ def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
 
 
 def _last_decimal(stamps: Value) -> float:
-    """The last decimal to which stamps are written, as 0.001; 0 where they have more than that."""
+    """Last decimal place of the stamps, such as 0.001; 0 with more decimals."""
     for digits in range(_MOST_DECIMALS + 1):
         whole = stamps * 10**digits
         if (np.abs(whole - np.round(whole)) <= _BINARY).all():
@@ -192,8 +192,8 @@ def _last_decimal(stamps: Value) -> float:
 
 
 def _uniform(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | None]:
-    """Rate and indices; 0 and None for uneven stamps. A round rate (1000 for 1000.0003) if all stamps fit it. unit_s:
-    of their last decimal."""
+    """Rate and sample indices; 0 and None for non-uniform stamps. A round rate (1000 for 1000.0003) if all stamps agree
+    with it. unit_s: last decimal place of the stamps."""
     since_s = stamps_s - stamps_s[0]
     mean_hz = (len(stamps_s) - 1) / float(since_s[-1])
     usual_hz = 1 / float(np.median(np.diff(stamps_s)))
@@ -209,9 +209,12 @@ def _uniform(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | None]:
 
 
 def _rounded_rate(since_s: Value, unit_s: float) -> float:
-    """Rate of stamps without a gap that are even but for their last decimal; else 0. They lie within a unit of it
-    together (the rounding of two); of rates that leave hardly more than the mean rate does, the plainest is taken. Or a
-    step is now and then a unit of a fine decimal off the usual one, and no stamp half a step."""
+    """Rate of stamps without a gap that are uniform up to rounding to their last decimal place; else 0.
+
+    They must all lie within one unit of that place (rounding of two stamps). Among rates with nearly the residual of
+    the mean rate, the roundest is taken. Alternatively some steps differ by one unit of a fine decimal from the usual
+    one, and no stamp is off by half a step.
+    """
     ticks = np.round(np.diff(since_s) / unit_s) if unit_s else np.zeros(1)
     if ticks.min() < 1 or _skips_rows(ticks):
         return 0.0
@@ -228,15 +231,15 @@ def _rounded_rate(since_s: Value, unit_s: float) -> float:
 
 
 def _skips_rows(ticks: Value) -> bool:
-    """Whether steps are multiples of the shortest, and no more are longer than a logger skips, by chance too."""
+    """Whether steps are multiples of the shortest one, and no more are longer than a logger skips by chance."""
     usual = LEFT_OUT * len(ticks)
     skipped = np.count_nonzero(ticks > ticks.min())
     return not (ticks % ticks.min()).any() and bool(skipped <= usual + 3 * np.sqrt(usual) + 1)
 
 
 def without_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, str]:
-    """The names without rows that repeat the one above, and a sentence that says how many; unchanged where time
-    stands still otherwise, too. Raises ImportProblemError."""
+    """The arrays without rows that repeat the one above, and a sentence with their number; unchanged where the time is
+    also constant otherwise. Raises ImportProblemError."""
     if not clock.time:
         return names, ""
     stamps: Value = names.value_of(clock.time, NoTime())
@@ -254,13 +257,13 @@ def without_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, 
 
 
 def _repeats(array: Array, rows: npt.NDArray[np.intp]) -> bool:
-    """Whether the rows are all as those above them."""
+    """Whether all rows equal those above them."""
     return np.array_equal(array[rows], array[rows - 1], equal_nan=array.dtype.kind == "f")
 
 
 @np.errstate(all="ignore")
 def _counts(array: Array) -> bool:
-    """Whether an array numbers the rows, doubled ones too."""
+    """Whether an array numbers the rows, duplicated ones included."""
     return array.ndim == 1 and array.dtype.kind in "fiu" and bool((array[1:] - array[:-1] == 1).all())
 
 

@@ -9,7 +9,7 @@ from study.participants.observer import Felt
 
 _MEDIAN_RESPONSE_S = math.sqrt(1.2 * 2.5)
 _SPREAD_OF_LOG = math.log(2.5 / 1.2) / (2 * 1.96)
-"""So that 95 % of the response times lie between 1.2 and 2.5 s."""
+"""Chosen so that 95 % of the response times lie between 1.2 and 2.5 s."""
 
 _OBSERVERS = 0x0B5E
 """Separates these keys from those of the schedule: with a shared seed, a participant's draws would otherwise be

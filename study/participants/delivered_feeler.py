@@ -28,7 +28,7 @@ class DeliveredFeeler:
     feeler: DirectionFeeler
     """Thresholds, slope, lapses and criterion."""
     masking: float = 1.0
-    """By how much a harmonic amplitude adds to the threshold, in squares; 0: not at all."""
+    """Factor by which a harmonic amplitude adds to the threshold, in squares; 0: not at all."""
     adaptation_db: float = 1.0
     """Rise of the threshold in a long run."""
     adaptation_trials: float = 20.0

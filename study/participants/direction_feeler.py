@@ -29,7 +29,7 @@ class DirectionFeeler:
     thresholds_n: tuple[tuple[float, float], ...]
     """(frequency in Hz, level in N with 79.37 % of the directions right), frequencies ascending."""
     slope: float = 2.0
-    """Of the Weibull curve over newtons; people's lie between 1 and 3.5."""
+    """Slope of the Weibull function over newtons; people's are between 1 and 3.5."""
     lapse: float = 0.0
     """Fraction of wrong answers at the strongest level; lapses are random answers, at twice this rate."""
     criterion: float = 0.0

@@ -28,7 +28,7 @@ from study.participants.psychometric_curve import WeibullCurve
 class IntensityCue:
     name: str
     difference_db: float = 3.0
-    """By how much direction 1 is delivered more strongly than direction 2."""
+    """Level of direction 1 as delivered, above that of direction 2."""
     noise_db: float = 1.0
     """Standard deviation of one judgement of strength; about the difference limen of vibration."""
     detection_n: float = 0.1

@@ -24,7 +24,7 @@ class Felt:
     nominal_n: float | None = None
     """Level of the staircase, where `level_n` was roved around it."""
     delivered: Delivered | None = None
-    """What the device made of it; None where that was not felt or nothing was measured."""
+    """The stimulus as delivered by the device; None where it was not felt or not measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Reply:
     answer: int
     """1 or 2."""
     response_time_s: float
-    """From the onset to the answer."""
+    """Time from the onset to the answer."""
     ask_again: bool = False
     """The same trial is asked for once more, if that is allowed; else the answer counts."""
 

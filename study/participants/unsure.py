@@ -22,7 +22,8 @@ class UnsureRepeater:
     name: str
     feeler: DirectionFeeler
     unsure: float = 0.5
-    """In standard errors of the averaged evidence: 0.5 asks again in some 30 % of the trials near the threshold."""
+    """Threshold of doubt in standard errors of the averaged evidence: 0.5 asks again in about 30 % of the trials near
+    the threshold."""
     looks: int = 5
     """After so many looks at one trial it is answered anyway."""
 

@@ -23,7 +23,7 @@ class BeginWanted(Message):
 @dataclass(eq=False)
 class ResumeWanted(Message):
     path: str
-    """Of the session's folder, here and below."""
+    """Path of the session's folder, here and below."""
 
 
 @dataclass(eq=False)
@@ -57,7 +57,7 @@ class WatchWanted(Message):
 @dataclass(eq=False)
 class DiagnosisWanted(Message):
     path: str
-    """Of a diagnosis.json."""
+    """Path of a diagnosis.json."""
 
 
 @dataclass(eq=False)

@@ -20,7 +20,7 @@ from rich.console import Console
 from textual_serve.server import Server
 
 RELOAD_S = 10.0
-"""How long a reloaded page waits for the sitting of the old one to end."""
+"""Longest wait of a reloaded page for the sitting of the old one to end."""
 
 THIS_MACHINE = ("localhost", "127.0.0.1", "[::1]")
 TOKEN_BYTES = 32

@@ -1,6 +1,6 @@
-"""Work on the workers of a dask scheduler: the same executor as the processes of this computer, on others.
+"""Work on the workers of a dask scheduler: the same executor interface as for the processes of this computer.
 
-Each worker imports hapteq itself, so that all must have the version that asks: other code could give other numbers.
+Each worker imports hapteq itself, so that all must have the same version: other code could give other numbers.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 PATIENCE_S = 10.0
-"""For the scheduler to answer."""
+"""Timeout in seconds for the scheduler to answer."""
 INSTALL = "pip install 'hapteq[cluster]'"
 
 
@@ -47,7 +47,7 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
             "Start it with: dask scheduler. Then give the address that it prints.",
             saved="Nothing was begun.",
         ) from problem
-    # A recording goes to its worker as a value: distributed would advise against so large a piece.
+    # A recording is sent to its worker as a value; distributed warns against such large arguments.
     with client, dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 GB"}):
         _require_workers(client, address, one_thread)
         try:
@@ -56,7 +56,7 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
         except (KilledWorker, CommClosedError, CancelledError) as problem:
             raise _undone_error(problem) from problem
         except (TypeError, ValueError) as problem:
-            # A future that is lost with its scheduler has no result, which distributed's executor tries to unpack.
+            # A future that is lost with its scheduler has no result, and distributed's executor fails on unpacking it.
             if client.status == "running":
                 raise
             raise _undone_error(problem) from problem
@@ -72,7 +72,7 @@ def _undone_error(problem: BaseException) -> StudyError:
 
 
 def own_version() -> str:
-    """Also asked of each worker; empty where hapteq is not installed."""
+    """Version of hapteq, here and on each worker; empty where it is not installed."""
     try:
         return version("hapteq")
     except PackageNotFoundError:

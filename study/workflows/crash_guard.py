@@ -9,5 +9,5 @@ STRICT = "HAPTEQ_STRICT"
 
 
 def crash_guard() -> Guard:
-    """A new one, for one run."""
+    """A new guard, for one run."""
     return Guard(on=not os.environ.get(STRICT))

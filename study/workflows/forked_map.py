@@ -69,7 +69,8 @@ def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: 
 
 @contextmanager
 def unforked() -> Iterator[None]:
-    """Within it nothing is forked, as on a worker beside which others use the other cores. The results are the same."""
+    """Within this context nothing is forked, for workers whose neighbours use the other cores. The results are the
+    same."""
     _within.append(True)
     try:
         yield
@@ -113,7 +114,7 @@ class _Shared:
         results = []
         for number, piece in enumerate(self._pieces):
             if number not in found:
-                # What a process could not send, or died of, is done here.
+                # Results that a process could not send, or pieces at which it died, are computed here.
                 _lost.add(_key(self._function))
                 found[number] = self._function(*piece), None
             result, error = found[number]
@@ -130,7 +131,8 @@ class _Shared:
             answers, end = os.pipe()
             try:
                 with warnings.catch_warnings():
-                    # Of other threads, whose locks it might wait for: it computes, and leaves without cleaning up.
+                    # Python warns of other threads, whose locks the child might wait for: the child only computes, and
+                    # leaves without cleaning up.
                     warnings.simplefilter("ignore", DeprecationWarning)
                     process = os.fork()
             except OSError:
@@ -139,7 +141,7 @@ class _Shared:
                 return False
             if not process:
                 try:
-                    # Else its own answers would wait for ever to be read, once the process that forked it is gone.
+                    # Otherwise its own results would wait for ever to be read, once its parent is gone.
                     for other in (answers, *(theirs for _, theirs in children)):
                         os.close(other)
                     self._work_there(end, parent, spent_s)

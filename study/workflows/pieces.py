@@ -1,4 +1,4 @@
-"""Pieces of work on an executor, at home or on a cluster: each with its result as soon as that is there."""
+"""Pieces of work on an executor, on this computer or a cluster: each result is returned as soon as it is available."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 Key = TypeVar("Key")
 Result = TypeVar("Result")
 AHEAD = 100
-"""A bound, chosen by hand, on the pieces in flight: inputs and results of no more of them are in memory at once."""
+"""Largest number of pieces in flight, chosen by hand: it bounds the inputs and results in memory."""
 
 
 def finished_pieces(

@@ -11,12 +11,12 @@ from numba import njit
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.tracking.lqr import lqr_kernel
+from equalizer.tracking.lqr.changing_direction import TurningTransient, turning_transient
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.riccati import backward_gains
 from equalizer.tracking.lqr.rotation import normal_basis, rotation_basis
 from equalizer.tracking.lqr.toeplitz import least_squares_forces
 from equalizer.tracking.lqr.tracking_problem import TrackingProblem, TrackingWeights, make_tracking_problem
-from equalizer.tracking.lqr.turning import TurningTransient, turning_transient
 
 ORDER, SAMPLES = 26, 500
 NEEDED = {"stored gains": (10.0, 100.0), "rotation basis": (500.0, 5000.0)}

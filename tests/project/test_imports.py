@@ -88,7 +88,7 @@ OPTIONAL_ROOMS = (
     "analysis.diagnosis.contrast",  # only beside clean recordings
     "analysis.diagnosis.reference",
     "analysis.diagnosis.discovery",  # only where a model is given
-    "analysis.diagnosis.first_model.fitted_first",  # only without a given model
+    "analysis.diagnosis.first_model.fit_without_model",  # only without a given model
     "equalizer.identification.mechanical",
     "analysis.figures",  # only once the answer is there
     "analysis.reports",

@@ -1,12 +1,13 @@
 """Nonlinear laws of the actuator (dead band, saturation, curvature), found with the force balance inverted.
 
-A law of the command cannot be a column beside the commanded force, for the command would stand on both sides and take
-the noise of the motion on itself. Solved for the acceleration, the command is known exactly:
+A law of the command cannot be a column of a regression of the commanded force, because the command would then be on
+both sides and absorb the noise of the motion. In the balance solved for the acceleration, the command is a regressor
+without noise:
 
     a = g(u) / m - (c v + k x + sum of w phi) / m
 
-with the command's rate of change beside it, for a short lag. g(u) is tried in place of u, with the best sums of laws
-of the motion beside it, and is named where it takes most of what any of them leaves.
+with the command's rate of change beside it, for a short lag. g(u) is tried in place of u, together with the best sums
+of laws of the motion, and is named where it explains most of their residual.
 """
 
 from collections.abc import Sequence
@@ -48,7 +49,7 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 ROUNDS = 8
 NEEDLESS = "a law of the command leaves as little without it"
 CURVED = "quadratic_damping"
-"""The law of the motion that an actuator's curve looks like, where speeds settle."""
+"""Law of the motion that resembles an actuator's curve when the speed follows the command."""
 HOLDS_AT_REST = (*SLIDING, "presliding_hysteresis")
 
 
@@ -59,11 +60,12 @@ class Actuator:
     law: CommandLaw
     judged: JudgedLaw
     alone: bool
-    """Without laws of the motion, it leaves as little."""
+    """Whether its error is as small without laws of the motion."""
     instead: bool = False
-    """By itself it leaves less than the named laws of the motion."""
+    """Whether its error alone is smaller than that of the named laws of the motion."""
     suffices: bool = False
-    """By itself it leaves no more than the best sum of laws of the motion beside the command as it is."""
+    """Whether its error alone is no larger than that of the best sum of laws of the motion with the unchanged
+    command."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,7 @@ class DrivenAxis:
     number: int
     rotational: bool
     target: int | None = None
-    """Derivative of the position that the command is a target of; None = it is a force."""
+    """Order of the position's time derivative that the command sets (target of a servo); None = it is a force."""
 
 
 def find_balance(
@@ -81,7 +83,7 @@ def find_balance(
     time_left: TimeBudget,
     map_: Mapper = map,
 ) -> Balance:
-    """The balance of one axis: laws of the motion and, where one earns it, a law of the command, through which the
+    """The balance of one axis: laws of the motion and, where it is significant, a law of the command, through which the
     commanded force is then passed before the laws of the motion are searched again."""
     axis, rotational = driven.number, driven.rotational
     balance = judge_laws(search_beside_linear(motions, axis, rotational, without, time_left))
@@ -118,10 +120,10 @@ def _pass_through_law(motion: Motion, axis: int, own: int, law: CommandLaw) -> M
 
 
 def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str], map_: Mapper = map) -> Actuator | None:
-    """The law of the command that leaves the smallest error; None where the balance has no clock, no command varies,
-    no law of the command is allowed, or none can take enough."""
+    """The law of the command with the smallest error; None where the balance has no time axis, no command varies, no
+    law of the command is allowed, or none can explain enough."""
     search, target = balance.search, driven.target
-    # Only what follows a target tells a limited rate: of a force, hardening springs and friction look like it.
+    # A limited rate is tried for servo targets only: for forces, hardening springs and friction resemble it.
     barred = without if target is not None else without | {"slew_limit"}
     kinds = _kinds_of_laws(search.regression, driven.rotational, barred)
     if not np.isfinite(search.regression.motions[0].band_hz) or not kinds:
@@ -132,7 +134,7 @@ def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str],
     instead = _in_place_of_motion(turned, kinds, tuple(each.place for each in balance.named))
     if instead is not None:
         return instead
-    # Laws of the position would give it back where the balance is solved for it.
+    # Laws of the position are left out where the balance is solved for it: they would reproduce it.
     sums = _sums_to_try(search) if target is None else [()]
     plain, beside = min((turned.total_error(AS_COMMANDED, each), each) for each in sums)
     laws = _worth_trying(turned, kinds, (1 - FURTHER_LAW_OF_ALL / 2) * plain, beside)
@@ -149,11 +151,12 @@ def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str],
 
 
 Kinds = Sequence[tuple[AnyCommandLaw | None, Sequence[CommandLaw]]]
-"""Laws of the command of one kind, and a sum that comes near to each of them; None = there is no such sum."""
+"""Laws of the command of one kind, and a sum of functions that approximates each of them; None = there is none."""
 
 
 def _kinds_of_laws(regression: Regression, rotational: bool, without: frozenset[str]) -> Kinds:
-    """Pulls of coils only where the position of a translation was measured; empty where no command varies."""
+    """Kinds of laws to try. Those of coils need the measured position of a translation. Empty where no command
+    varies."""
     motions, own = regression.motions, regression.beside.own
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
     if not np.any(command):
@@ -171,17 +174,17 @@ def _kinds_of_laws(regression: Regression, rotational: bool, without: frozenset[
 
 
 def _worth_trying(turned: InverseBalance, kinds: Kinds, most: float, beside: tuple[int, ...]) -> list[CommandLaw]:
-    """Laws of those kinds of which a sum that comes near to any leaves no more than `most`, on the samples that it is
-    fitted to: others need not be tried one by one."""
+    """Laws of those kinds whose approximating sum has an error of at most `most` on the samples that it is fitted to:
+    the laws of other kinds need not be tried one by one."""
     return [law for near, laws in kinds if near is None or turned.least_error(near, beside) <= most for law in laws]
 
 
 def _in_place_of_motion(turned: InverseBalance, kinds: Kinds, named: tuple[int, ...]) -> Actuator | None:
-    """A law of the command that by itself takes most of what the named laws of the motion leave, or leaves less than
-    several of them: they took its part, as a drag does that of an actuator whose gain falls."""
+    """Whether a law of the command alone explains most of the residual of the named laws of the motion, or has a
+    smaller error than several of them: they had compensated for it, as a drag does for an actuator whose gain falls."""
     if not named:
         return None
-    # Half of what is asked for below, for the sums are not those laws themselves.
+    # Half of the gain required below, because the sums only approximate the laws.
     share = 1 - COMMAND_LAW_LEAVES / 2 if len(named) == 1 else 1 / (1 - COMMAND_RIVAL_LEAVES_MORE)
     most = share * turned.total_error(AS_COMMANDED, named)
     laws = _worth_trying(turned, kinds, most, ())
@@ -203,7 +206,7 @@ def _scaled_to_command(law: CommandLaw, regression: Regression) -> CommandLaw:
 
 
 def _sums_to_try(search: StructureSearch) -> list[tuple[int, ...]]:
-    """No law that is linear in the motion: such a filter of the acceleration would give it back."""
+    """Laws that are linear in the motion are left out: filters of the acceleration would reproduce it."""
     laws = search.regression.laws
     plain = [each.laws for each in search.ranked if each.laws and not any(laws[k].linear for k in each.laws)]
     return [(), *plain[:SUMS_BESIDE_COMMAND_LAW]]
@@ -229,7 +232,7 @@ def _best_of_each(
 def _refined_values(
     turned: InverseBalance, beside: tuple[int, ...], found: tuple[float, CommandLaw]
 ) -> tuple[float, dict[str, float]]:
-    """Error and numbers of a law after moving each number for as long as that helps."""
+    """Error and parameters of a law after a coordinate search over its parameters."""
     error, law = found
     for _ in range(ROUNDS):
         tried = [(turned.total_error(other, beside), other) for other in neighbours_of(law)]
@@ -245,7 +248,7 @@ def _judge_law(
     rivals: Sequence[CommandLaw],
     sums: tuple[tuple[int, ...], tuple[int, ...]],
 ) -> JudgedLaw:
-    """sums: laws of the motion beside the command as it is, and beside what the law makes of it."""
+    """sums: laws of the motion beside the unchanged command, and beside the command after the law."""
     plain, beside = sums
     without, held = turned.errors(AS_COMMANDED, plain, True), turned.errors(law, beside, True)
     linear = float(turned.errors(AS_COMMANDED, (), True).sum())
@@ -264,12 +267,12 @@ def _judge_law(
 
 
 def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -> str:
-    """A sentence; empty where it is to be named."""
+    """Reason not to name the law, as a sentence; empty where it is to be named."""
     if gain < COMMAND_LAW_LEAVES or low <= 0:
         return (
             f"in the command's place it takes {100 * max(gain, 0.0):.0f} % of what laws of the motion leave, not most"
         )
-    # A curve of the command and a pull that changes with the distance are different physics.
+    # A curve of the command and a force that changes with the distance are different physics.
     strange = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.pull is not None]
     if strange or len(alike) >= LARGEST_CLASS:
         return f"these data cannot tell it from {', '.join(alike)}"

@@ -1,9 +1,9 @@
-"""Laws of a driven motion that its actuator might have as well, where the motion cannot tell.
+"""Laws of a driven motion that cannot be distinguished from laws of its actuator.
 
-Without reversal, friction is a constant that the motion overcomes from rest: a dead band looks the same, and a drag
-beside it may be the curve of that actuator. Where no inertia shows, speed follows the command at once: then a drag that
-grows with the speed is a gain that falls with the command, and a dead band is dry friction. Where an axis rests as
-long as its dead band passes no force, dry friction may hold it instead: the two are named as a class.
+Without reversal, friction is a constant force that must be overcome from rest: a dead band has the same effect, and a
+drag beside it may be the curve of that actuator. Where inertia is negligible, speed follows the command: a drag that
+grows with the speed is then equivalent to a gain that falls with the command, and a dead band to dry friction. Where an
+axis rests as long as its dead band passes no force, dry friction may hold it instead: the two are named as a class.
 """
 
 from dataclasses import replace
@@ -22,8 +22,8 @@ BACKWARDS = "it never moves backwards"
 
 
 def doubt_laws_of_actuator(balance: Balance) -> Balance:
-    """The balance of a driven axis, with the laws not named that its actuator might have as well. Without a
-    law of the command, what was found behind it is not named either."""
+    """The balance of a driven axis, with the names removed from laws that may as well be its actuator's. Without a law
+    of the command, laws found behind it are not named either."""
     laws = tuple(_doubt_law(each, balance) for each in balance.laws)
     through = [each.law.effect for each in balance.named if each.place == NO_COLUMN]
     if through and not any(each.named and each.place == NO_COLUMN for each in laws):
@@ -64,14 +64,14 @@ def _doubted(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
 
 
 def _reverses(regression: Regression, channel: int) -> bool:
-    """Whether the motion goes both ways by more than what counts as standing still."""
+    """Whether the motion goes both ways beyond the threshold for standstill."""
     speed = np.concatenate([motion.velocity[motion.fit, channel] for motion in regression.motions])
     ways = [float(np.sum(np.maximum(way * speed, 0.0) ** 2)) for way in (1.0, -1.0)]
     return min(ways) > STILL_SHARE * max(ways)
 
 
 def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
-    """Whether a mass takes a notable share of the cross-validated error, and delays the speed by more than a sample."""
+    """Whether a mass reduces the cross-validated error notably, and delays the speed by more than a sample."""
     columns, own = regression.columns_of(laws), regression.beside.own
     if regression.mass is not None or not np.isfinite(regression.motions[0].band_hz):
         return True
@@ -79,5 +79,5 @@ def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
     without, held = (Structure(laws, regression.cross_validated_errors(each)) for each in (rest, columns))
     weights = regression.weights(columns)
     mass, damping = (float(weights[columns.index(k)]) for k in (own, len(regression.motions[0].channels) + own))
-    # Within a sample, a time constant is that of the held command.
+    # A shorter time constant cannot be distinguished from the hold of the command.
     return mass * regression.motions[0].rate_hz > max(damping, 0.0) and is_better(without, held)

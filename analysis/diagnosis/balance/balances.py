@@ -22,8 +22,8 @@ def find_balances(
     recordings: Sequence[Recording], without: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> tuple[Balance, ...]:
     """One force balance per command; empty where no motion was measured, or too little of it. Where no law is named in
-    the band that noise allows, the narrower band in which the device moves is tried: edges of the command above it
-    hide laws."""
+    the band that noise allows, the narrower band in which the device moves is tried: content of the command above it
+    hides laws."""
     try:
         records = observed_parts(recordings, len(recordings[0].response.channels))
         motions = motions_of(records)
@@ -38,7 +38,7 @@ def find_balances(
 
 
 Select = Callable[[Sequence[Observed], Sequence[Motion]], Sequence[Motion]]
-"""What another look is taken at; empty where that is hardly anything else."""
+"""A further selection of band or samples; empty where it differs little from the first."""
 
 
 def look_again(
@@ -49,7 +49,7 @@ def look_again(
     time_left: TimeBudget,
     map_: Mapper,
 ) -> tuple[Balance, ...]:
-    """The balances of what is selected; empty where no law is named."""
+    """The balances of a selection; empty where no law is named."""
     try:
         kept = select(records, motions)
         recordings = [each.recording for each in records]
@@ -66,8 +66,8 @@ def motions_in_own_band(records: Sequence[Observed], motions: Sequence[Motion]) 
 
 
 def samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
-    """The samples in which the device moves; empty where it moves most of the time. At rest a friction holds any force
-    that is asked of it: no law foretells that, and what is linear takes its place."""
+    """Masks of the samples in which the device moves; empty where it moves most of the time. At rest, friction balances
+    any force: no law predicts it, and linear terms would replace it."""
     moving = [_moves(motion, motions) for motion in motions]
     if np.mean(np.concatenate(moving)) > MOVES_MOST_OF_THE_TIME:
         return ()
@@ -78,7 +78,7 @@ def samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) ->
 
 
 def _moves(motion: Motion, motions: Sequence[Motion]) -> Mask:
-    """(n,): where any channel is faster than what counts as standing still."""
+    """(n,): whether any channel is faster than the threshold for standstill."""
     squares = np.concatenate([each.velocity[each.fit] ** 2 for each in motions]).mean(axis=0)
     return np.asarray((motion.velocity**2 > STILL_SHARE * squares).any(axis=1))
 

@@ -1,4 +1,4 @@
-"""The band in which a measured motion tells accelerations and positions, by its own white noise."""
+"""The band in which accelerations and positions can be computed from a measured motion, given its white noise."""
 
 from collections.abc import Sequence
 

@@ -11,7 +11,7 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 RIDGE = 1e-10
-"""Ridge over the mean power of a column, against columns that are equal, or mere rounding errors in some blocks."""
+"""Ridge relative to the mean power of a column, for columns that are equal, or rounding errors, in some blocks."""
 
 
 Prior = tuple[FloatArray, FloatArray] | None
@@ -20,7 +20,7 @@ Prior = tuple[FloatArray, FloatArray] | None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """A stretch of consecutive samples by its products: of columns with themselves and with the force."""
+    """A block of consecutive samples as products: of the columns with each other and with the force."""
 
     gram: FloatArray
     """(k, k)"""
@@ -32,7 +32,7 @@ class Block:
     """Sum of squares of the force about its mean over all fitted samples."""
     motion: int
     rows: npt.NDArray[np.intp]
-    """Numbers of its samples among the motion's kept ones."""
+    """Indices of its samples among the motion's kept ones."""
 
 
 def column_scale(rows: Sequence[FloatArray], fit: Sequence[Mask]) -> FloatArray:

@@ -17,42 +17,41 @@ from equalizer.effects.slew_limit import limit_slew
 from equalizer.signals.signal import FloatArray
 
 DEAD, FULL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
-"""Shares of the samples that are commanded less: where a dead band ends, and where an actuator gives no more."""
+"""Quantiles of the command's size at which a dead band ends, and at which an actuator saturates."""
 STARTS = (0.05, 0.1, 0.2, 0.3)
-"""The same where a curve begins."""
+"""Quantiles of the command's size at which a curve begins."""
 POWERS = (0.3, 0.5, 0.7, 1.4, 2.0)
-"""Of the command beyond there: valves and magnets that saturate, propellers."""
+"""Exponents of the command beyond that point: valves and magnets that saturate, propellers."""
 SQUARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
 """Shares of the force at the largest command that grow with the square of the command."""
 GAPS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
-"""Smallest distance of a magnet from its armature, over the travel: beyond, its pull falls by less than half over the
-travel. One held by a spring stays within a third of the gap, which is 2 here."""
+"""Smallest distance of a magnet from its armature, relative to the travel: beyond it, its force falls by less than half
+over the travel. A magnet held by a spring stays within a third of the gap, which is 2 here."""
 CLOSER = (0.95, 0.98, 1.02, 1.05)
-"""Factors by which a number is moved, as long as that helps."""
+"""Factors on a parameter in a coordinate search."""
 MOVED = ("width", "limit", "square", "gap", "power", "rate")
 RATES = 20
-"""Of a slew limit, that are tried."""
+"""Number of slew limits that are tried."""
 BENDS = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
-"""Shares of the samples below a place where a piecewise linear function bends; of the command's size, a curve jumps
-there, too."""
+"""Quantiles at which a piecewise linear function has its nodes; at those of the command's size it may jump, too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommandLaw:
     effect: str
-    """A name of the vocabulary, or one written like them for physics that it lacks."""
+    """Name of the vocabulary, or a new one in the same style for physics that it lacks."""
     values: dict[str, float]
     columns: Callable[[FloatArray, dict[str, float]], FloatArray]
-    """Columns (n, weights) of a command (n,): their weighted sum is the force; a single column is the force but for a
+    """Columns (n, weights) of a command (n,): their weighted sum is the force; a single column is the force up to a
     gain."""
     pull: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
     """(n,): factor of the force at each position; None = it is the same everywhere."""
     rich: bool = False
-    """It fits more than the plain laws do, and counts only where it leaves clearly less than these."""
+    """Whether it has more freedom than the plain laws, and counts only with a clearly smaller error."""
     scale: float = 1.0
-    """Of a single column: what makes it a force."""
+    """Of a single column: scale that makes it a force."""
     formula: Callable[[dict[str, float], float], Formula] | None = None
-    """Of values and scale: what a simulation plays in the command's place, where no catalogue effect does."""
+    """From values and scale: formula that a simulation uses for the command, where the catalogue has no such effect."""
 
     @property
     def sloped(self) -> int:
@@ -99,9 +98,9 @@ def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
 
 
 def slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[CommandLaw]:
-    """The command followed at a limited rate, as a positioning servo follows its target. commands: (n,) each; rates
-    from the full stroke in the longest of them to the fastest change, but those at which it is hardly ever reached:
-    what never catches up goes by the command's sign alone."""
+    """A command followed at a limited rate, as by a positioning servo. commands: (n,) each; rates from the full stroke
+    in the longest of them to the fastest change, without rates that are hardly ever reached, and without those so low
+    that only the command's sign matters."""
     fastest = max(float(np.abs(np.diff(each)).max(initial=0.0)) for each in commands) * rate_hz
     slowest = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(each) for each in commands)
     for rate in np.geomspace(slowest, fastest, RATES)[:-1] if 0 < slowest < fastest else ():
@@ -117,8 +116,8 @@ def _slewed_force(step_s: float, command: FloatArray, of: dict[str, float]) -> F
 
 
 def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:
-    """An electromagnet: force as the square of the current over that of the distance; beside a permanent magnet, as
-    the current itself. position: (n,), where the magnet may be beyond either end."""
+    """An electromagnet: force proportional to the square of the current over that of the distance; with a permanent
+    magnet, to the current. position: (n,); the magnet may be beyond either end."""
     low, high = float(position.min()), float(position.max())
     for side, end in ((1.0, low), (-1.0, high)):
         for gap in GAPS:
@@ -173,8 +172,8 @@ def _deadband_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnyCommandLaw:
-    """A sum of simple functions that comes near to any law of a kind: where it does no better than the command itself,
-    none of them need be tried."""
+    """A sum of simple functions that approximates any law of a kind: where it is no better than the command itself,
+    none of the laws need be tried."""
 
     columns: Callable[[FloatArray, FloatArray], FloatArray]
     """(n, k) of command and position (n,) each; the command itself first."""
@@ -186,7 +185,8 @@ class AnyCommandLaw:
 
 
 def any_curve(command: FloatArray) -> AnyCommandLaw:
-    """A piecewise linear function of the command with jumps, each side by itself. command: (n,), which it spans."""
+    """A piecewise linear function of the command with jumps, separate for each sign. command: (n,), whose range the
+    nodes span."""
     bends = np.unique(np.quantile(np.abs(command), BENDS))
 
     def columns(u: FloatArray, position: FloatArray) -> FloatArray:
@@ -199,8 +199,8 @@ def any_curve(command: FloatArray) -> AnyCommandLaw:
 
 
 def any_pull(position: FloatArray) -> AnyCommandLaw:
-    """The command, and its square, each with a gain that is piecewise linear in the position. position: (n,), which it
-    spans."""
+    """The command and its square, each with a gain that is piecewise linear in the position. position: (n,), whose
+    range the nodes span."""
     bends = np.unique(np.quantile(position, BENDS))
 
     def columns(u: FloatArray, x: FloatArray) -> FloatArray:

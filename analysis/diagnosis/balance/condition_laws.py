@@ -16,12 +16,13 @@ from equalizer.signals.signal import FloatArray
 
 
 def condition_laws(motions: Sequence[Motion], c: int, of: Scales) -> Iterator[Law]:
+    """Laws of one axis for every recorded condition. c: index of the axis, of: its ranges of motion."""
     for k, known in enumerate(motions[0].conditions):
         yield from _laws_of_condition(known, k, c, of)
 
 
 def _laws_of_condition(known: Condition, k: int, c: int, of: Scales) -> Iterator[Law]:
-    """k: its column."""
+    """Laws of one condition. k: its column in `Motion.condition`, c: index of the axis."""
     sharp, spans = friction_widths(of)
     for width in sharp:
         yield Law(
@@ -56,7 +57,7 @@ def _friction_values(w: FloatArray, n: tuple[float, ...], mass: float) -> dict[s
 
 
 def _friction_formula(known: Condition) -> Callable[[dict[str, float]], Formula]:
-    # A friction below zero would push.
+    # Negative friction would drive the motion.
     text = f"-maximum(p0 + p1*{_deviation(known)}, 0)*sign(v)"
     return lambda of: Formula(text, (of["level"], of["change"]), "force")
 
@@ -67,8 +68,9 @@ def _formula(known: Condition, *factors: str) -> Callable[[dict[str, float]], Fo
 
 
 def _deviation(known: Condition) -> str:
-    """Of the condition from its mean, in standard deviations, all in whole numbers: these belong to a formula's form,
-    and no fit moves them. The standard deviation keeps four digits or more, the mean a thousandth of it."""
+    """Formula of a condition's deviation from its mean, in standard deviations, with whole numbers: these are part of a
+    formula's form, and no fit changes them. The standard deviation is rounded to four digits or more, the mean to a
+    thousandth of it."""
     finer = 10 ** max(0, min(3 - math.floor(math.log10(known.spread)), 15 - _digits(known.mean)))
     mean, spread = round(known.mean * finer), max(round(known.spread * finer), 1)
     scaled = known.name if finer == 1 else f"{finer}*{known.name}"
@@ -76,5 +78,5 @@ def _deviation(known: Condition) -> str:
 
 
 def _digits(value: float) -> int:
-    """Before the point."""
+    """Number of digits before the decimal point."""
     return max(math.floor(math.log10(abs(value))) + 1, 1) if value else 1

@@ -21,11 +21,11 @@ from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 SHARP = RESTS
-"""Width of the smoothed sign of a dry friction, over the rms speed, where nothing shows a wider one."""
+"""Width of the smoothed sign of dry friction, relative to the rms speed, unless the data show a wider one."""
 
 
 def friction_widths(of: Scales) -> tuple[FloatArray, tuple[tuple[float, float]]]:
-    """Widths of the smoothed sign of a dry friction, m/s, and between which they may be refined."""
+    """Widths of the smoothed sign of dry friction, m/s, and the bounds of their refinement."""
     sharp = SHARP * of.speed
     return sharp * np.geomspace(1.0, 50.0, 7), ((0.1 * sharp, 0.5 * of.speed),)
 
@@ -95,7 +95,7 @@ def _drifting_columns(c: int, sharp: float) -> Columns:
 
 
 def _drifting_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
-    """None where the friction would change its sign within the part: it would push."""
+    """None where the friction would be negative somewhere in the part: it would drive the motion."""
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > abs(w[1]) else None
 
 
@@ -114,7 +114,7 @@ def _position_dependent_values(w: FloatArray, n: Numbers, mass: float) -> dict[s
 
 
 def damping_laws(c: int, of: Scales) -> Iterator[Law]:
-    """Laws of the speed. Without a clock there are none, for no speed is known."""
+    """Laws of the speed; none without a time axis, because the speed is then unknown."""
     if not np.isfinite(of.band_hz):
         return
     yield Law(

@@ -1,4 +1,4 @@
-"""The force balance solved for the acceleration: how well a law of the command does in the command's place."""
+"""The force balance solved for the acceleration: errors with a law of the command in place of the command."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,11 +26,11 @@ from equalizer.signals.signal import FloatArray
 
 
 class ForceOfCommand(Protocol):
-    """One law of the command, or a sum of functions that comes near to any."""
+    """A law of the command, or a sum of functions that approximates a kind of laws."""
 
     @property
     def sloped(self) -> int:
-        """How many of its first columns have their rate of change beside them, for a short lag."""
+        """Number of its first columns that have their rate of change beside them, for a short lag."""
 
     def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
         """(n, weights), of command and position (n,) each: the force is their weighted sum."""
@@ -38,40 +38,40 @@ class ForceOfCommand(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InverseBalance:
-    """A balance solved for the acceleration along its axis, or for what its command is a target of."""
+    """A balance solved for the acceleration along its axis, or for the quantity that the command sets."""
 
     search: StructureSearch
     map_: Mapper
     rubs: bool
-    """Whether a friction is among the laws of the motion: rest is no evidence then, for friction holds any force up to
-    its level there, and a dead band gives none."""
+    """Whether friction is among the laws of the motion: samples at rest are then no evidence, because friction balances
+    any force up to its level, and a dead band gives none."""
     target: int | None = None
-    """Derivative of the position that the command is a target of; None = it is a force."""
+    """Order of the position's time derivative that the command sets; None = it is a force."""
 
     @property
     def solved(self) -> int:
-        """Column of what the balance is solved for: what the command is a target of, else the acceleration."""
+        """Column that the balance is solved for: the quantity that the command sets, else the acceleration."""
         regression = self.search.regression
         own, places = regression.beside.own, len(regression.motions[0].channels)
         column = own if self.target is None else (2 - self.target) * places + own
         return column if column < regression.matrices else own
 
     def total_errors(self, laws: Sequence[CommandLaw], beside: Sequence[int]) -> list[float]:
-        """Of each law: its cross-validated sum of squares."""
+        """Cross-validated sum of squares of each law."""
         return cast(list[float], list(self.map_(partial(self.total_error, beside=beside), laws)))
 
     def total_error(self, law: CommandLaw, beside: Sequence[int]) -> float:
         return float(self.errors(law, beside, False).sum())
 
     def least_error(self, law: ForceOfCommand, beside: Sequence[int]) -> float:
-        """Sum of squares on the samples that were fitted to: a lower bound for each law that this one comes near to."""
+        """Sum of squares on the fitted samples: a lower bound for each law that this sum approximates."""
         fit, _ = self._blocks(self._rows(law, beside), False)
         products = [block_products(block, range(len(fit[0].pull))) for block in fit]
         weights = solve_normal_equations(summed_products(fit, range(len(fit[0].pull))), RIDGE)
         return sum(squared_error(own, weights, block.power) for own, block in zip(products, fit, strict=True))
 
     def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
-        """(blocks,): sums of squares. judged: on what nothing was fitted to; else each fold's."""
+        """(blocks,): sums of squares. judged: on the held-out blocks; else on each fold."""
         tested = judged and blocks_to_judge(self.search.regression) is self.search.regression.test
         fit, test = self._blocks(self._rows(law, laws), tested)
         columns = list(range(len(fit[0].pull)))
@@ -88,7 +88,7 @@ class InverseBalance:
         return np.array(found)
 
     def _blocks(self, rows: Sequence[FloatArray], tested: bool) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
-        """To fit to, and, where they are asked for, to test by."""
+        """Blocks to fit and, where requested, to test by."""
         regression = self.search.regression
         motions, solved = regression.motions, self.solved
         aims = [columns[:, solved] for columns in regression.columns]
@@ -111,7 +111,7 @@ class InverseBalance:
 
     def _rows(self, law: ForceOfCommand, laws: Sequence[int]) -> list[FloatArray]:
         regression, found = self.search.regression, []
-        # Filters of what it is solved for would give it back.
+        # Filters of the quantity that it is solved for would reproduce it.
         filters = {self.solved, *range(regression.matrices, regression.base - 1)}
         beside = [column for column in regression.columns_of(laws) if column not in filters]
         for motion, columns in zip(regression.motions, regression.columns, strict=True):

@@ -1,9 +1,9 @@
-"""Decides which laws of a force balance are named, by how much of the held-out error each takes.
+"""Decides which laws of a force balance are named, by their gain on held-out data.
 
-No real device is within its sensors' noise of any model, so that nothing is asked of a remainder in units of noise. A
+No model of a real device reaches the sensors' noise, so that residuals are not judged in units of noise. A
 law is judged by its gain on held-out blocks against the same sum of laws without it, with an interval from resampled
-blocks (Kunsch, Ann. Stat. 17:1217, 1989), against the best rival in its place, and by the share that it takes of what
-all laws together could (a ceiling). Laws that cannot be told apart on these blocks are returned as a class.
+blocks (Kunsch, Ann. Stat. 17:1217, 1989), against the best rival in its place, and by its share of the gain of all laws
+together (a ceiling). Laws that cannot be distinguished on these blocks are returned as a class.
 """
 
 from collections.abc import Sequence
@@ -21,8 +21,8 @@ from analysis.diagnosis.balance.judged_law import (
     special_cases,
 )
 from analysis.diagnosis.balance.law import Law
-from analysis.diagnosis.balance.plainest_structure import numbers_of, plainest_structure
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
+from analysis.diagnosis.balance.simplest_structure import numbers_of, simplest_structure
 from analysis.diagnosis.balance.structures import Structure, StructureSearch, values_of
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
@@ -51,25 +51,25 @@ FAMILIES = (
     DRY_FRICTIONS | {"quadratic_damping"},
     {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
 )  # fmt: skip
-"""Effects that may stand in one class: they act alike. Of different families, none is named."""
+"""Effects that may form a class, because they act alike. Of different families, nothing is named."""
 BY_CONDITION = {"condition_dependent_friction", "condition_dependent_damping"}
-"""Laws of one condition that may stand in one class, though other friction acts otherwise."""
+"""Laws of one condition that may form a class, although other friction acts differently."""
 PLAYED_AS = {"drifting_friction": "coulomb_friction"}
 """Laws that have no simulation, and the law that is fitted in their place and forms a class with them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Balance:
-    """What a recording's forces say of one axis."""
+    """Result of the force balance of one axis."""
 
     search: StructureSearch
     chosen: Structure
     laws: tuple[JudgedLaw, ...]
     """Laws of the chosen structure, the largest gain first."""
     others: tuple[JudgedLaw, ...]
-    """Further laws that would take some of what the chosen structure leaves."""
+    """Further laws that would explain part of the residual of the chosen structure."""
     linear: float
-    """Held-out error of mass, damping and stiffness alone, over the signal's rms."""
+    """Held-out error of mass, damping and stiffness alone, relative to the signal's rms."""
     error: float
     """The same of the chosen structure."""
     ceiling: float
@@ -87,7 +87,7 @@ class Balance:
         return replace(self, laws=tuple(replace(each, why_not=each.why_not or why_not) for each in self.laws))
 
     def error_of(self, laws: Sequence[int]) -> float:
-        """Held-out error with these laws, over the signal's rms. laws: by number in the regression."""
+        """Held-out error with these laws, relative to the signal's rms. laws: by number in the regression."""
         regression = self.search.regression
         return float(np.sqrt(_held_out_errors(regression, laws).sum() / _signal_power(regression)))
 
@@ -97,13 +97,13 @@ def judge_laws(search: StructureSearch) -> Balance:
     if not blocks_to_judge(regression):
         alone = float(np.sqrt(search.linear.error / _signal_power(regression)))
         return Balance(search, search.linear, (), (), alone, alone, alone, search.complete, tested=False)
-    judged = _judge_structure(search, plainest_structure(search))
+    judged = _judge_structure(search, simplest_structure(search))
     if judged.named or not _shares_friction(regression, judged.chosen.laws):
         return judged
-    # Two frictions share what either could take alone, so that neither seems needed beside the other.
+    # Two frictions share the error that either could explain alone, so that neither would seem necessary.
     apart = tuple(each for each in search.ranked if not _shares_friction(regression, each.laws))
     best = min(apart, key=lambda each: each.error, default=search.linear)
-    single = _judge_structure(search, plainest_structure(replace(search, ranked=apart, best=best)))
+    single = _judge_structure(search, simplest_structure(replace(search, ranked=apart, best=best)))
     return single if single.named else judged
 
 
@@ -129,8 +129,8 @@ def _judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
 
 
 def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
-    """laws: the largest gain first. A second law of a family needs most of what is left to be named: one that acts like
-    the first may only correct its shape."""
+    """laws: the largest gain first. A second law of a family must explain most of the residual to be named: if it acts
+    like the first, it may only correct its shape."""
     found: list[JudgedLaw] = []
     for law in laws:
         mates = [other for other in found if other.named and family_of(other.law.effect) & {law.law.effect}]
@@ -144,7 +144,7 @@ def family_of(effect: str) -> set[str]:
 
 def blocks_to_judge(regression: Regression) -> tuple[Block, ...]:
     """The blocks that laws are judged by: the held-out ones where the device moves in them; else the fit blocks, by
-    cross-validation, where several of them move; else none, for a single move tests nothing."""
+    cross-validation, where it moves in several; else none, because a single move cannot test a law."""
     if len(regression.test) >= LEAST_JUDGED_BLOCKS and held_out_moves(regression):
         return regression.test
     fit = _speeds(regression, regression.fit)
@@ -159,7 +159,7 @@ def held_out_moves(regression: Regression) -> bool:
 
 
 def _speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
-    """(blocks,): mean square of the driven motion's speed, over its scale's."""
+    """(blocks,): mean square speed of the driven motion, relative to its scale."""
     speed = len(regression.motions[0].channels) + regression.beside.own
     return np.array([block.gram[speed, speed] / max(len(block.rows), 1) for block in blocks])
 
@@ -211,7 +211,7 @@ def _judge_law(
 
 
 def _errors_of_folds(regression: Regression, sums: Sequence[Sequence[int]]) -> list[FloatArray]:
-    """Errors of each sum of laws in the folds, (blocks,); empty where the folds are what is judged by."""
+    """Errors of each sum of laws on the folds, (blocks,); empty where laws are judged by the folds themselves."""
     if blocks_to_judge(regression) is not regression.test:
         return [np.zeros(0) for _ in sums]
     return [regression.cross_validated_errors(regression.columns_of(each)) for each in sums]
@@ -220,7 +220,7 @@ def _errors_of_folds(regression: Regression, sums: Sequence[Sequence[int]]) -> l
 def _indistinguishable_effects(
     regression: Regression, rest: tuple[int, ...], number: int, errors: tuple[FloatArray, FloatArray]
 ) -> tuple[tuple[str, ...], float]:
-    """Effects that fit hardly worse in a law's place, and the share of bootstrap draws in which none fits better."""
+    """Effects with a similar error in a law's place, and the share of bootstrap draws in which none is better."""
     without, held = errors
     own = regression.laws[number]
     found: dict[str, tuple[float, tuple[int, ...]]] = {}
@@ -240,7 +240,7 @@ def _indistinguishable_effects(
         behind = _held_out_errors(regression, laws) - held
         if own.effect not in special_cases(effect):
             first &= behind[drawn].sum(axis=1) >= 0
-        # Of two that do as well, the plainer: what acts otherwise and has more numbers must leave less.
+        # Of two equally good laws, the plainer: a law of another kind with more parameters must have a smaller error.
         more = numbers_of(regression, laws[-1:]) > numbers_of(regression, [number])
         most = 0.0 if more and effect not in family_of(own.effect) else RIVAL_STAYS_BEHIND * gained
         if float(behind.sum()) <= most:
@@ -251,7 +251,7 @@ def _indistinguishable_effects(
 def _why_not(
     law: Law, values: dict[str, float] | None, numbers: tuple[float, float, float, float], alike: tuple[str, ...]
 ) -> str:
-    """A sentence; empty where it is to be named."""
+    """Reason not to name the law, as a sentence; empty where it is to be named."""
     gain, low, share, explained = numbers
     if law.linear:
         return "a linear model of a higher order: part of the first model, no missing physics"

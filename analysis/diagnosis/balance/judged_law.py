@@ -14,38 +14,38 @@ from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
 NO_COLUMN = -1
-"""Place in a regression of a law that changes the force itself."""
+"""Index in a regression of a law that changes the force itself."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedLaw:
-    """One law, its parameters, its gain, and why it is not named."""
+    """A law with its parameters, its gain, and the reason where it is not named."""
 
     place: int
     """Its number in the regression."""
     law: Law
     values: dict[str, float]
     gain: float
-    """Share of the held-out error power that it takes, beside the other laws."""
+    """Share of the held-out error power that it explains beside the other laws."""
     gain_low: float
     """Lower confidence bound of the gain, at 97.5 %."""
     share: float
-    """Share of the error that all laws together take which this law takes."""
+    """Its share of the gain of all laws together."""
     alike: tuple[str, ...]
-    """Effects that fit as well in its place."""
+    """Effects that fit as well in its place (class)."""
     probability: float
-    """Share of resampled blocks in which none of them leaves less."""
+    """Share of bootstrap draws in which none of them has a smaller error."""
     why_not: str
-    """Empty where it is to be named."""
+    """Reason not to name it; empty where it is to be named."""
     stands_for: str = ""
     """The law that was chosen, where it has no simulation and this one is fitted in its place."""
 
     formula: Formula | None = None
-    """Of a law that no catalogue effect plays."""
+    """Formula of a law that no catalogue effect simulates."""
     possible: bool = True
-    """Its numbers have signs and sizes that such physics can have."""
+    """Whether its parameters have physically possible signs and sizes."""
     agreed: bool = False
-    """Over the held-out blocks and the folds that it was chosen by, its gain exceeds what varies between them."""
+    """Whether its gain, over the held-out blocks and the folds that it was chosen by, is significant."""
 
     @property
     def played_as(self) -> str:
@@ -65,8 +65,8 @@ def gain_with_bound(without: FloatArray, with_it: FloatArray) -> tuple[float, fl
 
 
 def agrees_with_folds(held: Sequence[FloatArray], folds: Sequence[FloatArray]) -> bool:
-    """Whether a law gains over the held-out blocks, and over these and the folds together by more than what varies.
-    Each: errors without the law, and with it, (blocks,)."""
+    """Whether a law has a gain on the held-out blocks, and a significant one on these and the folds together. Each:
+    errors without the law, and with it, (blocks,)."""
     _, low = gain_with_bound(*(np.concatenate(each) for each in zip(held, folds, strict=True)))
     return low > 0 and gain_with_bound(*held)[0] > 0
 

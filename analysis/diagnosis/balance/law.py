@@ -1,4 +1,4 @@
-"""A term of a force balance: its columns along a measured motion, and the parameters that its weights stand for."""
+"""A term of a force balance: its columns along a measured motion, and the parameters that follow from its weights."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from analysis.diagnosis.balance.motion import Motion
 from equalizer.signals.signal import FloatArray
 
 Numbers = tuple[float, ...]
-"""Nonlinear numbers: speeds, pitches, time constants; in SI."""
+"""Nonlinear parameters: speeds, pitches, time constants; in SI units."""
 Columns = Callable[[Motion, Numbers], FloatArray]
 """(n, weights)"""
 Values = Callable[[FloatArray, Numbers, float], dict[str, float] | None]
@@ -21,10 +21,10 @@ not physical."""
 
 @dataclass(frozen=True, slots=True)
 class Formula:
-    """A law in the language of `equalizer.laws`; q, v and f are its own axis' position, velocity and command."""
+    """A law in the language of `equalizer.laws`; q, v and f are position, velocity and command of its axis."""
 
     text: str
-    """Its free numbers are p0, p1, …"""
+    """Formula with the free parameters p0, p1, …"""
     numbers: tuple[float, ...]
     acts_on: Literal["force", "command"] = "command"
 
@@ -32,18 +32,18 @@ class Formula:
 @dataclass(frozen=True, slots=True, eq=False)
 class Law:
     effect: str
-    """A name of the vocabulary, or one written like them for physics that it lacks."""
+    """Name of the vocabulary, or a new one in the same style for physics that it lacks."""
     channel: int
-    """Channel of the motion; -1 = none."""
+    """Channel of the motion that it depends on; -1 = none."""
     numbers: Numbers
     columns: Columns
     values: Values
     linear: bool = False
-    """Linear in the motion: a linear model of a higher order could take its place."""
+    """Whether it is linear in the motion: a linear model of a higher order could replace it."""
     bounded: tuple[tuple[float, float], ...] = ()
-    """Bounds of each nonlinear number."""
+    """Bounds of each nonlinear parameter."""
     formula: Callable[[dict[str, float]], Formula] | None = None
-    """Of its parameters: what simulations play where the catalogue holds no such effect."""
+    """From its parameters to the formula that simulations use where the catalogue has no such effect."""
 
     @property
     def key(self) -> tuple[str, int]:
@@ -52,14 +52,14 @@ class Law:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseTerms:
-    """What the base of one axis's balance holds beyond mass, damping and stiffness."""
+    """The base of one axis's balance beyond mass, damping and stiffness."""
 
     own: int
     """Channel of the motion that the force drives."""
     laws: tuple[Law, ...] = ()
-    """Linear in the motion."""
+    """Laws that are linear in the motion."""
     delay_s: float = 0.0
-    """Delay from the force to the motion; the motions' forces are shifted by it already."""
+    """Delay from the force to the motion; the motions' forces are already shifted by it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class Scales:
     seconds: float
     band_hz: float
     turns: bool
-    """A shaft that makes more than two turns: no position is special but within a turn."""
+    """Whether the shaft makes more than two turns: only the position within a turn matters."""
     rotational: bool
 
 
@@ -90,7 +90,7 @@ def scales_of(motions: Sequence[Motion], channel: int, rotational: bool) -> Scal
 
 
 def relative_time(motion: Motion) -> FloatArray:
-    """(n, 1): from -1 to 1 over the part."""
+    """(n, 1): rises linearly from -1 to 1 over the part."""
     return np.linspace(-1.0, 1.0, len(motion.force))[:, None]
 
 

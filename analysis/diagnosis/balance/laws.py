@@ -1,7 +1,7 @@
 """Terms that physics may add to the force balance of a moving axis, each over a grid of its nonlinear numbers.
 
 A law's force is linear in its weights: sum of weight times column, with columns from the measured motion. The grids
-span what a recording can tell (its speeds, its travel, its band), so that no starting value is needed.
+span the recording's speeds, travel and band, so that no starting values are needed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
         if np.isfinite(scales.band_hz):
             yield from dynamic_laws(channel, scales)
         if motions[0].conditions:
-            # Imported here: few recordings hold any.
+            # Imported here: few recordings have conditions.
             from analysis.diagnosis.balance.condition_laws import condition_laws
 
             yield from condition_laws(motions, channel, scales)
@@ -34,7 +34,7 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
 
 
 def _longest_pitch(of: Scales) -> float:
-    """Half the travel, or half a turn: once per turn is a weight off the axis, or an axis off its centre."""
+    """Half the travel, or half a turn: an unbalanced or eccentric shaft has a period of one turn."""
     return min(0.5 * of.travel, np.pi) if of.rotational else 0.5 * of.travel
 
 
@@ -46,7 +46,7 @@ def cogging_law(channel: int, pitch: float, of: Scales) -> Law:
         lambda m, n: np.hstack(
             [np.sin(2 * np.pi * m.position[:, [channel]] / n[0]), np.cos(2 * np.pi * m.position[:, [channel]] / n[0])]
         ),
-        # The catalogue's force pushes along the motion where the balance's pulls.
+        # Opposite signs: the catalogue's force drives the motion, that of the balance resists it.
         lambda w, n, mass: {
             "amplitude": float(np.hypot(*w)), "pitch": n[0], "phase": float(np.arctan2(-w[1], -w[0])),
         } if n[0] <= longest else None,
@@ -62,7 +62,7 @@ def likely_pitches(
     q = np.concatenate([each.position[:: each.step, channel][each.valid_samples(each.fit)] for each in motions])
     left = np.concatenate([r[each.valid_samples(each.fit)] for each, r in zip(motions, remainders, strict=True)])
     longest = _longest_pitch(of)
-    # Shorter ones pass faster than the band's end at the usual speed.
+    # Shorter pitches give frequencies above the band's end at the usual speed.
     shortest = max(of.speed / of.band_hz, longest / 400)
     if shortest >= longest or not len(left):
         return []

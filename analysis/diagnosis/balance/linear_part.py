@@ -1,8 +1,8 @@
-"""The linear part of a force balance, found together with the laws: which motion a force drives, how late the force
-is, and dynamics of a higher order.
+"""The linear part of a force balance, found together with the laws: which motion a force drives, how late the force is,
+and dynamics of a higher order.
 
-A lag, a delay, a mode or a relaxation is no missing physics but a part of the first model. Left out, it hides laws and
-poses as them; so the search is done again beside those that it found, until it finds no more.
+A lag, a delay, a mode or a relaxation is not missing physics but part of a linear first model. Without it, laws are
+hidden or imitated; so the search is repeated with the linear terms found, until there are no more.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,8 +13,8 @@ import numpy as np
 from analysis.diagnosis.balance.blocks import blocks_of
 from analysis.diagnosis.balance.law import BaseTerms
 from analysis.diagnosis.balance.motion import Motion, filter_spectrum
-from analysis.diagnosis.balance.plainest_structure import plainest_structure
 from analysis.diagnosis.balance.regression import Regression, keep_laws, regression_of
+from analysis.diagnosis.balance.simplest_structure import simplest_structure
 from analysis.diagnosis.balance.structures import (
     Structure,
     StructureSearch,
@@ -28,11 +28,11 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 LATER = 2.0 ** np.arange(-5, 2)
-"""Delays that are tried, over the period of the band's end: up to twice that, beyond which signals repeat."""
+"""Delays that are tried, in periods of the band's end: up to two, beyond which signals repeat."""
 FINER = 4
 """Halvings of the step around the best delay."""
 LATE = ("amplifier_lag", "transport_delay")
-"""Laws that describe a delay in other words."""
+"""Laws that are equivalent to a delay."""
 
 
 def search_beside_linear(
@@ -63,7 +63,7 @@ def driven_motion(motions: Sequence[Motion]) -> tuple[int, ...]:
     if places <= forces:
         return tuple(min(axis, places - 1) for axis in range(forces))
     missed = [_error_without_each(motions, axis, places) for axis in range(forces)]
-    # Imported where it is used: the package takes longer to import than a diagnosis that does without it.
+    # Imported here: the package takes longer to import than a diagnosis that does not need it.
     from scipy.optimize import linear_sum_assignment
 
     return tuple(linear_sum_assignment(missed, maximize=True)[1].tolist())
@@ -81,9 +81,9 @@ def _error_without_each(motions: Sequence[Motion], axis: int, places: int) -> li
 
 
 def _extend_base(found: StructureSearch, beside: BaseTerms) -> BaseTerms:
-    """The base with a delay and, where the plainest structure holds a linear law, with as many linear laws as
-    cross-validation asks for. The delay is sought before or after these laws, whichever leaves the smaller error."""
-    regression, plain = found.regression, plainest_structure(found).laws
+    """The base with a delay and, where the plainest structure has a linear law, with as many linear laws as
+    cross-validation supports. The delay is estimated before or after these laws, whichever gives the smaller error."""
+    regression, plain = found.regression, simplest_structure(found).laws
     bent = [k for k in plain if not regression.laws[k].linear]
     delay_s = 0.0 if beside.delay_s else _find_delay_s(keep_laws(regression, bent))
     if not delay_s and len(bent) == len(plain):
@@ -98,8 +98,8 @@ def _extend_base(found: StructureSearch, beside: BaseTerms) -> BaseTerms:
 def _complete_base(
     regression: Regression, beside: BaseTerms, bent: Sequence[int], delay_s: float
 ) -> tuple[BaseTerms, float]:
-    """The base with this delay and the linear laws that are then worth it (or, where the delay is zero, with the delay
-    that is worth it beside these), and its cross-validated error. bent: laws that are not linear."""
+    """The base with this delay and the linear laws that are then significant (or, where the delay is zero, with the
+    delay that is significant beside these), and its cross-validated error. bent: laws that are not linear."""
     held = tuple(law for law in beside.laws if not (delay_s and law.effect in LATE))
     others = [law for law in regression.laws if law.linear and not (delay_s and law.effect in LATE)]
     motions = [_delay_forces(each, delay_s) for each in regression.motions]
@@ -118,7 +118,7 @@ def _complete_base(
 
 
 def _add_linear_law(room: Regression, chosen: Structure) -> tuple[Regression, Structure] | None:
-    """One more linear law, the one that leaves the least error, its numbers refined; None where it is not worth it."""
+    """One more linear law, that with the smallest error, its parameters refined; None where it is not significant."""
     best: Structure | None = None
     for number, law in enumerate(room.laws):
         if not law.linear or number in chosen.laws:
@@ -143,7 +143,7 @@ def _turns(regression: Regression) -> bool:
 
 def _find_delay_s(small: Regression) -> float:
     """Delay of the motion behind the force, in s: the minimum nearest to zero of the cross-validated error; 0 where it
-    is not worth it."""
+    is not significant."""
     columns = small.columns_of(range(len(small.laws)))
 
     def errors(seconds: float) -> FloatArray:
@@ -161,8 +161,8 @@ def _find_delay_s(small: Regression) -> float:
 def _nearest_minimum(
     errors: Callable[[float], FloatArray], none: FloatArray, period_s: float
 ) -> tuple[float, FloatArray]:
-    """Downhill from no delay, and none where that leads beyond all that are tried: then the motion is too uniform to
-    tell a delay from damping and stiffness. Negative delays are not tried: they would not be causal."""
+    """Descends from delay zero; returns zero where the minimum is beyond the range: the motion is then too uniform to
+    distinguish a delay from damping and stiffness. Negative delays are not causal and not tried."""
     best_s, best = 0.0, none
     for share in LATER:
         left = errors(float(share) * period_s)

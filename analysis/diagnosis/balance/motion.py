@@ -1,9 +1,9 @@
-"""Positions, velocities and accelerations of what moves, and the forces on it, from one part of a recording.
+"""Positions, velocities, accelerations and forces from one part of a recording.
 
-Differentiation is done line by line of the spectrum, below a band's end that is the highest at which the motion's
-white noise makes at most a hundredth of the acceleration's mean square: regression on a noisier acceleration would
+Differentiation is done line by line of the spectrum, below a band's end that is the highest at which the motion's white
+noise makes at most a hundredth of the acceleration's mean square: regression on a noisier acceleration would
 underestimate the mass by more (errors in variables; Soderstrom, Automatica 43:939, 2007). Accelerations are integrated
-above the band's beginning, found likewise by the position, for below it their integrals are drift.
+above the lower end of the band, found likewise from the position, because below it their integrals are drift.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from equalizer.signals.signal import FloatArray, Signal
 
 
 class NoMotionError(ValueError):
-    """The recording holds no motion from which forces could be told."""
+    """The recording has no motion that a force balance could use."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Condition:
     """A recorded condition that changes within the recordings."""
 
     name: str
-    """In a formula."""
+    """Name in a formula."""
     mean: float
     spread: float
     """Standard deviation."""
@@ -41,16 +41,16 @@ class Condition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """One part of a recording; all at the recording's rate, band-limited but for the force."""
+    """One part of a recording; all arrays at the recording's rate, band-limited except the force."""
 
     rate_hz: float
     band_hz: float
-    """Infinite where no time is known: then nothing is filtered, and there are no accelerations."""
+    """End of the band in Hz; infinite without a time axis: then nothing is filtered, and there are no accelerations."""
     step: int
-    """Every so many samples are kept after filtering."""
+    """Decimation after filtering: one of this many samples is kept."""
     channels: tuple[str, ...]
     order: int
-    """Derivative of the position that was measured: 0, 1 or 2."""
+    """Order of the position's time derivative that was measured: 0, 1 or 2."""
     position: FloatArray
     """(n, d): as measured, or integrated from the first sample on."""
     velocity: FloatArray
@@ -64,9 +64,9 @@ class Motion:
     test: Mask
     """(n,): held-out samples."""
     lowest_hz: float = 0.0
-    """Where the band begins: above 0 for integrated accelerations."""
+    """Lower end of the band in Hz: above 0 for integrated accelerations."""
     conditions: tuple[Condition, ...] = ()
-    """Of `condition`, column by column."""
+    """Recorded conditions, for the columns of `condition`."""
 
     def decimate(self, columns: FloatArray) -> FloatArray:
         """(kept samples, k): columns (n, k) filtered to the band and decimated by `step`."""
@@ -131,7 +131,7 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
 
 
 def motion_band_hz(motions: Sequence[Motion]) -> float:
-    """The highest frequency at which a channel moves to speak of; inf without a clock."""
+    """The highest frequency of a channel's motion; inf without a time axis."""
     if not np.isfinite(motions[0].band_hz):
         return np.inf
     ends = []
@@ -157,7 +157,7 @@ def _motion(
 ) -> Motion:
     (samples, order), (band_hz, lowest_hz) = measured, band
     rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
-    # A held command is, over its time, centred half a sample after the reading.
+    # A held command is centred half a sample after the reading.
     early_s = 0.5 / rate_hz if hold is Hold.ZERO_ORDER and not record.recording.meta.get("imposed") else 0.0
     if not np.isfinite(band_hz):
         return _motion_without_clock(record, samples, condition, names)
@@ -165,7 +165,7 @@ def _motion(
         _derivative(samples, rate_hz, (band_hz, lowest_hz), wanted - order, early_s) for wanted in range(3)
     )
     if is_read_as_free(record.recording):
-        # It is the force, turned round: no law may explain it by itself.
+        # The acceleration is the negative force here: no law may use it.
         acceleration = np.zeros_like(acceleration)
     return Motion(
         rate_hz, band_hz, max(int(rate_hz / (MOTION_OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
@@ -186,7 +186,7 @@ def _band_gain(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> Fl
 def _motion_without_clock(
     record: Observed, samples: FloatArray, condition: FloatArray, names: tuple[str, ...]
 ) -> Motion:
-    """Without a clock: positions, and which way each changes from sample to sample."""
+    """Without a time axis: positions, and the sign of their change from sample to sample."""
     return Motion(
         record.recording.sample_rate_hz, np.inf, 1, names, 0, samples, np.gradient(samples, axis=0),
         np.zeros_like(samples), fill_gaps(record.command), condition, record.fit | record.choose, record.test,
@@ -196,8 +196,8 @@ def _motion_without_clock(
 def _derivative(
     samples: FloatArray, rate_hz: float, band: tuple[float, float], times: int, early_s: float
 ) -> FloatArray:
-    """The derivative of order `times`; an integral where that is negative. Integrals of an acceleration are without
-    what lies below the band's beginning; the acceleration itself keeps it, as the force does."""
+    """The derivative of order `times`; an integral where that is negative. Integrals of an acceleration are high-passed
+    at the lower end of the band; the acceleration itself is not, like the force."""
     band_hz, lowest_hz = band
     line, slope = _end_to_end_line(samples, rate_hz)
 
@@ -207,7 +207,7 @@ def _derivative(
         return np.asarray(shaped * np.exp(turn * early_s) * turn**times)
 
     if times < 0 and lowest_hz == 0:
-        # A velocity: its integral goes on and on, which no finite number of lines holds.
+        # The integral of a velocity is not periodic: it is summed in time instead of divided by frequency.
         smooth = _derivative(samples, rate_hz, band, 0, early_s)
         return np.asarray(np.cumsum(smooth, axis=0) / rate_hz)
     if times < 0:

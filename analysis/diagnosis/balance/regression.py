@@ -1,4 +1,5 @@
-"""Products of all laws' columns, block by block, from which any sum of laws is fitted and tested without new passes.
+"""Products of all laws' columns, block by block, from which any sum of laws is fitted and tested without another pass
+over the samples.
 
 The base of each balance is mass, damping and stiffness along every measured motion, linear dynamics of a higher order
 where there are any (`BaseTerms`), and a constant. Errors are those of the force within the band. A fold's error is that
@@ -31,7 +32,7 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 RIDGES = tuple(10.0**exponent for exponent in range(-8, 1))
-"""Ridge over the mean power of a column; cross-validation chooses among them."""
+"""Ridge parameters relative to the mean power of a column; cross-validation chooses among them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,11 +44,13 @@ class Regression:
     laws: tuple[Law, ...]
     beside: BaseTerms
     base: int
-    """How many columns come first: mass, damping, stiffness, linear laws beside them, and a constant."""
+    """Number of columns of the base, which come first: mass, damping, stiffness, further linear laws, and a
+    constant."""
     matrices: int
-    """How many of these are mass, damping and stiffness."""
+    """Number of mass, damping and stiffness columns."""
     positive: tuple[int, ...]
-    """Columns whose weights may not be negative. One is listed twice: the length also limits the active-set steps."""
+    """Columns whose weights must not be negative. A single one is listed twice: the length also limits the active-set
+    steps."""
     places: tuple[slice, ...]
     """Each law's columns."""
     scale: FloatArray
@@ -59,12 +62,12 @@ class Regression:
     fit: tuple[Block, ...]
     test: tuple[Block, ...]
     prior: Prior = None
-    """Prior of a given model's open numbers."""
+    """Prior of a given model's free parameters."""
     mass: float | None = None
     """Mass of a given model in kg (kg m^2); None = the weight of the driven motion's acceleration."""
 
     def columns_of(self, laws: Sequence[int]) -> list[int]:
-        """Numbers of the columns of the base and of these laws. A law of the command, numbered below zero, has none."""
+        """Column indices of the base and of these laws. A law of the command, numbered below zero, has none."""
         more = [k for law in laws if law >= 0 for k in range(self.places[law].start, self.places[law].stop)]
         return [*range(self.base), *more]
 
@@ -156,7 +159,7 @@ def signal_power(blocks: Sequence[Block]) -> float:
 
 
 def _linear_columns(motion: Motion, turns: bool, beside: Sequence[Law]) -> FloatArray:
-    """(n, k): acceleration, velocity, position and linear laws. turns: a shaft that turns freely has no spring."""
+    """(n, k): acceleration, velocity, position and linear laws. turns: a freely rotating shaft has no spring."""
     more = [law.columns(motion, law.numbers) for law in beside]
     return np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *more])
 
@@ -178,7 +181,7 @@ def _has_size(columns: Sequence[FloatArray]) -> Mask:
 
 
 def replace_law(regression: Regression, number: int, law: Law) -> Regression | None:
-    """The regression with another law of as many columns in a law's place; None where its columns vanish."""
+    """The regression with a law replaced by another with as many columns; None where its columns vanish."""
     place = regression.places[number]
     columns = _law_columns(regression.motions, law)
     if columns is None or columns[0].shape[1] != place.stop - place.start:
@@ -247,7 +250,7 @@ def _select_columns(block: Block, columns: Sequence[int]) -> Block:
 
 
 def _renew_products(regression: Regression, block: Block, place: slice) -> Block:
-    """The block with the products of the columns in `place` computed anew."""
+    """The block with the products of the columns in `place` recomputed."""
     x = regression.columns[block.motion][block.rows] / regression.scale
     gram, pull = block.gram.copy(), block.pull.copy()
     gram[:, place] = x.T @ x[:, place]

@@ -1,4 +1,4 @@
-"""Springs that are not linear, stops, play, weight on a lever, and linear dynamics of a higher order."""
+"""Nonlinear springs, end stops, backlash, gravity torque, and linear dynamics of a higher order."""
 
 from collections.abc import Iterator
 
@@ -35,7 +35,7 @@ def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
 
 
 def _stop_values(side: float) -> Values:
-    """Parameters of an end stop on one side, which is said where the stop does not stand on that side of zero."""
+    """Parameters of an end stop on one side; the result states it where the stop is not on that side of zero."""
 
     def values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
         beyond = {} if side * n[0] > 0 else {"side": side}
@@ -68,7 +68,7 @@ def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
 
 
 def _mode_force(m: Motion, c: int, n: Numbers) -> FloatArray:
-    """(n, 1): force per kg of a body that hangs on the axis by a spring and a damper."""
+    """(n, 1): force per kg of a body that is attached to the axis by a spring and a damper."""
     turn, loss = 2 * np.pi * n[0], 2 * n[1] * 2 * np.pi * n[0]
     return filter_from_rest(
         m.acceleration[:, [c]], m.rate_hz, lambda s: (turn**2 + loss * s) / (s**2 + loss * s + turn**2)

@@ -1,13 +1,14 @@
-"""Sums of one to three laws that explain a force along a measured motion: a beam search over folds' errors."""
+"""Sums of one to three laws that explain a force along a measured motion, by a beam search over cross-validated
+errors."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.given_base import GivenBase, regression_beside_model, takes_enough
 from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, scales_of
 from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
+from analysis.diagnosis.balance.model_base import GivenBase, regression_beside_model, takes_enough
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.balance.regression import Regression, append_laws, keep_laws, regression_of, replace_law
 from analysis.diagnosis.settings import FURTHER_LAW_ERRORS, FURTHER_LAW_GAIN, MOST_SUMMED_LAWS, STRUCTURES_BEAM
@@ -15,13 +16,13 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 REFINED = (0.8, 0.93, 1.075, 1.25)
-"""Factors by which nonlinear numbers are moved, as long as that helps."""
+"""Factors on a nonlinear parameter in a coordinate search."""
 ROUNDS = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Structure:
-    """A sum of laws, by their numbers in a regression, and each fold's cross-validated sum of squares."""
+    """A sum of laws, by their numbers in a regression, with the cross-validated sum of squares of each fold."""
 
     laws: tuple[int, ...]
     errors: FloatArray
@@ -40,7 +41,7 @@ class StructureSearch:
     ranked: tuple[Structure, ...]
     """The best structure of each set of effects, of all sizes, the best first."""
     complete: bool
-    """The search was not ended early."""
+    """Whether the search was completed."""
 
 
 def search_structures(
@@ -95,9 +96,9 @@ def _beam(first: Regression, linear: Structure, time_left: TimeBudget) -> tuple[
 
 
 def is_better(plain: Structure, richer: Structure) -> bool:
-    """Whether more laws are worth it: a sufficient gain in error power that is significant over the folds: absolutely;
-    relative to each fold's own error, for a stop that only one fold meets makes the absolute gains unequal; or as the
-    share of all errors, for a stop that few folds meet gains nothing in the others."""
+    """Whether more laws are significant: a sufficient gain in error power over the folds, either absolutely; or
+    relative to each fold's own error, because an end stop reached in one fold only makes absolute gains unequal; or as
+    a share of all errors, because an end stop reached in few folds has no gain in the others."""
     floor = 1e-12 * plain.error / len(plain.errors)
     shares = np.log(np.maximum(plain.errors, floor) / np.maximum(richer.errors, floor)) if floor > 0 else np.zeros(1)
     gains = plain.errors - richer.errors
@@ -108,7 +109,7 @@ def is_better(plain: Structure, richer: Structure) -> bool:
 
 
 def _is_significant(gains: FloatArray, about: FloatArray) -> bool:
-    """about: the gains about what is expected of each, or the gains themselves where that is their mean."""
+    """about: the gains minus the expected ones, or the gains themselves where these equal their mean."""
     spread = float(np.std(about, ddof=1) * np.sqrt(len(about))) if len(about) > 1 else np.inf
     return float(gains.sum()) > FURTHER_LAW_ERRORS * spread
 
@@ -136,7 +137,7 @@ def _add_law_to_each(regression: Regression, beam: Sequence[Structure]) -> list[
 SLIDING = (
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "position_dependent_friction", "drifting_friction"
 )  # fmt: skip
-"""Laws that share the column of dry friction: two of them on one motion would divide its level by chance."""
+"""Laws that share the column of dry friction: two of them on one motion would divide its level arbitrarily."""
 
 
 def _overlap(first: tuple[str, int], other: tuple[str, int]) -> bool:
@@ -187,7 +188,7 @@ def refine_numbers(regression: Regression, structures: Sequence[Structure]) -> R
         for place, number in enumerate(structure.laws):
             if number not in seen and regression.laws[number].bounded:
                 seen.add(number)
-                fitted = replace(keep_laws(regression, structure.laws), test=())  # only the fit is asked
+                fitted = replace(keep_laws(regression, structure.laws), test=())  # only the parameters are used
                 moved = replace_law(regression, number, _refine_law(fitted, place))
                 regression = moved or regression
     return regression

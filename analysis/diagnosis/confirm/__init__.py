@@ -1,7 +1,6 @@
 """Confirms laws of the force balance by simulation and held-out gain.
 
-`fitting_measures` says in which error measures they are fitted, `confirm_laws` fits what a balance named by output
-error and takes back what that does not bear out; beside a model from a file `balance_beside_model` makes the balance,
-and `laws_beside_model` weighs its laws. `held_out_gain` is what all of them are judged by. Begin at
-`confirm_laws.py`.
+`fitting_measures` selects the error measures, `confirm_laws` fits the named laws by output error and withdraws names
+that this does not confirm; for a model from a file `balance_with_model` makes the balance, and `laws_with_model`
+judges its laws. All are judged by `held_out_gain`. Begin at `confirm_laws.py`.
 """

@@ -1,7 +1,7 @@
 """Confirms laws that a force balance named by fitting them by output error.
 
-Used where the model itself was fitted to the recordings: then no calibration says how large its errors may be, and
-evidence is the gain on held-out data instead of a remainder in units of noise.
+Used where the model itself was fitted to the recordings: without a calibration, the size of its errors is unknown, and
+evidence is the gain on held-out data instead of a residual in units of noise.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ import numpy as np
 from analysis.diagnosis.balance.judge_laws import Balance, family_of
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_something
-from analysis.diagnosis.confirm.laws_to_play import (
+from analysis.diagnosis.confirm.laws_for_simulation import (
     CONSTANT,
     can_be_played,
     constants_of,
@@ -35,22 +35,23 @@ from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.signal import FloatArray
 
 CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
-"""Effects that are numbers of a fitted model, and their values."""
+"""Effects that are parameters of a fitted model, and their values."""
 SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
-"""Effects of a sensor that its signal shows by itself."""
+"""Effects of a sensor that can be seen in its signal alone."""
 ONLY_BESIDE_CALIBRATION = (
     "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may look like it; a "
     "calibrated model, or recordings of the device in order, would tell"
 )
 BESIDE_RUNAWAY = "the model without it leaves more than the mean of the signal, and all that bounds it gains"
 VAGUE = 1.96 * INTERVAL_FACTOR
-"""Half width of an interval in standard errors: a logarithm with a larger relative error leaves its number open."""
+"""Half-width of an interval in standard errors: a logarithm with a larger relative error leaves its parameter
+undetermined."""
 _Named = list[tuple[int, JudgedLaw]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Confirming:
-    """What every fit of named laws begins from."""
+    """Starting point of every fit of named laws."""
 
     whole: SearchContext
     context: SearchContext
@@ -58,7 +59,7 @@ class _Confirming:
     balances: tuple[Balance, ...]
     repeats: bool
     constants: int
-    """How many constants come before the laws."""
+    """Number of constants, which come before the laws."""
     before: FittedCandidate
     retuned: FittedCandidate
     confirmed: FittedCandidate
@@ -67,8 +68,8 @@ class _Confirming:
 
 
 def search_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> SearchResult | None:
-    """The named laws of the balances as a search result. repeats: the noise is known from repeats; else nothing counts
-    as explained. None where nothing is named, or simulations do not confirm it."""
+    """The named laws of the balances as a search result. repeats: whether the noise is known from repeats; otherwise
+    nothing counts as explained. None where nothing is named, or simulations do not confirm it."""
     named = [
         (axis, law)
         for axis, balance in enumerate(balances)
@@ -112,8 +113,8 @@ def _confirm(begun: _Confirming, named: Sequence[tuple[int, JudgedLaw]]) -> tupl
 
 
 def _prefer_special_case(begun: _Confirming, found: SearchResult, named: _Named) -> SearchResult:
-    """The result with the special case of a law whose further numbers are open, a stiffness before sliding, say, where
-    that leaves hardly more; else as it is."""
+    """The result with a law replaced by its special case where its further parameters are undetermined (such as a
+    stiffness before sliding) and the error hardly rises; else unchanged."""
     for place in open_refinements(found, begun.constants):
         simpler = find_special_case(begun.balances, _without(named, place), named[place])
         other = None if simpler is None else _confirm(begun, _without(named, place, simpler))
@@ -233,7 +234,7 @@ def _all_of_some(said: Sequence[bool]) -> bool:
 
 
 def leaves_open(result: SearchResult) -> bool:
-    """Whether the interval of any positive number of a law reaches zero: a stiffness before sliding, say."""
+    """Whether the interval of any positive parameter of a law reaches zero, such as a stiffness before sliding."""
     return bool(_open_numbers(result))
 
 

@@ -13,7 +13,7 @@ from analysis.diagnosis.errors.fit_score import fit_score
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.first_model.model_of_balance import first_model, share_within
+from analysis.diagnosis.first_model.model_from_balance import first_model, share_within
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.settings import CONSTANT_LEAVES, LAWS_WITHIN
@@ -33,7 +33,7 @@ class FittingMeasure:
     model: MechanicalModel
     chosen: Chosen
     narrow: bool = False
-    """Whether the band ends where noise is small in the force, which may leave numbers of laws open."""
+    """Whether the band is limited to small noise in the force, which may leave parameters of laws undetermined."""
 
 
 def choose_fitting_measure(
@@ -45,22 +45,22 @@ def choose_fitting_measure(
 ) -> FittingMeasure:
     """The measure that the rule chooses. about_mean: the model was fitted to deviations from the mean, and a constant
     command is added where that lowers the error."""
-    look = FittingMeasure(model, measure_of(recordings, model, clean, compared))
+    fitting = FittingMeasure(model, measure_of(recordings, model, clean, compared))
     if not about_mean or clean:
-        return look
-    measure = look.chosen.measure
+        return fitting
+    measure = fitting.chosen.measure
     moved = None
     if measure.name == "free simulation":
         moved = about_operating_point(recordings, model)
     elif isinstance(measure, PredictedForce):
         moved = _about_mean_force(recordings, model, measure)
     if moved is None:
-        return look
+        return fitting
     other = measure_of(moved, model, clean, compared)
     if other.measure.name != measure.name or _error_over_noise(model, other) > CONSTANT_LEAVES * _error_over_noise(
-        model, look.chosen
+        model, fitting.chosen
     ):
-        return look
+        return fitting
     return FittingMeasure(model, replace(other, remarks=(*other.remarks, ABOUT_MEAN)))
 
 

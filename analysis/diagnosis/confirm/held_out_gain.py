@@ -1,7 +1,7 @@
 """The share of the held-out error power that an effect takes, with an interval by block bootstrap.
 
-No device is within its sensors' noise of any model, so that an effect is judged by its prediction of held-out samples,
-not by the remainder in units of noise. Stretches are resampled as blocks, for residuals are correlated (Kunsch, Ann.
+No model of a real device reaches the sensors' noise, so that an effect is judged by its prediction of held-out samples,
+not by the residual in units of noise. Stretches are resampled as blocks, because residuals are correlated (Kunsch, Ann.
 Stat. 17:1217, 1989).
 """
 
@@ -19,13 +19,13 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class HeldOutGain:
-    """Shares of the error power that an effect takes, in the mean over the channels."""
+    """Shares of the error power that an effect explains, in the mean over the channels."""
 
     gain: float
     low: float
-    """Bound at 2.5 %."""
+    """Lower bound of the 95 % interval."""
     high: float
-    """Bound at 97.5 %."""
+    """Upper bound of the 95 % interval."""
 
 
 def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: FittedCandidate) -> HeldOutGain | None:
@@ -34,7 +34,7 @@ def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: Fitt
     left, right = (_powers(measure, each) for each in (without, with_it))
     if len(left) < LEAST_HELD_OUT_STRETCHES or not (np.isfinite(left).all() and np.isfinite(right).all()):
         return None
-    # Each channel in units of what is left of it without the effect: no channel drowns the others.
+    # Each channel in units of its residual without the effect, so that no channel dominates.
     size = np.maximum(left.sum(axis=0), np.finfo(float).tiny)
     before, after = (left / size).mean(axis=1), (right / size).mean(axis=1)
     drawn = bootstrap_draws(len(before))
@@ -44,15 +44,15 @@ def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: Fitt
 
 
 def predicts_something(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
-    """Whether a completed model leaves less of a held-out motion than its mean alone would: a law that only holds a
-    runaway model still does not. Channels that hold no more than noise do not count. True where forces are compared, or
-    nothing that moves is held out."""
+    """Whether a completed model predicts a held-out motion better than its mean would: a law that only stabilises an
+    unstable model does not. Channels that contain only noise do not count. True where forces are compared, or no motion
+    is held out."""
     return measure.name == "predicted force" or _share_left(measure, candidate, 0.0) < 1
 
 
 def explains_half(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
-    """Whether a completed model explains at least half of the held-out power that is no noise: a law in a model that
-    leaves more is no more than the best stand-in for what was not found. True where nothing that moves is held out."""
+    """Whether a completed model explains at least half of the held-out power beyond noise: with less, a law may only be
+    the best substitute for one that was not found. True where no motion is held out."""
     return predicts_something(measure, candidate) and _share_left(measure, candidate, 1.0) < 0.5
 
 

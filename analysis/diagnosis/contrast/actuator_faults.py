@@ -23,12 +23,12 @@ from equalizer.effects.slew_limit import limit_slew
 from equalizer.signals.signal import FloatArray
 
 CommandChange = Callable[[FloatArray, float], FloatArray]
-"""Maps one axis's command (n,), at a rate in Hz, to the force that the faulty drive makes of it."""
+"""Maps one axis's command (n,), at a rate in Hz, to the force of the faulty actuator."""
 AROUND = (0.75, 1.35)
-"""Range of sizes in which the change for size 1, scaled, stands for other sizes."""
+"""Range of sizes over which the change for size 1 may be scaled."""
 GRID = 12
 BEGUN = (0.0, 0.25, 0.5)
-"""Shares of a drift that had come before the recording began."""
+"""Shares of a drift that had occurred before the recording began."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +49,8 @@ class _Axis:
 
 
 def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: bool, rows: Rows) -> Iterator[Fault]:
-    """All faults of the actuator of axis `number`. parts: all compared ones, which the grids span. by_force: the base
-    predicts the command, not the response."""
+    """All faults of the actuator of axis `number`. parts: all compared ones, whose range the grids span. by_force:
+    whether the base predicts the command, not the response."""
     axis = _Axis(number, name)
     whole = np.concatenate([part.command[:, number] for part in parts])
     top = float(np.abs(whole).max(initial=0.0)) or 1.0
@@ -105,8 +105,8 @@ def _gain_drift(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
 
 
 def drift_course(part: Part, begun: float) -> FloatArray:
-    """(n,): a drift to 1 at the end of the file, of which a share `begun` had come before the file began."""
-    return np.asarray(begun + (1 - begun) * part.course)
+    """(n,): a drift to 1 at the end of the file, of which a share `begun` had occurred before the file began."""
+    return np.asarray(begun + (1 - begun) * part.elapsed_share)
 
 
 def _delay(axis: _Axis, time_s: float) -> Variant:
@@ -149,7 +149,7 @@ def delays_to_try(samples: FloatArray, rate_hz: float) -> list[float]:
     shortest, longest = 0.1 / rate_hz, LONGEST_DELAY / median_frequency_hz(samples, rate_hz)
     if longest <= shortest:
         return []
-    # Sizes `AROUND` each must meet those of the next.
+    # The ranges `AROUND` neighbouring sizes overlap.
     count = int(np.ceil(np.log(longest / shortest) / np.log(AROUND[1] / AROUND[0]))) + 1
     return [float(time_s) for time_s in np.geomspace(shortest, longest, max(count, GRID))]
 

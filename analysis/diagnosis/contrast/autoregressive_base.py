@@ -1,5 +1,6 @@
-"""Base model by autoregression: each response from its past and the commands (ARX; Ljung, System Identification, 2nd
-ed., chapter 4.2). For devices that no force balance describes: voltages as responses, many modes."""
+"""Base model by autoregression: each response is predicted from the past of responses and commands (ARX; Ljung, System
+Identification, 2nd ed., chapter 4.2). Used for devices that no force balance describes: voltages as responses, many
+modes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,8 +18,9 @@ from equalizer.signals.signal import FloatArray
 class AutoregressiveBase:
     """One response. Rows are its second difference, then the past of all responses and commands, and 1.
 
-    The past is given as the last value, its difference, and second differences: of smooth readings the values are so
-    alike that their products, in double precision, leave errors below 1e-5 of them to rounding."""
+    The past is given as the last value, its difference, and second differences: products of smooth readings are nearly
+    equal, so that in double precision errors below 1e-5 of them would be lost to rounding.
+    """
 
     channel: int
     order: int
@@ -31,7 +33,7 @@ class AutoregressiveBase:
         return tuple(self._rows(part) for part in parts)
 
     def command_columns(self, width: int) -> Mask:
-        """(width,): which columns commands make."""
+        """(width,): mask of the columns made from commands."""
         return (np.arange(width) > self.order * self.responses) & (np.arange(width) < width - 1)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
@@ -74,8 +76,10 @@ def likely_step(parts: Sequence[Part]) -> int:
         power = np.abs(np.fft.rfft(moved, axis=0)) ** 2
         for column in power.T:
             floor = float(np.median(column[3 * len(column) // 4 :]))
-            course = np.cumsum(np.maximum(column - floor, 0.0))
-            if course[-1] > 0:
-                ends.append(int(np.searchsorted(course, RESPONSE_BAND_SHARE * course[-1])) * part.rate_hz / len(moved))
+            cumulative = np.cumsum(np.maximum(column - floor, 0.0))
+            if cumulative[-1] > 0:
+                ends.append(
+                    int(np.searchsorted(cumulative, RESPONSE_BAND_SHARE * cumulative[-1])) * part.rate_hz / len(moved)
+                )
     fastest = max(ends, default=parts[0].rate_hz / 2)
     return max(int(parts[0].rate_hz / (RESPONSE_OVERSAMPLED * 2 * max(fastest, 1e-9))), 1)

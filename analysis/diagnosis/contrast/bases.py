@@ -17,8 +17,8 @@ from equalizer.signals.signal import FloatArray
 
 
 def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tuple[list[Base], tuple[Motion, ...]]]:
-    """Force bases, one per axis, where they fit the clean side; then autoregressive bases, one per response. Each with
-    the motions of both sides (the faulty one may be empty); empty where none was measured."""
+    """Force balances, one per axis, where they fit the clean side; then autoregressive models, one per response. Each
+    with the motions of both sides (the faulty one may be empty); empty where none was measured."""
     recording = clean[0].recording
     turning = is_rotational(recording)
     motions: tuple[Motion, ...] = ()

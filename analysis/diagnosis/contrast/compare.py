@@ -1,5 +1,5 @@
-"""Tests each fault: the error that undoing it removes between faulty and clean recordings, against the error that it
-removes between stretches of one set, for no real device repeats itself exactly."""
+"""Tests each fault: the error that undoing it removes between faulty and clean recordings, compared with the error that
+it removes between stretches of one set, because no real device repeats itself exactly."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -48,16 +48,16 @@ from equalizer.signals.signal import FloatArray
 
 SIXTHS, THIRDS = (tuple(tuple(ALL[k : k + size]) for k in ALL[::size]) for size in (len(ALL) // 6, len(ALL) // 3))
 FOLDS = len(SIXTHS)
-"""Parts of each set that are left out in turn."""
+"""Parts of each set that are left out in turn (jackknife)."""
 APART = (*THIRDS, ALL[: CONTRAST_BLOCKS // 2])
-"""Blocks of a set that are compared with its other blocks, thirds and halves, as if they were two recordings."""
+"""Blocks of a set that are compared with its other blocks, thirds and halves, as if they were separate recordings."""
 
 
 def compare(
     recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
 ) -> Comparison | None:
-    """The faulty recordings against the clean ones. None where there is too little data, no base fits, or one set
-    hardly moves beside the other."""
+    """Comparison of the faulty recordings with the clean ones. None where there is too little data, no base fits, or
+    one set moves far less than the other."""
     sides = split_into_parts(clean), split_into_parts(recordings)
     if not all(sides) or not move_alike(*sides):
         return None
@@ -80,7 +80,7 @@ def _set_up(
     table = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=False)}
     streams = [stream_of(base, clean, faulty) for base in bases]
     for base in sensor_bases(clean, band_hz, step):
-        with suppress(ValueError):  # too few rows of it: the others are compared
+        with suppress(ValueError):  # too few valid rows: the other bases are compared
             streams.append(stream_of(base, clean, faulty))
     row_s = streams[0].row_s
     lag_samples = 1 if by_force else round(row_s * clean[0].rate_hz)
@@ -122,7 +122,7 @@ def _judge_faults(streams: Sequence[Stream], trial: Trial) -> Comparison:
 
 
 def _balances(streams: Sequence[Stream], tried: Sequence[Tried]) -> bool:
-    """Whether the forces of the faulty set balance, with nothing or with the best fault undone. tried: the best
+    """Whether the force balance fits the faulty set, with nothing or with the best fault undone. tried: the best
     first."""
     device = [stream for stream in streams if isinstance(stream.base, ForceBase)]
     if all(unexplained_share_of_rows(each.base, each.other.rows, each.other.masks) < BALANCE_HOLDS for each in device):
@@ -145,8 +145,8 @@ def _undo(stream: Stream, found: Tried) -> tuple[list[FloatArray], list[Mask]]:
 
 
 def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
-    """Error of stretches of one set with a common base over that with a base each, less 1. sides: per stream, products
-    (blocks, k, k)."""
+    """Ratio of the errors of a common base to those of separate bases for stretches of one set, less 1. sides: per
+    stream, products (blocks, k, k)."""
 
     def error(blocks: Sequence[int]) -> float:
         return sum(error_of_own_fit(side[list(blocks)].sum(axis=0)) for side in sides)
@@ -209,9 +209,9 @@ def _leave_out_blocks(pairs: Sequence[Pair]) -> list[list[Pair]]:
 def _gains_within_a_set(
     streams: Sequence[Stream], fault: Fault, variant: Variant, sizes: FloatArray
 ) -> Iterator[float]:
-    """The fault's gains between stretches of one set (negative control): in the clean set from size zero to a size of
-    the stretch's own; in the faulty set from the common size, which is undone everywhere first, for what a base cannot
-    describe would gain in any stretch."""
+    """The fault's gains between stretches of one set (negative control): in the clean set from size zero to the
+    stretch's own size; in the faulty set from the common size, which is undone everywhere first, because lack of fit of
+    the base would gain in any stretch."""
     for clean in (True,) if fault.varies else (True, False):
         common = np.zeros_like(sizes) if clean else sizes
         sides = [stream.clean if clean else stream.other for stream in streams]

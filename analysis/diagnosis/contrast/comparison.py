@@ -1,4 +1,4 @@
-"""What a comparison with reference recordings found, fault by fault."""
+"""Result of a comparison with reference recordings, fault by fault."""
 
 from dataclasses import dataclass
 
@@ -9,13 +9,13 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedFault:
-    """A fault with its values, its gain, and what it gains between stretches of one set."""
+    """A fault with its values, its gain, and its gains between stretches of one set."""
 
     fault: Fault
     values: dict[str, float]
     spread: dict[str, float]
-    """Standard error of each value, from leaving out sixths of either set: what varies among the clean stretches makes
-    a number as uncertain as what varies among the others."""
+    """Standard error of each value, by leaving out sixths of either set: variation within the clean set counts as well
+    as that within the faulty set."""
     errors: FloatArray
     """(blocks,): sums of squares with it undone, of the faulty set, then of the clean one."""
     gain: float
@@ -23,9 +23,10 @@ class JudgedFault:
     usual: float
     """The largest gain between stretches of one set, less the typical one."""
     typical: float
-    """The median gain between stretches of one set: what it gains by its flexibility alone."""
+    """Median gain between stretches of one set: the gain due to its flexibility alone."""
     share: float
-    """Share of the excess error that it explains: that of both sets together over that of a base of each set's own."""
+    """Share of the excess error that it explains: of the error of one base for both sets over that of separate
+    bases."""
     held_out: float
     """Cross-validated sum of squares of the faulty set."""
     gain_low: float
@@ -41,13 +42,14 @@ class Comparison:
     plain: FloatArray
     """(blocks,): sums of squares with nothing undone, as `JudgedFault.errors`."""
     samples: int
-    """Number of samples: the sum of squares where each set has a base of its own, for errors are white with rms 1."""
+    """Number of samples: the sum of squares with separate bases, because errors are scaled to white noise with rms
+    1."""
     faulty_samples: int
     """The same of the faulty set."""
     held_out: float
     """Cross-validated sum of squares of the faulty set, with nothing undone."""
     faulty_share: float
-    """Rms error of the faulty set by a base of its own, over the rms of what is predicted."""
+    """Rms error of the faulty set with its own base, relative to the predicted quantity."""
     usual: float
     """The largest `excess` between stretches of one set."""
     usual_clean: float
@@ -55,7 +57,7 @@ class Comparison:
     by_force: bool
     step_s: float
     complete: bool
-    """All faults were tested before the time ran out."""
+    """Whether all faults were tested before the time ran out."""
 
     @property
     def excess(self) -> float:
@@ -67,6 +69,7 @@ class Comparison:
         return self.excess > max(SETS_AS_ONE, SETS_APART * self.usual)
 
     def differ_but_for(self, fault: JudgedFault) -> bool:
-        """The same with the fault undone in the faulty set: one that comes and goes sets its stretches apart, too. And
-        one that no base takes up makes all of that set's errors larger, so that it shows in its sure gain alone."""
+        """The same with the fault undone in the faulty set. An intermittent fault also makes its stretches differ; and
+        a fault that no base absorbs raises all errors of that set, so that it can be seen only in the lower bound of
+        its gain."""
         return max(self.excess, fault.gain_low) > max(SETS_AS_ONE, SETS_APART * max(self.usual_clean, fault.apart))

@@ -1,4 +1,4 @@
-"""Decides what a comparison with clean recordings names: a fault, a class of faults, or candidates only."""
+"""Decides what is named after a comparison with clean recordings: a fault, a class of faults, or candidates only."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,13 +23,13 @@ from analysis.diagnosis.settings import (
 )
 
 BOUND = float(stdtrit(FOLDS - 1, 0.975))
-"""Half width of a 95 % interval in standard errors (Student's t for so few blocks): within it, a number may be none."""
+"""Half-width of a 95 % interval in standard errors (Student's t for few blocks): a number within it may be zero."""
 SAME = {
     "transport_delay": ("logger_offset",),
     "logger_offset": ("transport_delay",),
     "force_offset": ("constant_force",),
 }  # fmt: skip
-"""What no recording of one command and one response could tell apart."""
+"""Faults that cannot be distinguished in any recording of one command and one response."""
 
 FINER = "it holds the named fault as a special case, and is not sure to leave less"
 BEHIND = "another explains more of what sets these recordings apart"
@@ -39,11 +39,11 @@ BEHIND = "another explains more of what sets these recordings apart"
 class Decision:
     named: JudgedFault | None
     alike: tuple[str, ...]
-    """Effects that fit as well in its place."""
+    """Effects that fit as well in its place (class)."""
     probability: float
-    """Share of resampled blocks in which none of them leaves less."""
+    """Share of bootstrap draws in which none of them has a smaller error."""
     others: tuple[tuple[JudgedFault, str], ...]
-    """Candidates, and why they are not named; the best first."""
+    """Candidates with the reason why they are not named; the best first."""
 
 
 def decide(found: Comparison, responses: int) -> Decision:
@@ -85,7 +85,8 @@ def decide(found: Comparison, responses: int) -> Decision:
 
 
 def _unsure_but_as_good(unsure: Sequence[JudgedFault], best: JudgedFault, found: Comparison) -> list[JudgedFault]:
-    """Faults that are not sure by themselves and leave as much as the best, which is: what is there may be either."""
+    """Faults that are not significant by themselves but have as small an error as the best, which is: either may be the
+    cause."""
     return [
         law
         for law in unsure
@@ -94,12 +95,12 @@ def _unsure_but_as_good(unsure: Sequence[JudgedFault], best: JudgedFault, found:
 
 
 def _refines(other: JudgedFault, best: JudgedFault) -> bool:
-    """Whether `other` holds `best` as a special case, so that it always fits better."""
+    """Whether `other` contains `best` as a special case, so that it always fits better."""
     return best.fault.effect in other.fault.simpler and best.fault.axis == other.fault.axis
 
 
 def _choose_plainest(sure: Sequence[JudgedFault], found: Comparison) -> JudgedFault:
-    """The fault with the least error, or a special case of it that these data cannot tell from it."""
+    """The fault with the smallest error, or a special case of it that these data cannot distinguish from it."""
     best = min(sure, key=lambda each: float(each.errors.sum()))
     for law in sure:
         if _refines(best, law) and _is_inseparable(best, law, found):
@@ -108,8 +109,8 @@ def _choose_plainest(sure: Sequence[JudgedFault], found: Comparison) -> JudgedFa
 
 
 def _why_not(weighed: JudgedFault, differ: bool) -> str:
-    """differ: whether the sets do by more than stretches of one. Where they do not, a fault must gain in all blocks
-    alike, which what changes in the course of a recording does not."""
+    """differ: whether the sets differ by more than stretches of one. If not, a fault must gain in all blocks alike,
+    which excludes slow changes during a recording."""
     if weighed.gain < LEAST_FAULT_GAIN or weighed.gain_low <= 0:
         return "its gain is not larger than what varies between stretches"
     steady = weighed.gain_low >= FAULT_STEADY * weighed.gain and not weighed.fault.varies
@@ -135,18 +136,19 @@ def _is_inseparable(best: JudgedFault, other: JudgedFault, found: Comparison) ->
 
 
 def _is_sure_to_leave_less(finer: JudgedFault, best: JudgedFault) -> bool:
-    """Whether a fault that holds the best as a special case leaves less, beyond what resampled blocks vary."""
+    """Whether a fault that contains the best as a special case has a significantly smaller error (bootstrap over
+    blocks)."""
     ahead = best.errors - finer.errors
     return bool(np.quantile(ahead[bootstrap_draws(len(ahead))].sum(axis=1), BOOTSTRAP_LEVEL) > 0)
 
 
 def _behind(other: JudgedFault, best: JudgedFault) -> float:
-    """What another leaves beyond what the best leaves."""
+    """Error of another fault minus that of the best."""
     return float((other.errors - best.errors).sum())
 
 
 def _least(best: JudgedFault, found: Comparison) -> float:
-    """What a rival must leave beyond the best to be told from it."""
+    """Least difference of a rival's error from that of the best, for it to be distinguished."""
     left = float(best.errors.sum())
     return min(FAULT_RIVAL_BEHIND * (float(found.plain.sum()) - left), FAULT_RIVAL_WORSE * left)
 

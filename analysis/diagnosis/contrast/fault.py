@@ -1,4 +1,4 @@
-"""A fault as something that can be undone: what would have been recorded without it, of a given size."""
+"""A fault as a transformation that undoes it: the recording as it would have been without a fault of a given size."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -29,58 +29,57 @@ EVERY = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variant:
-    """A fault with its nonlinear numbers fixed. Its sizes multiply the changes that the functions in `undo` make."""
+    """A fault with its nonlinear parameters fixed. Its sizes multiply the changes made by the functions in `undo`."""
 
     undo: tuple[Undo, ...]
-    """One per size, each undoing a fault of size 1."""
+    """One function per size, each undoing a fault of size 1."""
     values: Numbers
-    """Numbers of the fault from its sizes (steps,)."""
+    """Parameters of the fault from its sizes (steps,)."""
     least: float = -np.inf
     most: float = np.inf
     """Bounds of each size: about 1 where undoing is not linear in the size."""
     unit: float = 1.0
-    """Factor by which the errors of a faulty sensor are scaled: else a gain that makes every error small would win."""
+    """Factor by which the errors of a faulty sensor are scaled: otherwise a gain that reduces every error would win."""
     curve: Curve | None = None
-    """Where undoing is a map of single readings: by its slope, errors change that were there before."""
+    """Where undoing is a map of single readings: its slope, which also scales the errors that were there before."""
     passed: float = 1.0
-    """Factor by which undoing makes prediction errors of all samples smaller by interpolation alone: see
-    `noise_kept`."""
+    """Factor by which interpolation alone reduces the prediction errors of all samples: see `noise_kept`."""
     column_change: ColumnChange | None = None
-    """How the predicted command changes with the fault, where that is known. Undoing a gain or a lag in the recorded
-    command instead would make errors smaller that the fault did not cause."""
+    """Change of the predicted command by the fault, where known. Undoing a gain or a lag in the recorded command
+    instead would also reduce errors that the fault did not cause."""
     grid_error: float = 0.0
-    """Standard error of its number where its size is fixed, from the distance to the next variant."""
+    """Standard error of its parameter where the size is fixed: from the distance to the next variant."""
     about: Callable[[float], "Variant"] | None = None
-    """The fault about another size, where undoing it is not linear: that size is its size 1."""
+    """The fault linearised about another size, where undoing it is not linear: that size then is its size 1."""
     exact: bool = False
-    """Only of size 1 it is the fault: a delay undone by half is no delay, but the mean of two readings, in which noise
-    is smaller."""
+    """Whether it is a fault at size 1 only: half of a delay undone is not half the delay, but the mean of two readings,
+    with less noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fault:
     effect: str
-    """A name of the vocabulary, or a new one written like them."""
+    """Name of the vocabulary, or a new one in the same style."""
     place: Place
     axis: str
     site: int
     variants: tuple[Variant, ...]
     simpler: tuple[str, ...] = ()
-    """Faults that it holds as special cases."""
+    """Faults that it contains as special cases."""
     varies: bool = False
-    """It changes in the course of a recording, so that stretches of a faulty one differ by it, too."""
+    """Whether it changes during a recording, so that stretches of a faulty recording differ by it, too."""
 
 
 @dataclass(frozen=True, slots=True)
 class ClockRate:
-    """A rate with which the delay of the readings may grow in the course of the faulty set."""
+    """A rate at which the delay of the readings grows over the faulty set."""
 
     rate: float
-    """Of the clock of the readings, relative: 0 is right."""
+    """Relative error of the readings' clock rate: 0 is right."""
     step: float
-    """From one of the rates that are tried to the next."""
+    """Spacing of the rates that are tried."""
     runs_on: bool
-    """Its time counts from the begin of the file, else of each part."""
+    """Whether its time counts from the beginning of the file, else of each part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,16 +91,16 @@ class Rows:
     late_s: tuple[float, ...]
     """See `likely_delays_s`."""
     late_step_s: float
-    """From one of these delays to the next."""
+    """Spacing of these delays."""
     clocks: tuple[ClockRate, ...]
     """See `likely_clock_rates`."""
 
 
 def fix_size(variant: Variant, grid_error: float) -> Variant:
-    """The variant at size 1 alone. A delay of many oscillations, undone by half, is no delay of half its length."""
+    """The variant at size 1 only. Half of a delay of many oscillations undone is not a delay of half its length."""
     return replace(variant, least=1.0, most=1.0, about=None, grid_error=grid_error)
 
 
 def proportional_number(name: str, of_one: float = 1.0) -> Numbers:
-    """A fault's number in proportion to its only size. of_one: the number at size 1."""
+    """A fault's parameter in proportion to its only size. of_one: the parameter at size 1."""
     return lambda sizes: {name: of_one * float(sizes[0])}

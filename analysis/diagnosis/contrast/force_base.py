@@ -1,5 +1,5 @@
 """Base model by force balance: along each axis mass, damping, stiffness and the laws that the clean recordings need.
-None of these is named; they describe the device without faults."""
+None of these laws is named; they describe the device without faults."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class ForceBase:
     rate_hz: float
     """Sample rate of the rows."""
     lowest_hz: float = 0.0
-    """Where the band begins, see `Motion`."""
+    """Lower end of the band, see `Motion`."""
 
     def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
         """Per part (kept, 1 + columns). like: rows of parts with the same motion, whose columns are reused."""

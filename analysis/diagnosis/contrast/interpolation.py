@@ -1,4 +1,4 @@
-"""Samples between samples, and the share of white noise that they keep."""
+"""Interpolation between samples, and the share of white noise that it passes."""
 
 from functools import cache
 
@@ -8,10 +8,10 @@ from scipy.interpolate import make_interp_spline
 from equalizer.signals.signal import FloatArray
 
 SMOOTH = 5
-"""Degree of the splines through samples: of short reach, where a shift of the spectrum's phase rings from the ends on,
-and hardly a low pass, as straight lines would be."""
+"""Degree of the splines: of short range, whereas a phase shift of the spectrum rings from the ends; and hardly a low
+pass, unlike linear interpolation."""
 FRACTIONS = np.linspace(0.0, 1.0, 41)
-"""Of a sample, at which the share that is kept is tabulated."""
+"""Fractions of a sample at which the share is tabulated."""
 
 
 def resample(samples: FloatArray, at: FloatArray) -> FloatArray:

@@ -1,8 +1,9 @@
 """Joint least squares of one base model on two sets of stretches, one of them with a fault of unknown size.
 
-The base is fitted to both sets at once, so that nothing depends on how it extrapolates to where only one set has been.
+The base is fitted to both sets at once, so that it is never extrapolated to states that only one set has visited.
 Undoing a fault changes the rows of one set by (size) x (change for size 1): exactly where the fault is linear, and to
-first order about size 1 elsewhere. Products of the rows and of their changes, block by block, hold all that is needed.
+first order about size 1 elsewhere. The products of the rows and of their changes, block by block, are sufficient
+statistics.
 """
 
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ from equalizer.signals.signal import FloatArray
 
 Places = npt.NDArray[np.intp]
 RIDGE = 1e-9
-"""Ridge over a column's mean power."""
+"""Ridge relative to a column's mean power."""
 BLOWN_UP = 1e16
 """Product of columns above which undoing a fault of a size about 1 is ill-conditioned."""
 ROUNDS = 3
@@ -30,12 +31,12 @@ class Grams:
 
     blocks: FloatArray
     changed_columns: tuple[Places, ...]
-    """Per size, which columns change."""
+    """Per size, the columns that change."""
     width: int
 
     def is_sound(self, variant: Variant) -> bool:
-        """Whether undoing the fault is well-conditioned. Where any size may be, size 1 is 1 in SI units (a mass of 1 kg
-        on a device of 1 mg): its products may be of any magnitude."""
+        """Whether undoing the fault is well-conditioned. Sizes that may have any value are in SI units (a mass of 1 kg
+        on a device of 1 mg), so that their products may be of any magnitude."""
         most = BLOWN_UP if np.isfinite(variant.most) else np.inf
         return bool(np.isfinite(self.blocks).all() and np.abs(self.blocks).max(initial=0.0) < most)
 
@@ -76,8 +77,8 @@ class Pair:
     without: tuple[FloatArray, ...]
     """Products of plain rows (width, width), one per block."""
     may_grow: float = 1.0
-    """Factor by which undoing the fault may raise the sum of squares of the first blocks' own base without counting
-    against it. Where the clean set leaves more than the faulty one, a faulty sensor may have hidden errors."""
+    """Factor by which undoing the fault may raise the sum of squares of the first blocks' own base without penalty.
+    Where the clean set has larger errors than the faulty one, a faulty sensor may have hidden errors."""
 
     @cached_property
     def whole(self) -> FloatArray:
@@ -179,7 +180,7 @@ def _errors(pair: Pair, sizes: FloatArray) -> FloatArray:
 
 
 def _growth(pair: Pair, spread: FloatArray) -> float:
-    """By which undoing the fault raises the error of the blocks' own base, up to `may_grow`."""
+    """Factor by which undoing the fault raises the error of the blocks' own base, up to `may_grow`."""
     if pair.may_grow <= 1.0:
         return 1.0
     plain = pair.whole[: pair.with_it.width, : pair.with_it.width]

@@ -1,8 +1,8 @@
 """Delays and clock rates of the faulty set that cross-correlations of responses and commands suggest.
 
-With the weights of the clean set, errors are the sum of a part that the responses make and one that the commands make.
-How well they cancel has a valley about the true delay that is narrower than any grid of delays, where a signal has many
-oscillations in it. The cross-correlation of both parts has its peak there.
+With the weights of the clean set, errors are the sum of a part from the responses and one from the commands. Where the
+delay spans many oscillations of the signal, the error has a minimum at the true delay that is narrower than any grid.
+The cross-correlation of both parts has its peak there.
 """
 
 from collections.abc import Sequence
@@ -21,8 +21,8 @@ from equalizer.signals.signal import FloatArray
 
 
 def likely_delays_s(streams: Sequence[Stream]) -> tuple[float, ...]:
-    """How late the responses of the faulty set may be beside its commands: per base of the device, the delay by
-    cross-correlation, if it is at least a row, and delays up to half a row away from it."""
+    """Delays of the faulty responses behind the commands: per base of the device, the delay by cross-correlation, if it
+    is at least one row, and delays up to half a row away from it."""
     found = []
     for stream in _of_device(streams):
         late = _rows_late(stream)
@@ -31,8 +31,8 @@ def likely_delays_s(streams: Sequence[Stream]) -> tuple[float, ...]:
 
 
 def likely_clock_rates(streams: Sequence[Stream]) -> tuple[ClockRate, ...]:
-    """Clock rates with which the delay may grow in the course of the faulty set, per base of the device: the likeliest,
-    if it makes a row until the end, and those within half a row there."""
+    """Clock rates at which the delay grows over the faulty set: per base of the device, the most likely one, if it
+    amounts to at least a row at the end, and those within half a row there."""
     found = []
     for stream in _of_device(streams):
         for runs_on in (True, False) if any(part.start > 0 for part in stream.other.parts) else (True,):
@@ -43,7 +43,7 @@ def likely_clock_rates(streams: Sequence[Stream]) -> tuple[ClockRate, ...]:
 
 
 def _around() -> list[float]:
-    """Rows from a likely delay to those that are tried."""
+    """Offsets in rows from a likely delay to those that are tried."""
     return [float(by) for by in np.arange(-0.5, 0.51, LATE_STEP)]
 
 
@@ -52,7 +52,7 @@ def _of_device(streams: Sequence[Stream]) -> list[Stream]:
 
 
 def _made_by(stream: Stream, rows: FloatArray) -> FloatArray:
-    """(n, 2): whitened errors of the clean set's base, as what the responses make and what the commands take away."""
+    """(n, 2): whitened errors of the clean set's base, split into the contributions of responses and of commands."""
     weights = weights_of(stream.clean.white.T @ stream.clean.white) / stream.columns
     pushed = np.arange(len(weights)) == 0
     if isinstance(stream.base, AutoregressiveBase):
@@ -78,7 +78,7 @@ def _likeliest_rate(stream: Stream, runs_on: bool) -> tuple[float, float]:
         return 0.0, 0.0
     end, longest = float(times.max()), correlations.shape[1] // 2
     rates = np.arange(-longest, longest + LATE_STEP, LATE_STEP) / end
-    # Readings of a clock that is fast by `rate` show at row t what was at t (1 + rate): they are early.
+    # Readings of a clock that is fast by `rate` show at row t the value of t (1 + rate): they are early.
     at = np.clip(longest - rates[:, None] * times, 0.0, 2 * longest - 1e-9)
     whole = at.astype(np.intp)
     block, beyond = np.arange(len(times)), at - whole

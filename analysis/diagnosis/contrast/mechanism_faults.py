@@ -1,4 +1,4 @@
-"""Faults of a mechanism: forces along the measured motion that act beside what the device needs."""
+"""Faults of a mechanism: additional forces along the measured motion."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -17,11 +17,11 @@ Shape = Callable[[Motion], FloatArray]
 """Maps a part's motion to the force (n,) of a fault of size 1."""
 Along = Callable[[Part], Motion]
 WIDER = (1.0, 3.0, 8.0, 20.0)
-"""Widths of the smoothed sign of dry friction, over the sharpest."""
+"""Widths of the smoothed sign of dry friction, relative to the narrowest."""
 GIVES = tuple(np.geomspace(0.003, 0.3, 7).tolist())
 """Presliding distances, over the travel."""
 RIPPLES = tuple(np.arange(2.0, 40.0, 0.35).tolist())
-"""Periods of a cogging force within the travel: closer than what tells two of them apart."""
+"""Numbers of periods of a cogging force within the travel: neighbours cannot be distinguished."""
 STOPS = tuple(np.arange(0.05, 0.5, 0.05).tolist())
 """Distances of an end stop from the middle of the travel, over the travel."""
 
@@ -63,7 +63,7 @@ class _Axis:
 def mechanism_faults(
     number: int, name: str, motions: Sequence[Motion], along: Along, rotational: bool
 ) -> Iterator[Fault]:
-    """All faults of the mechanism along axis `number`. motions: of all compared parts, which the grids span."""
+    """All faults of the mechanism along axis `number`. motions: of all compared parts, whose range the grids span."""
     channel = min(number, len(motions[0].channels) - 1)
     position = np.concatenate([motion.position[:, channel] for motion in motions])
     velocity = np.concatenate([motion.velocity[:, channel] for motion in motions])
@@ -109,7 +109,7 @@ def _cogging_variant(axis: _Axis, pitch: float) -> Variant:
         axis.of(lambda m: np.sin(2 * np.pi * m.position[:, axis.channel] / pitch)),
         axis.of(lambda m: np.cos(2 * np.pi * m.position[:, axis.channel] / pitch)),
     )
-    # The catalogue's force pushes along the motion where this is what the motion needs.
+    # Opposite signs: the catalogue's force acts along the motion, this one is what the motion needs.
     return Variant(undo, lambda s: {
         "amplitude": float(np.hypot(*s)), "pitch": pitch, "phase": float(np.arctan2(-s[1], -s[0])),
     })  # fmt: skip

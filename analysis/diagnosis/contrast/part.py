@@ -29,12 +29,12 @@ class Part:
     known: Mask
     """(n,)"""
     start: int
-    """Its first sample in the file: what drifts or counts time does so between the parts, too."""
+    """Its first sample in the file: drifts and clocks also run between the parts."""
     whole: int
     """Samples of the file."""
 
     @property
-    def course(self) -> FloatArray:
+    def elapsed_share(self) -> FloatArray:
         """(n,): share of the file's time that has passed."""
         return np.linspace(self.start, self.start + len(self.known) - 1, len(self.known)) / max(self.whole - 1, 1)
 

@@ -1,6 +1,6 @@
 """Base model of one sensor by another: a measured velocity or acceleration from the differentiated position.
 
-No physics of the device enters, so that what they do not share is a fault of either sensor.
+No physics of the device is involved, so that a difference is a fault of one of the sensors.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Faults of a sensor, each as the change of the readings that undoes it."""
+"""Faults of a sensor, each as the transformation of the readings that undoes it."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 Read = Callable[[FloatArray, float], FloatArray]
-"""What one channel (n,) would have read, at a rate."""
+"""From the readings of one channel (n,) at a rate to those without the fault."""
 WIDELY = (0.5, 1.6)
 """Range of sizes, as `AROUND`, for faults that act nearly in proportion to their size."""
 GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)
@@ -43,15 +43,15 @@ BENT = (0.02, 0.06, 0.15, 0.3)
 PLAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 """Gaps before the sensor, over the channel's rms."""
 LATE = (*np.geomspace(0.004, 0.2, GRID // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
-"""How late a clock may be at the end of the file, in periods: beyond the first ones, closer than half a period."""
+"""Largest delays of a clock at the end of the file, in periods: after the first ones, closer than half a period."""
 IN_UNITS = ("sensor_offset", "sensor_drift")
-"""Faults that only channels of one unit can have alike."""
+"""Faults that channels can share only if they have the same unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Channel:
     numbers: tuple[int, ...]
-    """That have the fault: a channel, or all that there are."""
+    """Channels with the fault: one, or all."""
     name: str
     rms: float
     top: float
@@ -71,7 +71,7 @@ class _Channel:
 
 
 def sensor_faults(number: int, name: str, parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
-    """All faults of response channel `number`. parts: all compared ones, which the grids span."""
+    """All faults of response channel `number`. parts: all compared ones, whose range the grids span."""
     whole = np.concatenate([part.response[:, number] for part in parts])
     channel = _Channel((number,), name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
     longest = max(parts, key=lambda part: len(part.response))
@@ -99,10 +99,10 @@ def faults_of_all(parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
             yield fault
 
 
-def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray, rows: Rows) -> Iterator[Fault]:
-    """Faults that one channel may have, or all. course: (n,) of the longest part."""
+def _common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray, rows: Rows) -> Iterator[Fault]:
+    """Faults that one channel may have, or all. samples: (n,) of the longest part."""
     longest = max(parts, key=lambda part: len(part.response))
-    times = delays_to_try(course, longest.rate_hz)
+    times = delays_to_try(samples, longest.rate_hz)
     yield channel.fault("sensor_gain", [_gain(channel, gain) for gain in GAINS])
     shifts = [side * share * channel.rms for share in SHIFTS for side in (1.0, -1.0)]
     yield channel.fault("sensor_offset", [_offset(channel, shift) for shift in shifts])
@@ -114,7 +114,7 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], course: FloatArray,
     ])  # fmt: skip
     lags = [time_s for time_s in times if time_s * longest.rate_hz >= 0.1 * rows.lag_samples]
     yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz, rows.lag_samples) for time_s in lags])
-    period = longest.rate_hz / median_frequency_hz(course, longest.rate_hz)
+    period = longest.rate_hz / median_frequency_hz(samples, longest.rate_hz)
     rates = [side * late * period / longest.whole for late in LATE for side in (1.0, -1.0)]
     runs_on = (True, False) if any(part.start > 0 for part in parts) else (True,)
     clocks = [_clock_drift(channel, rate, on, parts) for rate in rates if abs(rate) < CLOCK_FASTEST for on in runs_on]
@@ -127,15 +127,15 @@ def _play(channel: _Channel, gap: float) -> Variant:
 
 
 def _undo_play(y: FloatArray, gap: float) -> FloatArray:
-    """(n,): the motion that drives a reading through a gap, half the gap ahead of it. It reverses at the reading's
-    extreme, slowly at first, and has crossed the gap where the reading reverses."""
+    """(n,): the motion that drives a reading through a backlash, half the gap ahead of it. It reverses at the reading's
+    extreme, and has crossed the gap where the reading reverses."""
     side = np.sign(bristle_bend(y, REVERSAL_OF_GAP * gap))
     ahead = 0.5 * side
     turns = np.flatnonzero(side[1:] * side[:-1] < 0) + 1
     for begin, turn in pairwise([0, *turns.tolist()]):
-        course = side[turn - 1] * y[begin:turn]
-        top = begin + int(np.argmax(course))
-        left = top + int(np.flatnonzero(course[top - begin :] > course.max() - REVERSAL_OF_GAP * gap)[-1])
+        excursion = side[turn - 1] * y[begin:turn]
+        top = begin + int(np.argmax(excursion))
+        left = top + int(np.flatnonzero(excursion[top - begin :] > excursion.max() - REVERSAL_OF_GAP * gap)[-1])
         crossed = (np.arange(top, turn) - top) / max(left - top, 1)
         ahead[top:turn] = side[turn - 1] * (0.5 - np.minimum(crossed, 1.0) ** 2)
     return np.asarray(y + gap * ahead)

@@ -20,10 +20,11 @@ from equalizer.signals.signal import FloatArray
 
 Base = ForceBase | AutoregressiveBase | SensorBase
 REACH = 2 * CONTRAST_WHITENING_ORDER
-"""Rows that ends of a part and rare gaps reach: by the filter that whitens, which begins from rest, and by what is left
-of those that differentiate. On real recordings, errors there were up to 20 times the rms."""
+"""Rows left out at the ends of a part and near rare gaps: the range of the whitening filter, which starts from rest,
+and of the differentiation. On real recordings, errors there were up to 20 times the rms."""
 FEWEST_ROWS = CONTRAST_BLOCKS * REACH
-"""Of each set. A block must be longer than errors are correlated: of shorter ones, resampling them says nothing."""
+"""Least rows of each set. A block must be longer than the correlation time of the errors: otherwise resampling is
+invalid."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,8 +51,8 @@ class Undone:
 
     rows: tuple[FloatArray, ...]
     lost: tuple[Mask, ...] | None = None
-    """Rows of which undoing leaves nothing known, readings from before the part began for instance: they stay as they
-    were, for to leave them out would be a gain where a part's ends fit worst."""
+    """Rows without known values after undoing, such as readings from before the part began: they keep their values,
+    because leaving them out would be a gain where a part fits worst at its ends."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,8 +126,8 @@ def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Strea
     everything = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
     columns = np.sqrt(np.mean(everything**2, axis=0))
     columns = np.where(columns > 0, columns, 1.0)
-    courses = [_residuals(rows[side], masks[side], columns) for side in (0, 1)]
-    colour = _whitening_filter([*courses[0], *courses[1]], [*masks[0], *masks[1]])
+    residuals = [_residuals(rows[side], masks[side], columns) for side in (0, 1)]
+    colour = _whitening_filter([*residuals[0], *residuals[1]], [*masks[0], *masks[1]])
     sides = []
     for parts, own, kept in zip((clean, other), rows, masks, strict=True):
         white = _whiten(colour, own, kept) / columns
@@ -147,8 +148,8 @@ def _settled(valid: Mask, gap_reach: int) -> Mask:
 
 
 def _reach_of_gaps(valid: Sequence[Mask]) -> int:
-    """`REACH`; 0 where single losses come so often that less than the main part of a set's rows would be left: what was
-    filled in over a sample or two is good enough then."""
+    """`REACH`; 0 where single losses are so frequent that most of a set's rows would be lost: interpolation over a
+    sample or two is then good enough."""
     whole, kept = (sum(int(_settled(mask, reach).sum()) for mask in valid) for reach in (0, REACH))
     return REACH if kept >= LEAST_KEPT * whole else 0
 
@@ -167,12 +168,12 @@ def _white_error(white: FloatArray) -> float:
 
 
 def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
-    courses = [np.where(mask, error, np.nan)[:, None] for error, mask in zip(errors, masks, strict=True)]
+    masked = [np.where(mask, error, np.nan)[:, None] for error, mask in zip(errors, masks, strict=True)]
     power = np.sum(
         [
-            lagged_products(course, CONTRAST_WHITENING_ORDER)[:, 0]
-            for course in courses
-            if len(course) > CONTRAST_WHITENING_ORDER
+            lagged_products(series, CONTRAST_WHITENING_ORDER)[:, 0]
+            for series in masked
+            if len(series) > CONTRAST_WHITENING_ORDER
         ],
         axis=0,
     )
@@ -215,9 +216,9 @@ def _lost_rows(stream: Stream, side: Side, undone: Sequence[Part]) -> tuple[Mask
 
 
 def _unit_of_curve(stream: Stream, side: Side, curve: Curve) -> float:
-    """The factor that takes back what a curve does to errors by its slope, which is no gain: to errors of one size
-    everywhere, by the geometric mean of the slope, or to those that a base of the side's own leaves, if that is more.
-    Else a curve would win that is flat where errors are large, or steep where the sets differ least."""
+    """The factor that corrects for the slope of a curve, which scales errors and is no gain: by the geometric mean of
+    the slope for errors of constant size, or by its effect on the errors of the side's own base, if that is larger.
+    Otherwise a curve would win that is flat where errors are large, or steep where the sets differ least."""
     weights = weights_of(side.white.T @ side.white) * stream.columns[0] / stream.columns
     rows = np.concatenate([part[mask] for part, mask in zip(side.rows, side.masks, strict=True)])
     errors = rows @ weights
@@ -234,7 +235,7 @@ def _source_of(base: Base) -> tuple[str, int]:
 
 
 def _spread_ratio(side: Side, rows: Sequence[FloatArray]) -> float:
-    """Standard deviation of the predicted signal before over after: a weaker actuator must not make all errors
-    smaller."""
+    """Ratio of the standard deviations of the predicted signal before and after: a weaker actuator must not reduce all
+    errors."""
     before, after = (float(np.std(np.concatenate([part[:, 0] for part in each]))) for each in (side.rows, rows))
     return before / after if after > 0 else 1.0

@@ -1,4 +1,4 @@
-"""Finds for each fault the variant and the size that leave least when they are undone."""
+"""Finds for each fault the variant and the size with the smallest error after undoing it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from analysis.diagnosis.types import TimeBudget
 
 ALL = tuple(range(CONTRAST_BLOCKS))
 VARIANTS_APPROACHED = 3
-"""Variants of a fault that are undone anew about their best sizes."""
+"""Number of variants of a fault that are linearised again about their best sizes."""
 
 Tried = tuple[Fit, Fault, Variant, list[Pair]]
 """A variant of a fault with its best size."""
@@ -24,7 +24,7 @@ class Trial:
     tried: list[Tried]
     """Each fault by its best variant; the one that leaves least first."""
     complete: bool
-    """All faults were tried before the time ran out."""
+    """Whether all faults were tried before the time ran out."""
 
 
 def try_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Trial:
@@ -61,8 +61,8 @@ def _error_of(tried: Tried) -> float:
 
 
 def _best_of(tried: Sequence[Tried], bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
-    """The variant that leaves least, after it was undone anew about its size. Of faults that are only of size 1 what
-    they say, several are, for at another size any of them may leave less than the true one."""
+    """The variant with the smallest error, after linearisation about its size. Of faults that are valid at size 1 only,
+    several are kept, because at another size any of them may have a smaller error than the true one."""
     first = min(tried, key=_error_of)
     if not first[2].exact:
         return _approach(first, bare, streams)
@@ -71,7 +71,7 @@ def _best_of(tried: Sequence[Tried], bare: Sequence[Pair], streams: Sequence[Str
 
 
 def _approach(found: Tried, bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
-    """The fault undone about the size that was found, again and again: beside it, the change was only extrapolated."""
+    """The fault linearised repeatedly about the size that was found: far from it, the change is only extrapolated."""
     best = _at_allowed_size(found)
     for _ in range(UNDOING_ROUNDS):
         fit, fault, variant, _ = found

@@ -19,7 +19,7 @@ def is_in_closed_loop(recording: Recording) -> bool:
         by_feedback = command - recording.excitation.samples
         return bool(_rms(by_feedback) > FED_BACK_SHARE * _rms(command))
     if recording.hold is not Hold.ZERO_ORDER:
-        # The command before a sample already depends on the one after it.
+        # The command written just before a sample may already depend on the sample after it.
         return False
     return any(_is_predicted_by_responses(command[:, axis], recording) for axis in range(command.shape[1]))
 
@@ -37,7 +37,7 @@ def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> boo
     own = np.column_stack([command[rows - back] for back in range(1, PAST + 1)] + [np.ones(len(rows))])
     others = np.column_stack([seen[rows - back] for back in range(PAST)])
     alone, helped = _residual_rms(command[rows], own), _residual_rms(command[rows], np.hstack([own, others]))
-    # A smooth command is predicted by its own past alone, and nothing can be said.
+    # A smooth command is predicted by its own past alone, so that the test has no power.
     return bool(alone > 1e-6 * _rms(command[:, None]) and helped < FORETOLD_SHARE * alone)
 
 

@@ -15,8 +15,8 @@ Stretch = tuple[int, int]
 
 
 def bridge_gaps(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """The recordings with gaps in their commands filled or cut out, and a sentence for each that was changed. One that
-    would lose too much stays as it is."""
+    """The recordings with gaps in their commands filled or cut out, and a sentence for each that was changed. A
+    recording of which too much would be lost is not changed."""
     found = [_bridge_or_cut(recording, name) for recording, name in zip(recordings, names, strict=True)]
     return tuple(each for each, _ in found), tuple(said for _, said in found if said)
 

@@ -1,8 +1,8 @@
 """Classifies the spectral lines of a periodic excitation: driven ones, and silent ones that detect distortion.
 
-A device that is linear answers on driven lines only. Where all driven lines are odd multiples of one, odd distortion
-falls on odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon 2016). Measured from the excitation as
-it was, so that any multisine with silent lines will do.
+A linear device responds on driven lines only. Where all driven lines are odd multiples of one, odd distortion falls on
+odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon 2016). The lines are taken from the measured
+excitation, so that any multisine with silent lines is suitable.
 """
 
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.lockin import ComplexArray
 
 _SILENT = 3e-3
-"""Amplitude of a line, of the strongest of its input, below which it counts as silent."""
+"""Largest amplitude of a silent line, relative to the strongest line of its input."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectionLines:
-    """Each (lines,), within the driven band."""
+    """Masks (lines,), within the driven band."""
 
     driven: Mask
     odd: Mask
@@ -37,8 +37,8 @@ class DetectionLines:
 
 
 def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines | None:
-    """excitation: (lines, inputs), line k in row k - 1. held: samples that each value of the command is held for; above
-    half its own rate there are its images only. None where nothing is driven."""
+    """excitation: (lines, inputs), line k in row k - 1. held: samples for which each value of the command is held;
+    above half of the command's own rate there are only images. None where nothing is driven."""
     size = np.abs(excitation)
     size[(len(size) + 1) // held :] = 0
     strongest = size.max()
@@ -60,6 +60,6 @@ def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines |
 
 
 def hold_length(command: npt.NDArray[np.float64]) -> int:
-    """Over how many samples each value of the command is held. command: (n, inputs)"""
+    """Number of samples for which each value of the command is held. command: (n, inputs)"""
     moves = np.flatnonzero(np.any(np.diff(command, axis=0) != 0, axis=1))
     return int(np.gcd.reduce(np.diff(moves))) if len(moves) > 16 else 1

@@ -2,9 +2,9 @@
 
 The statistic is the multiple coherence at the lines that the commands drive (Bendat and Piersol, Random Data, 4th ed.,
 7.3), which for K stretches of noise and r independent commands follows a beta distribution with r and K - r degrees of
-freedom. Stretches of a short recording may be shorter than the device's memory, so a response that the commands' past
-predicts on held-out samples counts, too. So does one that predicts its command: beside dry friction or under control, a
-slow force that follows the motion may be hidden below a command's own noise.
+freedom. Stretches of a short recording may be shorter than the device's memory, so that a response also counts as
+driven if the past commands predict it on held-out samples, or if it predicts its command: with dry friction or under
+control, a slow force that follows the motion may be hidden below the command's own noise.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,30 +18,30 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import hann
 
 STRETCHES = 12
-"""Per command."""
+"""Number of stretches per command."""
 DRIVEN = 0.01
-"""Power of a driven line, over the strongest line's, at least."""
+"""Least power of a driven line, relative to the strongest line."""
 SHARED_BY_WINDOW = 2.0
-"""Lines that count as one: neighbours are correlated by the Hann window."""
+"""Number of neighbouring lines that count as one independent line, because the Hann window correlates them."""
 RANK = 1e-6
 MEMORY, MOST_TAPS, RIDGE = 0.1, 100, 1e-3
-"""Share of a recording that the predicting filter spans, its numbers per command at most, and its ridge."""
+"""Share of a recording that the predicting filter spans, most coefficients per command, and ridge parameter."""
 
 
 def response_significance(recordings: Sequence[Recording]) -> float | None:
     """Excess coherence of the best response channel in standard deviations of that of noise; None where the recordings
-    are too short to tell. recordings: alike, commands without gaps."""
+    are too short. recordings: alike, commands without gaps."""
     inputs, outputs = _spectra(recordings)
     if not len(inputs):
         return None
     power = (np.abs(inputs) ** 2).sum(axis=(0, 2))
     lines = np.flatnonzero(power > DRIVEN * power.max(initial=0.0))
     lines = lines[lines > 0]
-    looks = [look for line in lines if (look := _coherence(inputs[:, line], outputs[:, line])) is not None]
-    if not looks:
+    coherences = [value for line in lines if (value := _coherence(inputs[:, line], outputs[:, line])) is not None]
+    if not coherences:
         return None
-    found, expected, variance = (np.array(column) for column in zip(*looks, strict=True))
-    spread = np.sqrt(SHARED_BY_WINDOW * variance.sum()) / len(looks)
+    found, expected, variance = (np.array(column) for column in zip(*coherences, strict=True))
+    spread = np.sqrt(SHARED_BY_WINDOW * variance.sum()) / len(coherences)
     if (ANSWER_COHERENCE - expected.mean()) / spread < 2 * ANSWER_DEVIATIONS:
         return None
     sure = float(((found.mean(axis=0) - expected.mean()) / spread).max())
@@ -98,10 +98,8 @@ def _lines(samples: FloatArray, window: FloatArray) -> ComplexArray:
 
 
 def _coherence(u: ComplexArray, y: ComplexArray) -> tuple[FloatArray, float, float] | None:
-    """(p,): the share of each response's power that the commands bring; with its mean and variance for noise.
-
-    u: (stretches, inputs), y: (stretches, outputs). None where too few stretches drive the line.
-    """
+    """(p,): coherence, the share of each response's power that the commands explain; with its mean and variance for
+    noise. u: (stretches, inputs), y: (stretches, outputs). None where too few stretches drive the line."""
     basis, size, _ = np.linalg.svd(u, full_matrices=False)
     basis = basis[:, size > RANK * size.max()]
     stretches, rank = basis.shape

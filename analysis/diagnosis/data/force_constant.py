@@ -14,7 +14,7 @@ PUSHED = {"m": ("force", "N"), "rad": ("torque", "N m")}
 
 
 class NoForceConstant(ValueError):  # noqa: N818 - an answer that a user reads
-    """The constants do not go with the recording; a sentence without a full stop."""
+    """The constants do not fit the recording; a sentence without a full stop."""
 
 
 def with_force_constant(recording: Recording, constants: Sequence[float]) -> tuple[Recording, str]:

@@ -12,15 +12,15 @@ _FORCES = frozenset({"force", "torque"})
 
 
 def is_driven(recordings: Sequence[Recording]) -> bool:
-    """Whether any command changes, in a recording or between them; True where none holds a number."""
+    """Whether any command changes, in a recording or between recordings; True where no command has a finite sample."""
     commands = np.vstack([each.command.samples for each in recordings])
     commands = commands[np.isfinite(commands).all(axis=1)]
     return len(commands) == 0 or bool(np.any(np.ptp(commands, axis=0) != 0))
 
 
 def as_force_driven(recording: Recording) -> Recording:
-    """The measured force as the command and the imposed motion as the response, and `imposed` in its meta; any other
-    recording as it is."""
+    """The recording with the measured force as the command, the imposed motion as the response, and `imposed` in its
+    meta; a recording with a changing command is not changed."""
     moves = set(recording.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
     pushes = set(recording.response.quantities) <= _FORCES
     if not (moves and pushes and len(recording.command.channels) >= len(recording.response.channels)):

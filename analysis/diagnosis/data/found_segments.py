@@ -1,7 +1,7 @@
-"""Finds periodic segments in a recording that names none: parts whose command repeats exactly.
+"""Finds periodic segments in a recording that declares none: parts whose command repeats exactly.
 
-A period is only stated where the command itself, sample by sample, is the same one period later, all through the part:
-what was measured with noise, or repeats nearly, is left without. Where no part repeats, nothing is stated at all.
+A period is accepted only where the command itself, sample by sample, repeats throughout the part; commands that were
+measured with noise, or repeat approximately, are not used. Without such a part, no segments are declared.
 """
 
 from collections.abc import Sequence
@@ -16,23 +16,23 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
 SHORTEST = 16
-"""Samples of a period that is looked for."""
+"""Shortest period that is searched for, in samples."""
 LEAST_WHOLE = 3
-"""Periods of a part: the first holds the transient, and noise shows between two."""
+"""Least number of periods of a part: the first contains the transient, and noise needs two more."""
 LEAST_BY_ITSELF = 256
-"""Samples, as many as a diagnosis needs: of a shorter period an odd multiple is stated, for odd lines must stay odd."""
+"""Least period in samples for a diagnosis: of a shorter one an odd multiple is declared, so that odd lines stay odd."""
 ALIKE, DIPPED = 0.98, 0.7
-"""Correlation of a command with itself a period later, and to which it must have fallen in between."""
+"""Least correlation of a command with itself one period later, and level below which it must fall in between."""
 EXACT = 1e-6
-"""Difference of a command between periods at most, over its peak: rounding of numbers stored with six digits."""
+"""Largest difference of a command between periods, relative to its peak: rounding of numbers stored with six digits."""
 ROUNDED = 1e-3
-"""Rms difference between periods by different rounding at most, over the command's rms."""
+"""Largest rms difference between periods due to rounding, relative to the command's rms."""
 MOST_SAMPLES = 2**19
 
 
 def find_segments(recording: Recording) -> tuple[Recording, str]:
     """The recording with the segments found, and a sentence about them; unchanged and without a sentence where it has
-    segments, or where no part of its command repeats."""
+    segments, or no part of its command repeats."""
     if recording.segments:
         return recording, ""
     parts = parts_of(recording)
@@ -64,7 +64,7 @@ def exact_period(command: FloatArray) -> int:
         return 0
     if period >= LEAST_BY_ITSELF:
         return period
-    # As long as more periods are left than decisions are made by; what repeats is alike, so any multiple is a period.
+    # While enough periods are left for the noise estimate; any multiple of a period is a period.
     times = len(command) // period // (MOST_PERIODS + 1)
     multiple = period * max(1, times - 1 + times % 2)
     return multiple if multiple >= LEAST_BY_ITSELF else 0
@@ -84,7 +84,7 @@ def find_period(command: FloatArray) -> int:
     after = np.flatnonzero(correlation[dips[0] :] > ALIKE) + dips[0]
     if not len(after) or after[0] < SHORTEST:
         return 0
-    # The top of the first hill that is high enough.
+    # First local maximum that is high enough.
     last = after[0] + int(np.argmax(np.diff(np.append(after, after[-1] + 2)) > 1))
     return int(after[0] + np.argmax(correlation[after[0] : last + 1]))
 
@@ -102,7 +102,7 @@ def _correlation(samples: FloatArray) -> FloatArray:
 
 
 def _is_same(later: FloatArray, before: FloatArray) -> bool:
-    """Whether each channel is the same, but for rounding."""
+    """Whether each channel repeats, up to rounding."""
     if not np.isfinite(later).all() or not np.isfinite(before).all():
         return False
     for column, other in zip(later.T, before.T, strict=True):

@@ -1,5 +1,5 @@
-"""The frequency bands of a diagnosis: octaves that begin at powers of two, alike for all recordings, so that what was
-learned of a band on one is known on another."""
+"""The frequency bands of a diagnosis: octaves that begin at powers of two, the same for all recordings, so that results
+for a band of different recordings can be compared."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ Band = tuple[float, float]
 
 
 def octaves_between(from_hz: float, to_hz: float) -> tuple[Band, ...]:
-    """Every octave that holds a part of it; a last line on an edge opens its own octave. Both must be positive."""
+    """All octaves that overlap the interval; a last line on an edge opens its own octave. Both must be positive."""
     first = int(np.floor(np.log2(from_hz) + 1e-9))
     last = int(np.floor(np.log2(to_hz) + 1e-9))
     return tuple((2.0**power, 2.0 ** (power + 1)) for power in range(first, last + 1))
@@ -22,8 +22,8 @@ def lines_in_band(frequency_hz: FloatArray, band_hz: Band) -> Mask:
 
 
 def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[str, ...]:
-    """Which inputs were driven in a segment. power: (inputs,). An input that only reacts, by a feedback, stays below a
-    hundredth of the strongest where the excitation was recorded."""
+    """Names of the inputs that were driven in a segment. power: (inputs,). An input that only reacts, by feedback,
+    stays below a hundredth of the strongest where the excitation was recorded."""
     if power.max(initial=0.0) == 0:
         return ()
     return tuple(name for name, strength in zip(channels, power, strict=True) if strength > _DRIVEN * power.max())

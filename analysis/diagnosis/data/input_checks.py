@@ -1,15 +1,15 @@
-"""Input checks of a diagnosis: recordings of one device, a model of that device, enough data. What fails is refused and
-gets no verdict, not even `unexplained`."""
+"""Input checks of a diagnosis: recordings of one device, a model of that device, enough data. Recordings that fail are
+refused and get no verdict, not even `unexplained`."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
 
-from analysis.diagnosis.data.as_recorded import weight_problems
 from analysis.diagnosis.data.driven_response import response_significance
-from analysis.diagnosis.data.growth import free_motion_rates, growth_rate
+from analysis.diagnosis.data.growth_rate import free_motion_rates, growth_rate
 from analysis.diagnosis.data.observed_parts import samples_to_fit
+from analysis.diagnosis.data.recorded_conditions import weight_problems
 from analysis.diagnosis.settings import (
     ANSWER_DEVIATIONS,
     CYCLES_SHARE,
@@ -28,7 +28,7 @@ from equalizer.signals.signal import Signal
 
 
 class NothingToDiagnose(ValueError):  # noqa: N818 - an answer that a user reads
-    """`problems`: one sentence each, without a full stop."""
+    """The recordings cannot be diagnosed. `problems`: one sentence each, without a full stop."""
 
     def __init__(self, problems: tuple[str, ...]) -> None:
         super().__init__("; ".join(problems))
@@ -55,8 +55,8 @@ def require_alike(
 
 
 def require_something(recordings: Sequence[Recording], names: Sequence[str], short: bool = False) -> tuple[str, ...]:
-    """Requires a command without gaps and responses that change and depend on it, for long enough. short: a little too
-    short is a sentence that is returned, and no refusal. Raises NothingToDiagnose."""
+    """Requires a command without gaps, and responses that change and depend on it, for long enough. short: a slightly
+    short recording gives a returned sentence instead of a refusal. Raises NothingToDiagnose."""
     problems = [
         problem for recording, name in zip(recordings, names, strict=True) for problem in _gaps(recording.command, name)
     ]
@@ -90,7 +90,7 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str], sho
 
 
 def is_too_short_to_name(recordings: Sequence[Recording]) -> bool:
-    """Whether recordings are so short that any law explains them about as well as another."""
+    """Whether recordings are so short that other laws would explain them about as well."""
     known = _answered_samples(recordings)
     return known < SHORTEST_SAMPLES and known / recordings[0].sample_rate_hz < SHORTEST_S
 
@@ -114,7 +114,7 @@ def _shortness(recordings: Sequence[Recording]) -> Iterator[str]:
 
 
 def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> None:
-    """Requires recordings that differ: one given twice would be tested by what it was fitted to. Raises
+    """Requires recordings that differ: a duplicate would be tested by the data that it was fitted to. Raises
     NothingToDiagnose."""
     problems = [
         f"{names[two]} holds the same samples as {names[first]}, and a recording counts once"
@@ -127,7 +127,7 @@ def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> 
 
 
 def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) -> None:
-    """Requires a model that can be of the recordings' device. recordings: alike. Raises NothingToDiagnose."""
+    """Requires a model that fits the recordings' device. recordings: alike. Raises NothingToDiagnose."""
     first = recordings[0]
     names = [recording.device or f"recording {number}" for number, recording in enumerate(recordings, 1)]
     problems = (
@@ -188,7 +188,8 @@ def _constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
 
 
 def _command_cycles(recording: Recording) -> float:
-    """Cycles of the frequency below which most of the command's power lies, its mean left out."""
+    """Number of cycles in the recording of the frequency below which most of the command's power lies, its mean
+    removed."""
     power = (np.abs(np.fft.rfft(recording.command.samples, axis=0)) ** 2).sum(axis=1)
     power[0] = 0.0
     return float(np.searchsorted(np.cumsum(power), CYCLES_SHARE * power.sum())) if power.any() else 0.0
@@ -220,7 +221,7 @@ def _unlike_quantities(model: MechanicalModel, recording: Recording) -> Iterator
 
 
 def _is_rotational(recording: Recording) -> bool | None:
-    """Whether the response is an angle or its derivative; None where the units do not tell, such as volts."""
+    """Whether the response is an angle or its derivative; None where the units do not determine it, such as volts."""
     units = recording.response.units
     if any(unit.split("/")[0] == "rad" for unit in units):
         return True
@@ -237,7 +238,7 @@ def _impossible_model_values(model: MechanicalModel) -> Iterator[str]:
 
 
 def _unconnected_channels(model: MechanicalModel, recording: Recording) -> Iterator[str]:
-    """Inputs of the model that drive nothing, or the same motion, and outputs that see nothing."""
+    """Inputs of the model that drive nothing, or the same motion as another, and outputs that measure nothing."""
     idle = [name for name, column in zip(recording.command.channels, model.input.T, strict=True) if not column.any()]
     blind = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
     if idle:

@@ -11,19 +11,19 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 FREE = "free"
-"""Of a recording's `meta["imposed"]`."""
+"""Value of `meta["imposed"]` of a free (undriven) motion."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredMotion:
     position: FloatArray
-    """(n, m), finite, of the rows of the model's first m outputs."""
+    """(n, m), finite: positions of the model's first m outputs."""
     noise: FloatArray
     """(lines, m): density of its noise, as `ChannelNoise.density`; NaN where unknown."""
 
 
 def has_motion(recording: Recording, model: MechanicalModel) -> bool:
-    """Whether positions or velocities of every driven axis were measured: accelerations tell nothing of slow forces."""
+    """Whether positions or velocities of every driven axis were measured: accelerations do not show slow forces."""
     return model.outputs >= model.inputs and (
         _has_position(recording, model) or DERIVATIVE_OF_QUANTITY[model.quantity] < 2
     )
@@ -51,7 +51,7 @@ def _has_position(recording: Recording, model: MechanicalModel) -> bool:
 
 
 def fill_gaps(samples: FloatArray) -> FloatArray:
-    """Samples (n, k), interpolated across what is missing; zero where a channel holds nothing."""
+    """Samples (n, k), interpolated across gaps; zero where a channel has no finite sample."""
     whole, places = np.array(samples, dtype=np.float64), np.arange(len(samples))
     for column in whole.T:
         known = np.isfinite(column)
@@ -63,8 +63,8 @@ def fill_gaps(samples: FloatArray) -> FloatArray:
 
 
 def is_quasi_static(recording: Recording) -> bool:
-    """Whether no time is known, and a position was measured (or no motion): then forces are compared as they stand
-    beside the positions. Where speeds or accelerations alone were measured, samples are counted as their time."""
+    """Whether the time axis is unknown and a position was measured (or no motion): forces are then compared against the
+    positions, sample by sample. Where only speeds or accelerations were measured, samples are counted as time."""
     quantities = [
         quantity for signal in (recording.position, recording.response) if signal for quantity in signal.quantities
     ]
@@ -73,11 +73,12 @@ def is_quasi_static(recording: Recording) -> bool:
 
 
 def is_read_as_free(recording: Recording) -> bool:
-    """Whether nothing drove the motion, and the command is the force per unit mass that it shows; see
+    """Whether the motion was not driven, so that the command is the force per unit mass that it implies; see
     `first_model.free_motion`."""
     return recording.meta.get("imposed") == FREE
 
 
 def time_unit(recording: Recording) -> str:
-    """ "sample" where no time is known: what hangs on time then hangs on the samples' numbers."""
+    """ "sample" where the time axis is unknown, the unit of time otherwise: quantities that depend on time are then per
+    sample."""
     return "s" if recording.is_timed else "sample"

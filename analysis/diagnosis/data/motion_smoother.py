@@ -1,7 +1,7 @@
-"""States of a model, and the force along each axis that it lacks, estimated from measurements by a Kalman smoother.
+"""States of a model, and the missing force along each axis, estimated from measurements by a Kalman smoother.
 
-The missing force is modelled as a random walk (a latent force, Alvarez and others 2009; Rogers and
-Friis 2021). Unlike deconvolution this works for plants that drift.
+The missing force is modelled as a random walk (a latent force, Alvarez and others 2009; Rogers and Friis 2021). Unlike
+deconvolution this works for plants that drift.
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,14 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 EXPECTED = 0.1
-"""Rms change of a missing force within `CHANGES_S`, over the command's rms."""
+"""Rms change of a missing force within `CHANGES_S`, relative to the command's rms."""
 CHANGES_S = 0.005
 """Time in s in which a missing force may change by `EXPECTED`."""
 _LEAK = 1e-5
-"""Share of the state that is forgotten per sample: without it, states that no sensor observes have no steady filter."""
+"""Share of the state that is forgotten per sample: without it, unobservable states have no steady-state filter."""
 _PROCESS_NOISE = 1e-12
-"""Process noise of all states per sample, in their own size: without it the Riccati equation has no stable solution."""
+"""Process noise of all states per sample, relative to their size: without it the Riccati equation has no stabilising
+solution."""
 _DOUBLINGS = 40
 _MATRIX = types.float64[:, ::1]
 _READ = types.Array(types.float64, 2, "C", readonly=True)
@@ -33,29 +34,30 @@ _READ = types.Array(types.float64, 2, "C", readonly=True)
 @njit(types.void(_MATRIX, _MATRIX, _MATRIX, _MATRIX, _READ, _READ, _MATRIX), cache=True, nogil=True)
 def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its products out
     advance: FloatArray,
-    look: FloatArray,
+    observation: FloatArray,
     gain: FloatArray,
     back: FloatArray,
     pushed: FloatArray,
-    seen: FloatArray,
+    measured: FloatArray,
     out: FloatArray,
 ) -> None:
-    """out (n, s): the states. advance (s, s), look (c, s), gain (s, c), back (s, s): see `motion_smoother`. pushed
-    (n, s): what is added over the step that begins there. seen (n, c): NaN where nothing was."""
-    n, s, c = out.shape[0], out.shape[1], look.shape[0]
+    """Fill out (n, s), the smoothed states. advance (s, s), observation (c, s), gain (s, c), back (s, s): see
+    `motion_smoother`. pushed (n, s): input of the step that begins at a sample. measured (n, c): NaN where nothing was
+    measured."""
+    n, s, c = out.shape[0], out.shape[1], observation.shape[0]
     predicted = np.empty((n, s))
     state = out[0].copy()
     for k in range(n):
         predicted[k] = state
         known = True
         for i in range(c):
-            known = known and not np.isnan(seen[k, i])
+            known = known and not np.isnan(measured[k, i])
         if known:
             off = np.empty(c)
             for i in range(c):
-                total = seen[k, i]
+                total = measured[k, i]
                 for j in range(s):
-                    total -= look[i, j] * predicted[k, j]
+                    total -= observation[i, j] * predicted[k, j]
                 off[i] = total
             for j in range(s):
                 for i in range(c):
@@ -87,33 +89,41 @@ class SmoothedMotion:
 
 
 def smooth_motion(model: MechanicalModel, record: Observed, forces: FloatArray, unit: FloatArray) -> SmoothedMotion:
-    """forces: (n, m), what enters along the axes over each sample's time, effects included. unit: (c,), standard
-    deviations of the measured channels. Raises numpy.linalg.LinAlgError where no filter exists."""
+    """States and missing force of a record. forces: (n, m), force along the axes over each sample's time, effects
+    included. unit: (c,), standard deviations of the measured channels. Raises numpy.linalg.LinAlgError where no filter
+    exists."""
     rate_hz, m = record.recording.sample_rate_hz, model.inputs
     steps, size = linear_steps(model, 1 / rate_hz), 2 * model.coordinates
     advance = np.eye(size + m)
     advance[:size, :size], advance[:size, size:] = steps.advance, steps.by_axis_force
     advance *= 1 - _LEAK
-    look, direct = _observation_matrices(steps, record.measured.shape[1])
+    observation, direct = _observation_matrices(steps, record.measured.shape[1])
     expected = EXPECTED * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12
     walk = np.concatenate([np.zeros(size), expected**2 / (CHANGES_S * rate_hz)])
-    gain, back = _smoother_gains(advance, look / unit[:, None], walk, _state_sizes(steps, expected))
+    gain, back = _smoother_gains(advance, observation / unit[:, None], walk, _state_sizes(steps, expected))
     gain = gain / unit[None, :]
-    seen = _subtract_feedthrough(model, record, forces, direct)
+    measured = _subtract_feedthrough(model, record, forces, direct)
     pushed = np.hstack([forces @ steps.by_axis_force.T, np.zeros((len(forces), m))])
     out = np.zeros((len(forces), size + m))
-    first = seen[np.isfinite(seen).all(axis=1)][:1]
+    first = measured[np.isfinite(measured).all(axis=1)][:1]
     if len(first):
-        out[0] = np.linalg.pinv(look, rcond=1e-6) @ first[0]
+        out[0] = np.linalg.pinv(observation, rcond=1e-6) @ first[0]
     smooth(
-        advance, look, np.ascontiguousarray(gain), back, np.ascontiguousarray(pushed), np.ascontiguousarray(seen), out
+        advance,
+        observation,
+        np.ascontiguousarray(gain),
+        back,
+        np.ascontiguousarray(pushed),
+        np.ascontiguousarray(measured),
+        out,
     )
     moved = out[:, :size] @ steps.motion[: 2 * m].T
     return SmoothedMotion(out[:, :size], moved[:, :m], moved[:, m:], out[:, size:])
 
 
 def _observation_matrices(steps: LinearSteps, channels: int) -> tuple[FloatArray, FloatArray]:
-    """(c, s + m) of the state and the missing force; (c, m) of the force that acted just before."""
+    """Observation matrix (c, s + m) of the state and the missing force; and (c, m) of the force that acted just
+    before."""
     p, m = len(steps.position), steps.by_axis_force.shape[1]
     of_state = np.vstack([steps.response, steps.position])[:channels]
     of_force = np.vstack([steps.response_by_axis_force, np.zeros((p, m))])[:channels]
@@ -123,11 +133,11 @@ def _observation_matrices(steps: LinearSteps, channels: int) -> tuple[FloatArray
 def _subtract_feedthrough(
     model: MechanicalModel, record: Observed, forces: FloatArray, direct: FloatArray
 ) -> FloatArray:
-    seen, p = np.array(record.measured), model.outputs
+    measured, p = np.array(record.measured), model.outputs
     if model.sensor.bandwidth_hz > 0:
-        seen[:, :p] = undo_low_pass(seen[:, :p], record.recording.sample_rate_hz, model.sensor.bandwidth_hz)
-    seen[1:] -= forces[:-1] @ direct.T
-    return seen
+        measured[:, :p] = undo_low_pass(measured[:, :p], record.recording.sample_rate_hz, model.sensor.bandwidth_hz)
+    measured[1:] -= forces[:-1] @ direct.T
+    return measured
 
 
 def _state_sizes(steps: LinearSteps, expected: FloatArray) -> FloatArray:
@@ -139,16 +149,16 @@ def _state_sizes(steps: LinearSteps, expected: FloatArray) -> FloatArray:
 
 
 def _smoother_gains(
-    advance: FloatArray, look: FloatArray, walk: FloatArray, large: FloatArray
+    advance: FloatArray, observation: FloatArray, walk: FloatArray, large: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Gains of the Kalman filter (s, c) and of the backward pass (s, s). look: observation matrix of channels in units
-    of their noise. Solved in units in which all states have about the same size."""
-    eye = np.eye(len(look))
-    scaled, observed = advance * large[None, :] / large[:, None], look * large[None, :]
+    """Gains of the Kalman filter (s, c) and of the backward pass (s, s). observation: observation matrix of channels in
+    units of their noise. Solved with all states scaled to about the same size."""
+    eye = np.eye(len(observation))
+    scaled, observed = advance * large[None, :] / large[:, None], observation * large[None, :]
     process_noise = np.diag(walk / large**2) + _PROCESS_NOISE * np.eye(len(advance))
     try:
         predicted = _steady_covariance(scaled, observed, process_noise)
-    except np.linalg.LinAlgError:  # states of very different sizes: slower, by an ordered Schur form
+    except np.linalg.LinAlgError:  # states of very different sizes: by an ordered Schur form, which is slower
         predicted = _covariance_by_schur_form(scaled, observed, process_noise)
     gain = np.linalg.solve(observed @ predicted @ observed.T + eye, observed @ predicted).T
     if np.abs(np.linalg.eigvals(scaled - scaled @ gain @ observed)).max() >= 1:
@@ -162,7 +172,7 @@ def _covariance_by_schur_form(advance: FloatArray, observed: FloatArray, process
     """As `_steady_covariance`. Raises numpy.linalg.LinAlgError."""
     try:
         return np.asarray(solve_discrete_are(advance.T, observed.T, process_noise, np.eye(len(observed))))
-    except ValueError as problem:  # what is not finite
+    except ValueError as problem:  # not finite
         raise np.linalg.LinAlgError(str(problem)) from problem
 
 

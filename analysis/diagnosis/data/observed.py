@@ -71,11 +71,11 @@ class Observed:
         return found & self.test
 
     def fit_to_all(self) -> "Observed":
-        """With the samples to choose by fitted to as well, for what was chosen by other means."""
+        """The record with the validation samples added to the fit samples, for explanations chosen by other means."""
         return replace(self, fit=self.fit | self.choose, choose=self.fit | self.choose)
 
     def shorten(self) -> "Observed":
-        """Cut after the last sample to fit or to choose by; the recording itself stays whole."""
+        """The record without the samples after the last one to fit or to choose by; its recording is not cut."""
         end = int(np.flatnonzero(self.fit | self.choose)[-1]) + 1 if (self.fit | self.choose).any() else len(self.fit)
         sealed = np.zeros(end, dtype=np.bool_)
         return Observed(
@@ -103,7 +103,7 @@ def measured_signals(recording: Recording, responses: int) -> tuple[FloatArray, 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A part of a recording: its first sample, and the ones after the last that moves and after its last."""
+    """A part of a recording: its first sample, the end of its motion, and its end (both exclusive)."""
 
     start: int
     end_of_motion: int
@@ -111,8 +111,8 @@ class Span:
 
 
 def moving_spans(response: FloatArray, parts: Sequence[tuple[int, int]]) -> tuple[Span, ...]:
-    """Where each part moves: until the last sample at which any channel is away from where it rests at the part's end.
-    Noise above `AT_REST` of a channel's range counts as motion. response: (n, p)."""
+    """Parts with the end of their motion: the last sample at which any channel differs from its rest at the part's end
+    by more than `AT_REST` of its range. response: (n, p)."""
     return tuple(Span(start, start + _end_of_motion(response[start:stop]), stop) for start, stop in parts)
 
 
@@ -126,21 +126,23 @@ def _end_of_motion(samples: FloatArray) -> int:
     moves = np.flatnonzero(away.any(axis=1))
     if not len(moves) or moves[-1] >= last:
         return len(samples)
-    # A step that settles at once would leave next to nothing to fit to.
+    # A step response that settles at once would leave almost no samples to fit.
     return max(int(moves[-1]) + 1, len(samples) // 2)
 
 
 def roles(
     segments: tuple[Segment, ...], length: int, tested: bool = False, spans: Sequence[Span] = ()
 ) -> tuple[Mask, Mask, Mask]:
-    """Samples to fit, to choose and to test by: (length,) each. tested: another recording is there to test by. spans:
-    of its parts; none = the whole.
+    """Masks (length,) of the samples to fit, to choose and to test by. tested: another recording is held out for the
+    test. spans: the recording's parts; empty = one part.
 
-    What is marked as test stays sealed. Where nothing is, the end of each segment is, whole periods of it, so that
-    every level is tested by; of a single level, the end of the time. Of the rest, the middle level of three or more is
-    kept back to choose by, for laws differ in how they grow with the level, and further periods of a level that was
-    fitted to show only noise; else the last quarter of the time is. Without segments, the last quarter of each
-    part's motion is held out; the rest behind it, which may hold a force but no motion, is fitted to.
+    Segments marked as test are held out. Without such marks, the end of each segment is held out, in whole periods, so
+    that every level is tested; of a single level, the end of the time. Of the rest, the middle one of three or more
+    levels is kept to choose by: laws differ in how they grow with the level, whereas further periods of a fitted level
+    only show noise. Otherwise the last quarter of the time is kept.
+
+    Without segments, the last quarter of each part's motion is held out; the rest period after it, which may show a
+    force but no motion, is fitted.
     """
     if not segments:
         return _roles_without_segments(spans or (Span(0, length, length),), length, tested)
@@ -171,7 +173,8 @@ def _roles_without_segments(spans: Sequence[Span], length: int, tested: bool) ->
 
 
 def error_units(measured: FloatArray, noise: FloatArray) -> FloatArray:
-    """(c,): unit of each channel's errors: its noise and, in quadrature, a share of its rms below which no model is."""
+    """(c,): unit of each channel's errors: its noise and, added in quadrature, the share of its rms that no model
+    reaches."""
     rms = np.sqrt(np.nanmean(measured**2, axis=0))
     return np.asarray(np.sqrt(noise**2 + (MODEL_FLOOR * rms) ** 2))
 

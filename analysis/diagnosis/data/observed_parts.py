@@ -12,17 +12,15 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
 MOST_PERIODS = 4
-"""Periods of a segment that decisions are made by: more of them repeat what is known, and take time."""
+"""Most periods of a segment that are used: further ones add time and little information."""
 LEAST_SAMPLES = 32
-"""Samples of a part that is worth comparing, at least."""
+"""Least samples of a part."""
 
 
 def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Observed, ...]:
-    """One per part of each recording. responses: how many position channels belong to the model's outputs.
-
-    Roles are those of the whole: where any recording has something to test, no other gives some of itself; where all
-    is marked as test, nothing is.
-    """
+    """Parts of all recordings, ready for comparison. responses: number of position channels that belong to the model's
+    outputs. Roles are those of the whole set: where any recording is marked for the test, no other gives up samples for
+    it; where all are marked as test, none is held out."""
     marked = [segment.role for recording in recordings for segment in recording.segments]
     if marked and all(role == "test" for role in marked):
         recordings = [_clear_roles(recording) for recording in recordings]
@@ -46,8 +44,8 @@ def samples_to_fit(recordings: Sequence[Recording]) -> int:
 
 
 def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
-    """The masks without surplus periods. Where nothing new is left to choose by, the last quarter of the fit samples
-    is taken for it."""
+    """The masks without surplus periods. Where no validation samples are left, the last quarter of the fit samples is
+    used."""
     if (choose & new).any() or not (fit & new).any():
         return fit & new, choose & new
     places = np.flatnonzero(fit & new)
@@ -112,7 +110,7 @@ def _clear_roles(recording: Recording) -> Recording:
 
 
 def names_of_parts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
-    """Names of the parts in the order of `observed_parts`: the recording's, with the part's number where there are
+    """Names of the parts in the order of `observed_parts`: the recording's name, with the part's number where there are
     several."""
     found: list[str] = []
     for number, recording in enumerate(recordings):

@@ -1,7 +1,7 @@
 """Adds the constant command of the operating point that a linear model lacks.
 
-A linear model that was fitted to what changes holds no constants: the level that a constant command keeps, or the zero
-of a sensor. Played from the command as it is, it misses by far more than by its dynamics.
+A linear model that was fitted to changes has no constants: neither the command at the operating point nor the zero of a
+sensor. Without them, its simulation has an offset far larger than the errors of its dynamics.
 """
 
 from collections.abc import Sequence
@@ -15,12 +15,12 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 SOFTEST = 1e-6
-"""Smallest over largest stiffness at least, for a position to be held at all."""
+"""Least ratio of the smallest to the largest stiffness for which a position is held at all."""
 
 
 def about_operating_point(recordings: Sequence[Recording], model: MechanicalModel) -> tuple[Recording, ...] | None:
     """The recordings with a constant added to their commands, with which the model keeps the mean measured position of
-    the fit samples. None where the response is no position, or no stiffness holds it."""
+    the fit samples. None where the response is not a position, or no stiffness holds it."""
     if DERIVATIVE_OF_QUANTITY[model.quantity] != 0:
         return None
     size = np.linalg.svd(model.stiffness, compute_uv=False)

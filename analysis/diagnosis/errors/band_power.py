@@ -1,7 +1,8 @@
 """Error measure for impacts: the power of each channel in each band and segment, because waveforms are unpredictable.
 
-The logarithm of the amplitude in half octaves (Welch's spectra over 1 s), the noise counted in. Two motions of a device
-that rattles, apart at first by less than any sensor sees, agree in it to a few per cent.
+The logarithm of the amplitude in half octaves (Welch's spectra over 1 s), the noise counted in. Two simulations of a
+rattling device whose initial states differ by less than any sensor resolves agree in it to a few per cent, while their
+waveforms do not (chaos).
 """
 
 from collections.abc import Sequence
@@ -19,18 +20,18 @@ from equalizer.signals.spectral_density import spectral_density
 
 WINDOW_S, OCTAVES = 1.0, 0.5
 LOWEST, HIGHEST = 2.0, 0.48
-"""Edges of the bands: over a window's own line, and over the rate."""
+"""Edges of the bands, relative to a window's own line, and relative to the sample rate."""
 LONGEST_S, LEAST = 8.0, 256
-"""Length of a stretch without segments at most, and samples of any stretch at least."""
+"""Longest stretch without segments, and least samples of any stretch."""
 HEARD = 4.0
-"""Power of a band over the noise's, from which on it counts."""
+"""Least ratio of a band's power to the noise's."""
 PARTS = ("fit", "choose", "test")
 Residuals = tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Samples of one record that count for one purpose."""
+    """Samples of one record with one role (fit, choose or test)."""
 
     record: int
     first: int
@@ -62,8 +63,8 @@ class BandPower:
     def predict(self, residuals: Residuals) -> FloatArray:
         """(stretches, bands, c): logarithm of the predicted amplitude, the noise's power added."""
         unit = self.measure.unit
-        courses = [r.measured - left * unit for r, left in zip(self.measure.records, residuals, strict=True)]
-        return np.asarray(0.5 * np.log(self._power(courses) + self._noise))
+        predicted = [r.measured - left * unit for r, left in zip(self.measure.records, residuals, strict=True)]
+        return np.asarray(0.5 * np.log(self._power(predicted) + self._noise))
 
     def misfits(self, off: FloatArray) -> FitScore:
         """Rms by channel of a difference of logarithms `off`, on the samples to fit, choose and test by; NaN = none."""
@@ -82,13 +83,13 @@ class BandPower:
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         return np.asarray(self.measure.noise**2 / (rate_hz / 2))
 
-    def _power(self, courses: Sequence[FloatArray]) -> FloatArray:
+    def _power(self, predicted: Sequence[FloatArray]) -> FloatArray:
         """(stretches, bands, c): mean density."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         rows = np.empty((len(self.stretches), len(self._edges) - 1, len(self.measure.noise)))
         for row, stretch in zip(rows, self.stretches, strict=True):
             window = min(int(WINDOW_S * rate_hz), stretch.last - stretch.first)
-            lines, density = spectral_density(courses[stretch.record][stretch.first : stretch.last], rate_hz, window)
+            lines, density = spectral_density(predicted[stretch.record][stretch.first : stretch.last], rate_hz, window)
             firsts = np.searchsorted(lines, self._edges)
             for band, (low, high) in enumerate(pairwise(firsts)):
                 row[band] = density[low : max(high, low + 1)].mean(axis=0)

@@ -1,7 +1,7 @@
 """Robust Gauss-Newton least squares on band powers, for the numbers of a hypothesis and of the model.
 
-Predictions of impacts vary by chance, so finite differences take large steps, and each band of a segment is weighted by
-the inverse of its chance variation.
+Predictions of impacts are chaotic, so that finite differences take large steps, and each band of a segment is weighted
+by the inverse of its variance between simulations.
 """
 
 from dataclasses import dataclass, replace
@@ -17,17 +17,17 @@ from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
 MOVES, WIDEST = (0.02, 0.2), 12.0
-"""Finite-difference move of a logarithm, least and most; and the same over its usual move."""
+"""Finite-difference step of a logarithm, least and most; and relative to its usual step."""
 LONGEST_STEP = 0.5
-"""Step of a logarithm at most; two moves for numbers of either sign."""
+"""Largest step of a logarithm; two finite-difference steps for numbers of either sign."""
 MOST_BY_CHANCE = 0.8
-"""Share of a column's apparent information that is attributed to chance, at most."""
+"""Largest share of a column's apparent information that is attributed to chance."""
 LEAST_KNOWN = 1e-6
 """Information on a combination of numbers to which the prediction is not sensitive."""
 SHARES = (1.0, 0.3, 0.1, 0.03)
-"""Shares of a step that are tried (line search)."""
+"""Factors on a step that are tried (line search)."""
 FLOOR = 0.04
-"""Standard deviation of the logarithm of an amplitude at least: no simulation predicts it better."""
+"""Least standard deviation of the logarithm of an amplitude: no simulation predicts it better."""
 TRUSTED = 2.0
 """Huber's threshold in standard deviations (Huber 1964): the model may lack more than one thing."""
 RESTS = 1e-4
@@ -35,7 +35,7 @@ RESTS = 1e-4
 
 
 PERTURBATION = 1e-9
-"""Initial difference between simulations of one hypothesis, in the logarithm of a number."""
+"""Difference in the logarithm of a number between the simulations of an ensemble."""
 
 
 def perturb(hypothesis: Hypothesis, number: int) -> Hypothesis:
@@ -50,11 +50,11 @@ class View:
     tuning: Tuning
     map_: Mapper
     spread: float | FloatArray = 0.05
-    """Standard deviation of the logarithms by chance; (stretches, bands, c), or a single one for all."""
+    """Standard deviation of the logarithms between simulations; (stretches, bands, c), or one for all."""
     by_deviations: FloatArray | None = None
     """(t, stretches, bands, c): sensitivity to the model's own numbers; None = these are not fitted."""
     ensemble: int = 1
-    """Simulations over which a prediction is averaged, from numbers that differ by APART: chance in it falls."""
+    """Ensemble size: simulations over which a prediction is averaged, from numbers that differ by PERTURBATION."""
 
     def predict(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
         """(stretches, bands, c): mean prediction over the ensemble; NaN throughout where the model is invalid."""
@@ -82,7 +82,7 @@ class View:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandPowerFit:
-    """A hypothesis, with what it predicts."""
+    """A hypothesis with its prediction."""
 
     hypothesis: Hypothesis
     deviations: FloatArray
@@ -146,7 +146,7 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
     columns = np.vstack([*known, *own])
     columns[~np.isfinite(columns).all(axis=1)] = 0.0
     trust = np.minimum(1.0, TRUSTED / np.maximum(np.abs(off), TRUSTED))
-    # Of the model's own numbers little is left to learn; where they leave much, something else is missing.
+    # Steps of the model's own numbers are small; where they leave a large residual, an effect is missing.
     believed = columns * (trust**3 if t else trust)
     pull = believed @ off
     products = believed @ columns.T
@@ -168,7 +168,7 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
 
 
 def _errors(view: View, at: BandPowerFit, products: FloatArray) -> FloatArray:
-    """(numbers,): standard errors from the information matrix, less what chance adds to the columns."""
+    """(numbers,): standard errors from the information matrix, with the information attributed to chance subtracted."""
     numbers = at.hypothesis.numbers
     first = len(products) - len(numbers)
     chance = _weight(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))

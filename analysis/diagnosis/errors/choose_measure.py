@@ -1,4 +1,4 @@
-"""Makes the error measure of recordings and a model: by the rule of `measure_rule`, or as a user asks."""
+"""Makes the error measure of recordings and a model: by the rule of `error_measure_rule`, or as a user asks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,8 +11,8 @@ from analysis.diagnosis.data.observed import Observed, error_units
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.error_measure_rule import UNTIMED, Choice, choose_measure, samples_to_settle
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.measure_rule import UNTIMED, Choice, choose_measure, samples_to_settle
 from analysis.diagnosis.errors.windows import windows_of
 from analysis.diagnosis.forces.force_views import force_views
 from analysis.diagnosis.noise.noise_floor import NoiseFloor, noise_floor
@@ -25,12 +25,12 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 Compared = Literal["auto", "motion", "force"]
-"""What a user asks to be compared; auto: by the rule."""
+"""What a user asks to be compared; auto: selected by the rule."""
 
 DITHER = 0.02
-"""Noise in steps of a converter below which repeats do not show the noise."""
+"""Noise in steps of a converter below which differences between repeats do not show the noise."""
 ORDERED = 0.45
-"""End of the band over the sample rate, for samples without a clock."""
+"""End of the band relative to the sample rate, for samples without a time axis."""
 BY_FORCE = (
     "The force that the model needs along the measured motion is compared with the one that entered: the motion was "
     "measured, and small errors of a model that was fitted to it would grow in a simulation."
@@ -49,7 +49,7 @@ NO_STATE = (
 class Chosen:
     measure: ErrorMeasure
     floors: tuple[NoiseFloor, ...]
-    """Noise of what is compared, per record of the measure."""
+    """Noise of the compared signals, per record of the measure."""
     remarks: tuple[str, ...]
 
 
@@ -59,8 +59,8 @@ def measure_of(
     beside: Sequence[Recording] = (),
     compared: Compared = "auto",
 ) -> Chosen:
-    """The error measure that the rule chooses, of every part of the recordings. beside: others that must be measured
-    alike, and are not part of it."""
+    """The error measure that the rule selects, of every part of the recordings. beside: other recordings that must be
+    measured the same way, and are not part of it."""
     if compared == "force":
         return measure_by_force(recordings, model, None)
     records, others = (
@@ -89,8 +89,7 @@ def measure_of(
 
 
 def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> Chosen:
-    """The force that the model needs along the measured motion, up to a frequency, without asking the rule; see
-    `has_motion`."""
+    """The error measure by force, up to a frequency, without the rule; see `has_motion`."""
     records = observed_parts(recordings, model.outputs)
     known = place_recorded_effects(model, recordings[0])
     floors = [noise_floor(record.recording) for record in records]
@@ -118,7 +117,7 @@ def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
 
 
 def _leave_out_beginning(record: Observed, model: MechanicalModel) -> Observed:
-    """The record without its beginning, where that is in motion and short."""
+    """The record without its first seconds, where these are in motion and short."""
     after = samples_to_settle(record, model)
     if not after:
         return record
@@ -141,8 +140,9 @@ def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatAr
 
 
 def _noise_before_rounding(floor: NoiseFloor, record: Observed) -> FloatArray:
-    """(p,): the response's rms noise before a converter rounded it, for that is physics that a model may lack; what
-    rounds a position is known of every encoder. Of repeats alone: elsewhere rounding and noise cannot be told apart."""
+    """(p,): rms noise of the response before a converter rounded it, because rounding is an effect that a model may
+    lack; the rounding of positions is assumed as for every encoder. Only from repeats: otherwise rounding and noise
+    cannot be separated."""
     noise = floor.response_rms
     if floor.how != "repeats":
         return noise

@@ -1,4 +1,4 @@
-"""Error measure with prewhitened residuals: its noise has the spectrum of a reference device's model error."""
+"""Error measure with prewhitened residuals: its noise has the spectrum of the model error on reference recordings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,13 +17,13 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColouredMeasure:
-    """An error measure whose residuals are whitened; they count where all samples that the filter uses are known."""
+    """An error measure with whitened residuals; they count where all samples that the filter uses are known."""
 
     plain: ErrorMeasure
     colour: WhiteningFilter
     unit: FloatArray
     noise: FloatArray
-    """(c,): rms of a reference device's whitened residual, in each channel's own unit."""
+    """(c,): rms of the whitened residual of the reference recordings, in each channel's own unit."""
     least: float = 0.0
 
     @property
@@ -53,7 +53,7 @@ class ColouredMeasure:
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """Evidence of the residuals before whitening, for estimators of starting values need time series."""
+        """Evidence from the residuals before whitening: estimators of starting values need time series."""
         return self.plain.evidence(model, effects, self.plain.residuals(model, effects))
 
 

@@ -1,7 +1,6 @@
 """Protocol of the error measures: residuals of a model with effects, sample by sample, in units of the noise.
 
-Three ways of looking, one per file: `free_simulation`, `windows`, `predicted_force`; which one suits is said by
-`choose_measure`.
+Three measures, one per file: `free_simulation`, `windows`, `predicted_force`; `choose_measure` selects one.
 """
 
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from equalizer.signals.signal import FloatArray
 
 
 class ErrorMeasure(Protocol):
-    """What is compared: whole simulated responses, windows of them, or forces."""
+    """A comparison of whole simulated responses, of windows of them, or of forces."""
 
     @property
     def name(self) -> str:
@@ -23,11 +22,11 @@ class ErrorMeasure(Protocol):
 
     @property
     def records(self) -> tuple[Observed, ...]:
-        """What is compared: their `measured`, with the channels of their recording's response and position."""
+        """The compared records: their `measured`, with the channels of their recording's response and position."""
 
     @property
     def noise(self) -> FloatArray:
-        """(c,): rms of what no model can predict, in each channel's own unit."""
+        """(c,): rms of the unpredictable part (noise), in each channel's own unit."""
 
     @property
     def unit(self) -> FloatArray:
@@ -35,19 +34,19 @@ class ErrorMeasure(Protocol):
 
     @property
     def least(self) -> float:
-        """Least error in units of the noise: smaller ones count as this."""
+        """Least error in units of the noise: smaller ones are set to it."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         """The measure on the same records with other sample roles."""
 
     def with_floor(self, rms: FloatArray) -> Self:
-        """The measure with more noise, and no error below it. rms: (c,), in each channel's own unit."""
+        """The measure with more noise, and that noise as its least error. rms: (c,), in each channel's own unit."""
 
     def shorten(self) -> Self:
         """The measure without the samples after the last to fit or to choose by."""
 
     def can_observe(self, effect: Effect) -> bool:
-        """Whether the effect changes what is compared; other effects are not considered."""
+        """Whether the effect changes the compared signals; other effects are not considered."""
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         """Per record (n, c): measured less predicted, in units of `unit`."""

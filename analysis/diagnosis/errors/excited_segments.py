@@ -10,9 +10,9 @@ from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from equalizer.signals.recording import Segment
 
 EXCITED_SHARE = 0.5
-"""Command of the axis over the strongest axis's in a segment, at least."""
+"""Least command of the axis, relative to that of the strongest axis in a segment."""
 LONGEST_S = 6.0
-"""Length of a segment that is used, at most."""
+"""Longest part of a segment that is used."""
 
 
 def select_excited_segments(measure: FreeSimulation, axis: int) -> FreeSimulation:

@@ -15,7 +15,7 @@ _TINY = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitScore:
-    """(c,) each: rms error over rms noise, 1 = noise alone."""
+    """(c,) each: rms error relative to rms noise; 1 = only noise."""
 
     fit: FloatArray
     choose: FloatArray
@@ -23,24 +23,22 @@ class FitScore:
 
     @property
     def worst_channel(self) -> float:
-        """The worst channel, on the samples to fit and to choose by."""
+        """Error of the worst channel, on the samples to fit and to choose by."""
         return float(max(self.fit.max(), self.choose.max()))
 
     @property
     def mean_log_error(self) -> float:
-        """Criterion of comparisons: the mean over channels of the logarithm of the error power, 0 = noise.
-
-        The likelihood where each channel's error is as strong as it is: no channel drowns the others.
-        """
+        """Criterion of comparisons: mean over channels of the logarithm of the error power; 0 = only noise. This is the
+        likelihood with a free error variance per channel, so that no channel dominates the others."""
         return float(np.mean(np.log(np.maximum(self.fit, _TINY))) + np.mean(np.log(np.maximum(self.choose, _TINY))))
 
     def larger(self, times: FloatArray) -> "FitScore":
-        """times: (c,)"""
+        """Score with errors multiplied by times (c,)."""
         return FitScore(self.fit * times, self.choose * times, self.test * times)
 
 
 def fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitScore:
-    """residuals: per record (n, c), in units of `measure.unit`."""
+    """Score of residuals, per record (n, c), in units of `measure.unit`."""
     scale = measure.unit / measure.noise
     return FitScore(
         *(
@@ -55,9 +53,9 @@ def fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitSc
 
 def signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> FloatArray:
     """(c,): standard deviation of the measured signals over the masked samples of all records, by which errors are
-    normalised. Positions are taken about the mean of each record, for encoders begin anywhere; forces, speeds and
-    accelerations about the mean of all, for of several takes at a steady speed each the mean is what differs.
-    """
+    normalised. Positions are taken relative to the mean of each record, because encoders start anywhere; forces, speeds
+    and accelerations relative to the mean of all records, because recordings at different constant speeds differ only
+    in their means."""
     held = [(record, mask) for record, mask in zip(records, masks, strict=True) if mask.any()]
     if not held:
         return np.full(records[0].measured.shape[1], np.nan)

@@ -6,9 +6,9 @@ from typing import Self
 
 import numpy as np
 
-from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.unexplained_motion import evidence_of
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.errors.evidence_from_residuals import evidence_of
 from equalizer.effects.effect import AxisForce, Effect, JointForce, PlacedEffect
 from equalizer.effects.simulation.simulator import Measurement, SimulationResult, simulate_mechanism, simulate_response
 from equalizer.effects.starts.evidence import Evidence
@@ -23,13 +23,13 @@ class FreeSimulation:
     records: tuple[Observed, ...]
     unit: FloatArray
     noise: FloatArray
-    """(c,): rms"""
+    """(c,): rms noise."""
     name: str = "free simulation"
     known: tuple[PlacedEffect, ...] = ()
-    """What the model's own file names: it is part of every simulation."""
+    """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
     coarser: int = 1
-    """Times that simulation steps under motion-dependent forces are longer."""
+    """Factor on the length of steps under motion-dependent forces."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
@@ -45,7 +45,7 @@ class FreeSimulation:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+        with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
             return tuple(
                 _subtract_prediction(record.measured, self._simulate(model, effects, record, simulate_response))
                 / self.unit

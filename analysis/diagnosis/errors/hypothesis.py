@@ -1,4 +1,4 @@
-"""Hypotheses about what is missing: effects of the catalogue, each at an axis or channel, with free numbers."""
+"""Hypotheses about what is missing: effects of the catalogue, each at an axis or channel, with free parameters."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -19,11 +19,11 @@ class Claim:
     effect: Effect
     spread: Spread
     sites: tuple[int, ...]
-    """One site; all with the same numbers; all, each with numbers of its own."""
+    """How sites share parameters: one site; all with the same; each with its own."""
 
     @property
     def groups(self) -> int:
-        """How many sets of the effect's numbers there are."""
+        """Number of sets of the effect's parameters."""
         return len(self.sites) if self.spread == "each" else 1
 
     @property
@@ -33,11 +33,11 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A free number of a hypothesis, as a coordinate that a fit can step along."""
+    """A free parameter of a hypothesis, as a coordinate that a fit can step along."""
 
     parameter: Parameter
     unit: float
-    """What 1 is, off a log scale."""
+    """Unit of the coordinate where it is not logarithmic."""
 
     def value(self, coordinate: float) -> float:
         p = self.parameter
@@ -61,13 +61,13 @@ class Number:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """Claims that hold together, with the numbers that a fit starts from or has found."""
+    """Claims that hold together, with the parameters to start a fit from, or those it found."""
 
     claims: tuple[Claim, ...]
     starts: tuple[Values, ...]
-    """One per group of each claim: what stays fixed, and the size of what may have either sign."""
+    """Per group of each claim: values that stay fixed, and the scale of those that may have either sign."""
     point: FloatArray
-    """The free numbers, claim by claim, group by group: the logarithm on a log scale, else in steps or sizes."""
+    """The free parameters, claim by claim, group by group: logarithms on a log scale, else in steps or scales."""
 
     @property
     def key(self) -> tuple[tuple[str, str, tuple[int, ...]], ...]:
@@ -75,7 +75,7 @@ class Hypothesis:
 
     @property
     def numbers(self) -> tuple[Number, ...]:
-        """One per number of the point."""
+        """One parameter per coordinate of the point."""
         groups = [claim.effect.parameters for claim in self.claims for _ in range(claim.groups)]
         return tuple(
             Number(p, _unit(p, start)) for of, start in zip(groups, self.starts, strict=True) for p in of if not p.fixed
@@ -115,7 +115,7 @@ def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
 
 
 def hypothesis_of_claim(claim: Claim, values: Sequence[Values]) -> Hypothesis:
-    """values: one set per group."""
+    """A hypothesis of one claim. values: one set per group."""
     free = [(p, of_group) for of_group in values for p in claim.effect.parameters if not p.fixed]
     point = np.array([Number(p, _unit(p, of_group)).coordinate(of_group[p.name]) for p, of_group in free])
     return Hypothesis((claim,), tuple(dict(of_group) for of_group in values), point)

@@ -1,6 +1,7 @@
 """Standard errors of a fit that hold where residuals are neither white nor of the assumed variance.
 
-The sandwich of Huber (1967) and White (1980), its middle summed over stretches longer than the errors remember.
+Sandwich estimate of Huber (1967) and White (1980), with scores summed over stretches longer than the residuals'
+correlation time.
 """
 
 import numpy as np
@@ -25,7 +26,7 @@ def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known
     middle = pulls @ pulls.T
     t, across = len(fitted.deviations), known.on(own)
     information = np.block([[known.squares, across], [across.T, own @ own.T]])
-    # The calibration is an observation of its own, one standard deviation wide.
+    # The calibration is one more observation per parameter, with a standard deviation of one.
     information[:t, :t] += np.eye(t)
     middle[:t, :t] += np.eye(t)
     scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))

@@ -1,7 +1,7 @@
-"""Output-error fit: regularised least squares of the model's own numbers, with their calibration as prior, and of a
-hypothesis's numbers, by bounded Gauss-Newton steps.
+"""Output-error fit: regularised nonlinear least squares by bounded Gauss-Newton steps.
 
-The sensitivity to the model's own numbers is computed once and kept; that to a hypothesis's numbers, at each step.
+Fitted are the model's own parameters, with their calibration as prior, and those of a hypothesis. The sensitivity to
+the model's own parameters is computed once and kept; that to the hypothesis's parameters, at each step.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.data.growth import is_unstable_within
+from analysis.diagnosis.data.growth_rate import is_unstable_within
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.tuning import Tuning
@@ -22,21 +22,21 @@ from equalizer.signals.signal import FloatArray
 MOVED = 0.1
 """Step of the finite differences, in standard deviations."""
 LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
-"""Largest step of a hypothesis's number, by its scale: a factor of e, so many times its start, none."""
+"""Largest step of a hypothesis's parameter, by its scale: a factor of e; a multiple of its start; unlimited."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """Sensitivity of the prediction to the model's own numbers, on the samples to fit."""
+    """Sensitivity of the prediction to the model's own parameters, on the samples to fit."""
 
     at: FloatArray
-    """(t,): deviations at which it was computed."""
+    """(t,): deviations (standard deviations of the calibration) at which it was computed."""
     columns: FloatArray
     """(t, samples): change of the prediction per standard deviation."""
     squares: FloatArray
-    """(t, t): products of the columns."""
+    """(t, t): Gram matrix of the columns."""
     repeated: npt.NDArray[np.int64] | None = None
-    """Where columns hold one period of each segment: per sample to fit, which of the columns' samples is its own."""
+    """Where columns contain one period of each segment: per sample to fit, index of its sample in the columns."""
 
     def on(self, errors: FloatArray) -> FloatArray:
         """(t,) or (t, k): products of the columns with errors on the samples to fit, (samples,) or (k, samples)."""
@@ -48,11 +48,12 @@ class Sensitivity:
 
     @property
     def whole(self) -> FloatArray:
-        """(t, samples): of all samples to fit, whichever period they are of."""
+        """(t, samples): columns on all samples to fit, with periods repeated."""
         return self.over(0, self.columns.shape[1] if self.repeated is None else len(self.repeated) * self._channels)
 
     def over(self, first: int, last: int) -> FloatArray:
-        """(t, last - first): of a run of the samples to fit, channel after channel at each instant; whole instants."""
+        """(t, last - first): columns on a run of the samples to fit, channel after channel at each instant; whole
+        instants."""
         if self.repeated is None:
             return self.columns[:, first:last]
         t, c = len(self.columns), self._channels
@@ -79,11 +80,11 @@ class Sensitivity:
 class Fitted:
     hypothesis: Hypothesis
     deviations: FloatArray
-    """(t,), of the model's own numbers, in standard deviations."""
+    """(t,): deviations of the model's own parameters, in standard deviations of the calibration."""
     residuals: tuple[FloatArray, ...]
-    """Per record (n, c), in units of the noise."""
+    """Residuals per record (n, c), in units of the noise."""
     cost: float
-    """Mean square over the fitting samples, with the calibration's pull."""
+    """Cost: mean square over the fitting samples, plus the prior of the calibration."""
 
 
 def residuals_to_fit(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatArray:
@@ -100,8 +101,8 @@ def sensitivity(
     map_: object = map,
     beside: tuple[FloatArray, Sequence[int]] | None = None,
 ) -> Sensitivity:
-    """Sensitivity to the model's own numbers by finite differences. map_: `map`, or a parallel one. beside: known
-    columns, and the numbers whose columns must be computed."""
+    """Sensitivity to the model's own parameters by finite differences. map_: `map`, or a parallel one. beside: known
+    columns, and the indices of those that must be computed."""
     base = residuals_to_fit(measure, measure.residuals(tuning.tune(at), hypothesis.placed_effects()))
 
     def moved(number: int) -> FloatArray:
@@ -117,7 +118,7 @@ def sensitivity(
                 continue
             if np.isfinite(change).all():
                 return np.divide(change, move, out=change)
-        # Neither way is a model: the number stays where it is.
+        # Neither direction gives a valid model: the parameter stays fixed.
         return np.zeros(len(base))
 
     columns, numbers = (
@@ -131,8 +132,8 @@ def sensitivity(
 def fit(
     measure: ErrorMeasure, tuning: Tuning, start: Fitted, known: Sensitivity, rounds: int, map_: object = map
 ) -> Fitted:
-    """The best fit within so many Gauss-Newton steps; never worse than the start. known: sensitivity to the model's
-    numbers, computed anywhere near. map_: as for `sensitivity`."""
+    """The best fit within a number of Gauss-Newton steps; never worse than the start. known: sensitivity to the model's
+    parameters, computed anywhere near. map_: as for `sensitivity`."""
     best = start
     for _ in range(rounds):
         better = _gauss_newton_step(measure, tuning, best, known, map_)
@@ -146,7 +147,7 @@ def fit(
 
 
 def expected_gain(gained: float, before: float) -> float:
-    """Share of the cost that the next fit may take, after `gained` by the last and `before` by the one before it: gains
+    """Share of the cost that the next fit may gain, after `gained` by the last and `before` by the one before it: gains
     shrink about geometrically."""
     return gained * min(gained / before, 1.0) if before > 0 else gained
 
@@ -157,7 +158,7 @@ def evaluate_fit(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, 
 
 
 def _cost(errors: FloatArray, deviations: FloatArray) -> float:
-    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that ran away: no fit is worse
+    with np.errstate(over="ignore", invalid="ignore"):  # cost of a simulation that diverged: no fit is worse
         cost = float(errors @ errors + deviations @ deviations) / max(len(errors), 1)
     return cost if np.isfinite(cost) else np.inf
 
@@ -173,7 +174,7 @@ def _gauss_newton_step(
         products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
         pull = np.concatenate([known.on(errors) - from_.deviations, own @ errors])
     if not (np.isfinite(products).all() and np.isfinite(pull).all()):
-        # Some number moved the model to where it runs away.
+        # A parameter made the simulation diverge.
         return None
     now = np.concatenate([from_.deviations, from_.hypothesis.point])
     low, high = (bound - now for bound in _bounds(from_.hypothesis, t))
@@ -181,7 +182,7 @@ def _gauss_newton_step(
     low[t:], high[t:] = np.maximum(low[t:], -longest), np.minimum(high[t:], longest)
     found, impossible = _first_better(measure, tuning, from_, (products, pull), (low, high))
     if found is None and impossible:
-        # A mass that is best below zero must not stop all other numbers: it stays where it is.
+        # A mass whose best value is negative must not stop the other parameters: it stays fixed.
         masses = [place for place, name in enumerate(tuning.names) if name.startswith("mass")]
         low[masses] = high[masses] = 0.0
         found, _ = _first_better(measure, tuning, from_, (products, pull), (low, high))
@@ -195,10 +196,10 @@ def _first_better(
     system: tuple[FloatArray, FloatArray],
     bounds: tuple[FloatArray, FloatArray],
 ) -> tuple[Fitted | None, bool]:
-    """The fit after the first of ever shorter steps that lowers the cost, None where none does, and whether any of them
-    led to numbers that no mechanical model has. system: normal matrix and right side."""
+    """The fit after the first of ever shorter steps that lowers the cost, None where none does; and whether any step
+    led to an invalid mechanical model. system: normal matrix and right side."""
     (products, pull), t, impossible = system, len(from_.deviations), False
-    # From a model that grows by itself no step could be taken, were growing ones refused.
+    # Steps that make the model less stable are refused, unless it is unstable already.
     grows = is_unstable_within(tuning.tune(from_.deviations), _longest_s(measure))
     for damping in (1e-9, 1e-3, 0.1, 3.0):
         step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, *bounds)
@@ -223,7 +224,7 @@ def _longest_s(measure: ErrorMeasure) -> float:
 def hypothesis_sensitivity(
     measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray, map_: object = map
 ) -> FloatArray:
-    """(numbers, samples): sensitivity of the prediction to the hypothesis's numbers."""
+    """(numbers, samples): sensitivity of the prediction to the hypothesis's parameters."""
     model: MechanicalModel = tuning.tune(from_.deviations)
     moves = [number.move for number in from_.hypothesis.numbers]
 
@@ -251,7 +252,7 @@ def _longest(hypothesis: Hypothesis) -> FloatArray:
 
 
 def bounded_step(products: FloatArray, pull: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Least-squares step within bounds: numbers that leave their range are held at its end (active set)."""
+    """Least-squares step within bounds: parameters that would leave their range are fixed at its end (active set)."""
     step, held = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
     for _ in range(2 * len(pull) + 2):
         free = ~held

@@ -1,4 +1,4 @@
-"""Prediction error of a finished model on a recording that nothing is fitted to, and the best gain factor."""
+"""Prediction error of a finished model on a recording that it was not fitted to, and the best gain factor."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,19 +27,19 @@ class ChannelRms:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictionError:
-    """Shares of the signal, root mean square over the channels; None where no number comes out."""
+    """Errors relative to the signal, root mean square over the channels; None where they are not finite."""
 
     error: str
-    """How it was measured."""
+    """Name of the error measure."""
     as_it_is: float | None
     with_gain: float | None
-    """The error with one gain factor for all channels, fitted to samples that are not tested, or to all."""
+    """The error with one gain factor for all channels, fitted to the samples that are not tested, or to all."""
     channels: tuple[ChannelRms, ...]
     """Errors by channel, without the gain factor; empty where they are not finite."""
 
 
 def prediction_error(recording: Recording, model: MechanicalModel, part: Part) -> PredictionError:
-    """Error of a finished model on a recording. model: with its own effects. part: which samples count."""
+    """Error of a finished model on a recording. model: with its own effects. part: mask of the samples that count."""
     measure = measure_of((recording,), model).measure
     measured, predicted, tested, fitted = [], [], [], []
     for record, left in zip(measure.records, measure.residuals(model, ()), strict=True):

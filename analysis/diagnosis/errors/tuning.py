@@ -1,8 +1,7 @@
-"""The free numbers of a mechanical model within its calibration's tolerances, and the model that they give.
+"""The free parameters of a mechanical model within the tolerances of its calibration, and the model that they give.
 
-Open are the grounded mass, damping and stiffness at the driven axes and, for every mode of what hangs on them, its
-frequency, mass and damping. In the coordinates of Craig and Bampton (1968): the driven axes, and what moves while they
-are held.
+Free are the grounded mass, damping and stiffness at the driven axes and, for every mode with these axes held, its
+frequency, mass and damping (coordinates of Craig and Bampton 1968: driven axes and fixed-interface modes).
 """
 
 from collections.abc import Callable
@@ -24,7 +23,7 @@ DAMPING_PER_MODES = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tuning:
-    """`model` with `names` open. Values are counted in standard deviations of the calibration."""
+    """`model` with the parameters `names` free, counted in standard deviations of the calibration."""
 
     model: MechanicalModel
     names: tuple[str, ...]
@@ -32,7 +31,7 @@ class Tuning:
     """(parameters,): one standard deviation, SI or relative."""
     units: tuple[str, ...]
     tune: Callable[[FloatArray], MechanicalModel]
-    """The model with its numbers changed by deviations (parameters,), in standard deviations. Raises
+    """The model with its parameters changed by deviations (parameters,), in standard deviations. Raises
     MechanicalModelError where the mass is not positive definite."""
 
     def values(self, deviations: FloatArray) -> FloatArray:
@@ -40,7 +39,7 @@ class Tuning:
 
 
 def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning:
-    """The numbers that the model's tolerances leave open; where it states none, a tenth is taken."""
+    """The parameters with a tolerance in the model; a tenth is assumed where it states none."""
     split = _split(model)
     m = model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
@@ -85,7 +84,7 @@ class _Split:
     damping: FloatArray
     stiffness: FloatArray
     back: FloatArray
-    """Takes a matrix back to the model's coordinates: back.T @ matrix @ back."""
+    """Transformation of a matrix back to the model's coordinates: back.T @ matrix @ back."""
     frequency_hz: FloatArray
 
 
@@ -99,7 +98,7 @@ def _split(model: MechanicalModel) -> _Split:
     driven = driven_axes(model)
     inside = null_space(driven.T)
     m = driven.shape[1]
-    # Dual to the driven axes, so that a push along one moves that one alone.
+    # Dual basis of the driven axes, so that a force along one axis moves that axis alone.
     axes = driven @ np.linalg.inv(driven.T @ driven)
     basis = axes
     frequency = np.zeros(0)
@@ -112,7 +111,7 @@ def _split(model: MechanicalModel) -> _Split:
     mass, damping, stiffness = (
         np.asarray(basis.T @ matrix @ basis) for matrix in (model.mass, model.damping, model.stiffness)
     )
-    # What is left between driven axes and modes in the stiffness is rounding alone.
+    # The remaining stiffness between driven axes and modes is rounding.
     stiffness[:m, m:] = stiffness[m:, :m] = 0.0
     return _Split(mass, damping, stiffness, np.linalg.inv(basis), frequency)
 

@@ -1,7 +1,7 @@
-"""Prewhitening filter: an autoregression of the residual that a re-tuned model leaves of a device in order.
+"""Prewhitening filter: an autoregression of the residual that a re-tuned model leaves on reference recordings.
 
-The whitened residual is the one-step prediction error (Yule 1927, Walker 1931): each frequency is weighted by the
-inverse of the residual's spectrum on a device in order.
+The whitened residual is the one-step prediction error of an AR(p) model (Yule 1927, Walker 1931): each frequency is
+weighted by the inverse of the residual's spectrum on the reference recordings.
 """
 
 from collections.abc import Sequence
@@ -16,9 +16,9 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 MOST_LAGS, SAMPLES_PER_LAG = 64, 50
-"""Largest order of the autoregression, and samples per lag."""
+"""Largest order of the autoregression, and least samples per lag."""
 FLAT = 1e-4
-"""White part added to the power, as a share of it: bounds the weight of any frequency."""
+"""White noise added to the power, as a share of it: bounds the weight of any frequency."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,12 +45,12 @@ class WhiteningFilter:
         return np.asarray(until[self.lags + 1 :] == until[: len(left)], dtype=np.bool_)
 
 
-def whitening_filter(courses: Sequence[FloatArray], least: FloatArray) -> WhiteningFilter:
-    """Autoregression fitted to residuals by Yule-Walker. courses: (n, c) each, NaN where not known. least: (c,), rms of
-    white noise, which bounds the spectrum from below."""
-    count = sum(int(np.isfinite(course).all(axis=1).sum()) for course in courses)
+def whitening_filter(residuals: Sequence[FloatArray], least: FloatArray) -> WhiteningFilter:
+    """Autoregression fitted to residuals by Yule-Walker. residuals: (n, c) each, NaN where not known. least: (c,), rms
+    of white noise, which bounds the spectrum from below."""
+    count = sum(int(np.isfinite(residual).all(axis=1).sum()) for residual in residuals)
     lags = int(np.clip(count // SAMPLES_PER_LAG, 1, MOST_LAGS))
-    alike: FloatArray = np.sum([lagged_products(course, lags) for course in courses], axis=0) / max(count, 1)
+    alike: FloatArray = np.sum([lagged_products(residual, lags) for residual in residuals], axis=0) / max(count, 1)
     alike[0] = alike[0] * (1 + FLAT) + least**2
     steps = np.zeros((lags + 1, len(least)))
     steps[0] = 1.0

@@ -1,7 +1,7 @@
 """Error measure by windows (multiple shooting): short simulations, each from a smoothed state, so that plants without a
 restoring force cannot drift far.
 
-The remaining error of the initial state is fitted to each window, and does not count.
+The error of the initial state is fitted in each window, and does not count.
 """
 
 from collections.abc import Sequence
@@ -10,11 +10,11 @@ from typing import Self
 
 import numpy as np
 
-from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motion
 from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.errors.evidence_from_residuals import without_gaps
 from analysis.diagnosis.errors.free_simulation import predicted_channels
-from analysis.diagnosis.errors.unexplained_motion import without_gaps
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
 from equalizer.effects.simulation.along_motion import actuator_force
 from equalizer.effects.simulation.bodies import Restarts, bodies_of
@@ -26,14 +26,13 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _UNSEEN = 1e-9
-"""Singular value over the largest, below which a direction of the initial state is not fitted."""
+"""Least singular value, relative to the largest, for which a direction of the initial state is fitted."""
 
 
 WINDOW_S = 1.0
-"""Length of a window at least."""
+"""Shortest window."""
 STATES = 10.0
-"""Readings of a window per number of its state; principle: the state, which is fitted and does not count, then takes a
-tenth of an error at most by chance."""
+"""Least readings of a window per state: the fitted initial state then absorbs a tenth of an error at most by chance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,12 +41,12 @@ class Windows:
 
     records: tuple[Observed, ...]
     states: tuple[FloatArray, ...]
-    """Per record (windows, 2 coordinates): where each window begins."""
+    """Per record (windows, 2 coordinates): initial state of each window."""
     unit: FloatArray
     noise: FloatArray
     window_s: float = WINDOW_S
     known: tuple[PlacedEffect, ...] = ()
-    """What the model's own file names: it is part of every simulation."""
+    """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
 
     @property
@@ -101,7 +100,7 @@ class Windows:
             Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
             Restarts(length, states),
         )
-        with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+        with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
             left = (record.measured - predicted_channels(played, record.measured.shape[1])) / self.unit
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
@@ -111,9 +110,9 @@ class Windows:
     def _without_states(
         self, structure: MechanicalModel, left: FloatArray, sample_rate_hz: float, length: int
     ) -> FloatArray:
-        """(n, c): residuals with the free motion of other initial states of the windows projected out."""
+        """(n, c): residuals after projection on the free motion from other initial states of the windows."""
         n, c = left.shape
-        # A fit may try a model that is unstable.
+        # A fit may try an unstable model.
         with np.errstate(over="ignore", invalid="ignore"):
             free = _free_motion(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
             finite = np.isfinite(left).all() and np.isfinite(np.sum(free**2))
@@ -162,7 +161,7 @@ def windows_of(
     records: tuple[Observed, ...], model: MechanicalModel, scales: tuple[FloatArray, FloatArray], window_s: float = 1.0
 ) -> Windows:
     """The measure with each window's initial state estimated by a smoother. scales: unit and noise, (c,) each.
-    window_s: at least. Raises numpy.linalg.LinAlgError where the motion cannot be estimated."""
+    window_s: shortest window. Raises numpy.linalg.LinAlgError where the motion cannot be estimated."""
     unit, noise = scales
     fitted = 2 * len(model.mass) / records[0].measured.shape[1]
     window_s = max(window_s, STATES * fitted / records[0].recording.sample_rate_hz)
@@ -192,7 +191,7 @@ def _free_motion(structure: MechanicalModel, sample_rate_hz: float, length: int,
 
 
 def _project_out(left: FloatArray, free: FloatArray) -> FloatArray:
-    """Rows of left (windows, samples) without what lies along the columns of free (samples, k)."""
+    """Rows of left (windows, samples) after projection on the columns of free (samples, k)."""
     size = np.linalg.norm(free, axis=0)
     along, sizes, _ = np.linalg.svd(free / np.where(size > 0, size, 1.0), full_matrices=False)
     along = along[:, sizes > _UNSEEN * max(float(sizes[0]), np.finfo(float).tiny)]

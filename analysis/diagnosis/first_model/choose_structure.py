@@ -36,7 +36,7 @@ SHAPES: dict[str, Callable[[Motion], FloatArray]] = {
 class TriedStructure:
     kind: Kind
     error: float | None
-    """Root-mean-square over the signal's; None where it was refused."""
+    """Root-mean-square error relative to the signal; None where it was refused."""
     why_not: str
 
 
@@ -80,7 +80,7 @@ def choose_structure(
 
 
 def remains(given: BalancedRecordings | None, fit: StructureFit) -> str:
-    """A sentence on the error that the model leaves, and what it depends on."""
+    """A sentence on the model's error, and what it depends on."""
     left = f"{100 * fit.error:.3g} % of the {fit.compared}"
     if given is None or fit.joint is None or given.untimed:
         return f"{left} remains."

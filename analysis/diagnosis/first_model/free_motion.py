@@ -1,8 +1,8 @@
-"""Reads a motion that nothing drives, such as a decay, as the force per unit mass that it shows.
+"""Converts a motion that is not driven, such as a decay, to a recording of the force per unit mass that it implies.
 
-Without a force, m q'' + c q' + k q + h(q, q') = 0 tells each term but for a common factor. Per unit of mass, the force
--q'' balances damping, spring and laws along the motion q: a recording whose motion is imposed and whose force is
-measured, with no mass in between.
+Without a force, m q'' + c q' + k q + h(q, q') = 0 determines each term up to a common factor. Per unit of mass, the
+force -q'' balances damping, spring and laws along the motion q: like a recording with an imposed motion and a measured
+force, without a mass.
 """
 
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, 
     response = recordings[0].response
     order, rate_hz = DERIVATIVE_OF_QUANTITY[response.quantities[0]], response.sample_rate_hz
     moved = [fill_gaps(each.response.samples) for each in recordings]
-    # Between two parts the motion jumps.
+    # The motion is discontinuous between two parts.
     parts = [parts_of(each) for each in recordings]
     cut = [samples[start:stop] for samples, those in zip(moved, parts, strict=True) for start, stop in those]
     band_hz = band_end_hz(cut, rate_hz, order)
@@ -63,8 +63,8 @@ def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, 
 
 
 def _levels(recording: Recording, samples: FloatArray) -> tuple[Segment, ...]:
-    """Stretches of some cycles each: as it decays, a motion goes through all levels, and each is fitted to and tested
-    by. samples: (n, p)."""
+    """Stretches of some cycles each: as it decays, the motion passes through all levels, and each is used for fit and
+    test. samples: (n, p)."""
     found = []
     for span in moving_spans(samples, parts_of(recording)):
         moving = samples[span.start : span.end_of_motion]

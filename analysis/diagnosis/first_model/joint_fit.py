@@ -27,11 +27,12 @@ class JointFit:
     matrices: dict[Part, FloatArray]
     """(d, d) each; zero where a part was not asked for."""
     halves: dict[Part, FloatArray]
-    """Half widths of the 95 % intervals, which hold the bias that the noise of the motion may make."""
+    """Half-widths of the 95 % intervals, including the bias due to the noise of the motion."""
     deviations: dict[Part, float]
     """The largest standard error on the diagonal."""
     folds: FloatArray
-    """(blocks,): cross-validated squares of each block over the power of all, in the mean over the axes."""
+    """(blocks,): cross-validated sum of squares of each block, relative to the power of all, in the mean over the
+    axes."""
     folds_error: float
     """Root of their sum."""
     held_out: FloatArray
@@ -42,7 +43,7 @@ class JointFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Parametrisation:
-    """Which numbers are fitted, and where each stands in each axis's row of weights."""
+    """Which parameters are fitted, and their places in each axis's row of weights."""
 
     columns: list[int]
     rows: tuple[FloatArray, ...]

@@ -31,13 +31,13 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
     "gravity": PARTS,
 }
 HELD_FIXED = 1e-6
-"""Factor of the least mass, and standard deviation of unknown numbers, where no time is known."""
+"""Factor of the least mass, and standard deviation of unknown parameters, without a time axis."""
 NAME = "first model, {}"
 FORCE, MOTION = "force along the measured motion", "free simulation"
 
 
 class StructureRefused(ValueError):  # noqa: N818 - an answer that a user reads
-    """The recordings do not carry this structure; the text says why."""
+    """The structure cannot be fitted to the recordings; the text says why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +58,9 @@ class StructureFit:
     """Per axis or response channel: rms of the held-out error over that of the signal."""
     channels: tuple[str, ...]
     compared: str
-    """What the signal is, in words."""
+    """The compared signal, in words."""
     joint: JointFit | None
-    """None where it was fitted to accelerations, or has modes."""
+    """The joint fit; None where it was fitted to accelerations, or has modes."""
     remarks: tuple[str, ...]
 
     @property
@@ -79,7 +79,7 @@ class BalancedRecordings:
     turns: bool
     rotational: bool
     free: bool = False
-    """Nothing drove the motion: numbers are per unit mass."""
+    """Whether the motion is free (not driven): parameters are per unit mass."""
 
 
 def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:

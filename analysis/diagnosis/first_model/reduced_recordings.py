@@ -1,7 +1,7 @@
 """Subtracts from the commands the linear part of a force balance that one body per command cannot describe.
 
-This is the force for motions beside the driven ones, for modes and for a delayed command. What is left drives one
-measured motion each, so that laws are fitted and drawn as on any device.
+This is the force of motions other than the driven ones, of modes and of a delayed command. Each remaining command
+drives one measured motion, so that laws are fitted and drawn as for any device.
 """
 
 from collections.abc import Sequence
@@ -53,7 +53,7 @@ def _reduce(
         for number, (start, stop) in enumerate(parts, begin):
             motion = regression.motions[number]
             left = motion.force[:, axis] - _force_beside(balance, motion)
-            # What lies below an integrated motion's band has no motion to balance it.
+            # Below the band of an integrated motion there is no motion to balance the force.
             command[start:stop, axis] = motion.band_pass(left[:, None])[:, 0] if motion.order == 2 else left
     response, integrated = _driven_motions(recording, parts, balances, begin)
     return replace(
@@ -62,7 +62,7 @@ def _reduce(
         response=response,
         position=None,
         excitation=None,
-        # An integrated motion was moved to the middle of the steps already.
+        # An integrated motion is already centred in the steps.
         hold=Hold.BAND_LIMITED if integrated else recording.hold,
     )
 
@@ -74,8 +74,8 @@ def _force_beside(balance: Balance, motion: Motion) -> FloatArray:
     weights = regression.weights(regression.columns_of([*linear, *(each.place for each in balance.named)]))
     # The constant of the base is left to the fit.
     weights = np.delete(weights, regression.base - 1)
-    courses = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]
-    whole = np.hstack([*courses, *(law.columns(motion, law.numbers) for law in linear_laws(balance))])
+    motion_columns = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]
+    whole = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in linear_laws(balance))])
     others = d > motion.force.shape[1]
     kept = [k >= regression.matrices or (others and k % d != regression.beside.own) for k in range(whole.shape[1])]
     return np.asarray(whole[:, kept] @ weights[: whole.shape[1]][kept])

@@ -1,8 +1,8 @@
 """Restores the sign of a speed whose sensor shows its magnitude only, such as a pulse counter, from the command.
 
-Between two minima near zero the sign is one; it is that of the speed that a linear filter makes of the command, fitted
-in turn to the speed with the signs found (alternating projections, as phases are retrieved; Gerchberg and Saxton,
-Optik 35:237, 1972).
+Between two minima near zero the sign is constant. It is estimated as that of the command after a linear filter, which
+is in turn fitted to the signed speed (alternating projections, as in phase retrieval; Gerchberg and Saxton, Optik
+35:237, 1972).
 """
 
 import itertools

@@ -1,12 +1,12 @@
-"""Finds and reverses commands that are counted against the motion that they drive, by an encoder or amplifier wired the
-other way round.
+"""Finds and reverses commands whose sign is opposite to the motion that they drive, by an encoder or amplifier with
+reversed wiring.
 
-Mass, damping and dry friction take work out of a drive. Counted the other way round they would give it, and no law of
-the motion has the signs that physics has. So forces are balanced with both signs, mass and damping not below zero in
-either; where the turned sign leaves clearly less on held-out folds, it is the device's. A spring alone tells nothing.
+Mass, damping and dry friction take energy from a drive. With the wrong sign they would supply it, which no physical law
+does. So forces are balanced with both signs, with mass and damping non-negative in either; the reversed sign is
+accepted where it has a clearly smaller error on held-out folds. A spring alone does not determine the sign.
 
-A recording says in its `meta` which commands were turned round, and a model of the device is written for the commands
-as they were recorded: see `as_recorded`.
+A recording's `meta` lists the reversed commands, and a model of the device is written for the commands as they were
+recorded: see `recorded_conditions`.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
 REVERSED = "turned commands"
-"""Note of a recording: the channels of its commands that were turned round."""
+"""Key of a recording's `meta`: channels of its commands that were reversed."""
 
 
 def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:

@@ -7,8 +7,8 @@ import numpy as np
 
 from analysis.diagnosis.data.measured_motion import MeasuredMotion, measured_motion
 from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.forces.inverse_dynamics import band_motion
 from analysis.diagnosis.forces.inverse_lines import inverse_lines
-from analysis.diagnosis.forces.needed_force import band_motion
 from analysis.diagnosis.forces.predicted_force import PredictedForce, edge_samples
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
@@ -17,16 +17,16 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import filter_low_pass, low_pass_gain
 from equalizer.signals.signal import FloatArray, Signal
 
-KNOWN = 0.01
-"""Relative uncertainty of an actuator's force at best, counted as noise."""
+ACTUATOR_ERROR = 0.01
+"""Relative uncertainty of an actuator's force at best; it counts as noise."""
 NOISE_SHARE = 0.02
-"""Noise that the motion's noise may cause in the force, over the force's rms; differentiation amplifies it."""
+"""Largest force noise due to the motion's noise, relative to the force's rms; differentiation amplifies it."""
 WIDEST, NARROWEST = 0.2, 0.002
-"""Bands, over the sample rate."""
-REACH = 10.0
-"""End of the band at most, over the frequency below which half of the force's power lies."""
-UNKNOWN = 1e-4
-"""Noise of the motion over its rms, assumed where it is not known."""
+"""Band ends that are tried, relative to the sample rate."""
+BAND_OVER_MEDIAN = 10.0
+"""Largest end of the band, relative to the frequency below which half of the force's power lies."""
+ASSUMED_NOISE = 1e-4
+"""Noise of the motion relative to its rms, assumed where it is not known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,37 +41,38 @@ def force_views(
 ) -> ForceViews:
     """records: with motion, see `has_motion`. band_hz: up to which forces are compared; None = by the noise."""
     motions = [measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)]
-    entered = [
+    applied = [
         actuator_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)
         for record in records
     ]
-    band_hz = band_hz or _band(records, motions, entered, floors, model)
-    views, seen = [], []
-    for record, motion, force, floor in zip(records, motions, entered, floors, strict=True):
+    band_hz = band_hz or _band(records, motions, applied, floors, model)
+    views, floors_of_views = [], []
+    for record, motion, force, floor in zip(records, motions, applied, floors, strict=True):
         view = _view(record, force, band_hz)
         views.append(view)
-        seen.append(_floor(model, motion, floor, band_hz))
+        floors_of_views.append(_floor(model, motion, floor, band_hz))
     forces = np.vstack([view.measured for view in views])
-    # The forces are not all noise, however little an unsuitable model makes of the motion; those of an idle axis are.
-    noise = np.minimum(np.fmin.reduce([view.response_rms for view in seen]), np.std(forces, axis=0).max())
-    noise = np.asarray(np.hypot(noise, KNOWN * np.sqrt(np.mean(forces**2, axis=0))))
+    # An unsuitable model overestimates the noise, so it is limited to the strongest force; that of an idle axis may be
+    # less than the noise.
+    noise = np.minimum(np.fmin.reduce([floor.response_rms for floor in floors_of_views]), np.std(forces, axis=0).max())
+    noise = np.asarray(np.hypot(noise, ACTUATOR_ERROR * np.sqrt(np.mean(forces**2, axis=0))))
     rate_hz = records[0].recording.sample_rate_hz
-    courses = tuple(band_motion(motion.position, rate_hz, band_hz) for motion in motions)
-    measure = PredictedForce(tuple(views), courses, noise, noise, band_hz)
-    return ForceViews(measure, tuple(seen))
+    band_motions = tuple(band_motion(motion.position, rate_hz, band_hz) for motion in motions)
+    measure = PredictedForce(tuple(views), band_motions, noise, noise, band_hz)
+    return ForceViews(measure, tuple(floors_of_views))
 
 
 def _band(
     records: Sequence[Observed],
     motions: Sequence[MeasuredMotion],
-    entered: Sequence[FloatArray],
+    applied: Sequence[FloatArray],
     floors: Sequence[NoiseFloor],
     model: MechanicalModel,
 ) -> float:
     """End in Hz of the widest band in which noise stays below `NOISE_SHARE` of the force in the quietest record."""
     rate_hz = records[0].recording.sample_rate_hz
-    power = max(float(np.mean((force - force.mean(axis=0)) ** 2)) for force in entered)
-    widest = REACH * float(np.median([_median_frequency_hz(force, rate_hz) for force in entered])) / rate_hz
+    power = max(float(np.mean((force - force.mean(axis=0)) ** 2)) for force in applied)
+    widest = BAND_OVER_MEDIAN * float(np.median([_median_frequency_hz(force, rate_hz) for force in applied])) / rate_hz
     for band_hz in np.geomspace(min(max(widest, NARROWEST), WIDEST), NARROWEST, 24) * rate_hz:
         noise = min(
             float(np.max(_floor(model, motion, floor, float(band_hz)).response_rms))
@@ -91,12 +92,12 @@ def _median_frequency_hz(force: FloatArray, rate_hz: float) -> float:
 def _view(record: Observed, force: FloatArray, band_hz: float) -> Observed:
     recording = record.recording
     rate_hz, command = recording.sample_rate_hz, recording.command
-    within = filter_low_pass(force, rate_hz, band_hz, late_s=0.5 / rate_hz)
-    signal = Signal(within, rate_hz, command.quantity, command.unit, command.channels)
+    filtered = filter_low_pass(force, rate_hz, band_hz, late_s=0.5 / rate_hz)
+    signal = Signal(filtered, rate_hz, command.quantity, command.unit, command.channels)
     view = replace(recording, response=signal, position=None)
-    edge = min(edge_samples(rate_hz, band_hz), len(within) // 8)
-    inside = np.zeros(len(within), dtype=np.bool_)
-    inside[edge : len(within) - edge] = True
+    edge = min(edge_samples(rate_hz, band_hz), len(filtered) // 8)
+    inside = np.zeros(len(filtered), dtype=np.bool_)
+    inside[edge : len(filtered) - edge] = True
     return Observed(
         view, record.command, signal.samples, record.fit & inside, record.choose & inside, record.test & inside
     )
@@ -104,10 +105,10 @@ def _view(record: Observed, force: FloatArray, band_hz: float) -> Observed:
 
 def _floor(model: MechanicalModel, motion: MeasuredMotion, floor: NoiseFloor, band_hz: float) -> NoiseFloor:
     frequency_hz, m = floor.frequency_hz, model.inputs
-    within = low_pass_gain(frequency_hz, band_hz)[:, None, None]
-    gain = np.abs(within * inverse_lines(model, np.maximum(frequency_hz, 1e-3))[:, :m]) ** 2
-    guessed = (UNKNOWN * np.std(motion.position, axis=0)) ** 2
-    density = np.einsum("lij,lj->li", gain, np.where(np.isfinite(motion.noise), motion.noise, guessed))
+    pass_gain = low_pass_gain(frequency_hz, band_hz)[:, None, None]
+    gain = np.abs(pass_gain * inverse_lines(model, np.maximum(frequency_hz, 1e-3))[:, :m]) ** 2
+    assumed = (ASSUMED_NOISE * np.std(motion.position, axis=0)) ** 2
+    density = np.einsum("lij,lj->li", gain, np.where(np.isfinite(motion.noise), motion.noise, assumed))
     freedom = np.full(m, float(np.max(floor.response.freedom, initial=1.0)))
     noise = ChannelNoise(np.sqrt(density.mean(axis=0)), density, freedom, np.zeros(m))
     return NoiseFloor(floor.how, frequency_hz, noise, None, floor.remarks)

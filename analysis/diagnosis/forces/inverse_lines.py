@@ -1,7 +1,7 @@
 """Inverse frequency response of a model: from the positions of its outputs to the forces along its axes.
 
 A rational function of frequency. Its poles are the model's zeros, generalised eigenvalues of its equations
-(Emami-Naeini and Van Dooren 1982, Automatica 18:415); with them all follows from a few lines.
+(Emami-Naeini and Van Dooren 1982, Automatica 18:415); once they are known, a few lines determine the whole function.
 """
 
 from collections.abc import Callable
@@ -15,20 +15,20 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 FEW = 2000
-"""Lines up to which each is solved for by itself."""
+"""Number of lines up to which each is solved for separately."""
 LEARNED_ON, NEAR = 60, np.array([-1.0, 0.0, 1.0])
-"""Lines over the whole range, and about each pole in its half widths, to which the coefficients are fitted."""
+"""Fitted lines: number over the whole range, and places about each pole in its half-widths."""
 HIGHEST_POWER = 4
 """Highest power of frequency: that of an inertia behind a massless coupling."""
 FAR = 1e3
-"""Times the highest line: a pole beyond it is a power."""
+"""Ratio to the highest line above which a pole is replaced by a power of frequency."""
 RIGHT_TO = 1e-8
-"""Relative error at lines that were not fitted, at most; else all lines are solved for."""
+"""Largest relative error at lines that were not fitted; above it all lines are solved for."""
 
 
 def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexArray:
-    """(lines, 2 m, m): from the positions of the model's first m outputs' rows to the forces along the driven axes, and
-    to the axes' positions. Raises numpy.linalg.LinAlgError where these rows do not say how the model moves."""
+    """(lines, 2 m, m): from the positions of the model's first m outputs to the forces along the driven axes, and to
+    the axes' positions. Raises numpy.linalg.LinAlgError where these outputs do not determine the model's motion."""
     n, m = model.coordinates, model.inputs
     s = 2j * np.pi * frequency_hz[:, None, None]
     whole = np.zeros((len(frequency_hz), n + m, n + m), dtype=np.complex128)
@@ -41,18 +41,19 @@ def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexAr
 
 
 def inverse_of(model: MechanicalModel, lines: int, highest_hz: float) -> Callable[[FloatArray], ComplexArray]:
-    """`inverse_lines` as a function of frequency, fast where many lines are asked for."""
+    """`inverse_lines` as a function of frequency, fast for many lines."""
     if lines > FEW and (learned := _fit_partial_fractions(model, highest_hz)) is not None:
         return learned
     return lambda frequency_hz: inverse_lines(model, frequency_hz)
 
 
 def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callable[[FloatArray], ComplexArray] | None:
-    """The inverse as a partial fraction expansion fitted to a few lines; None where it misses the lines between."""
+    """The inverse as a partial fraction expansion fitted to a few lines; None where its error between them is too
+    large."""
     poles = zeros_of(model, 2 * np.pi * FAR * highest_hz)
     tried, unit, m = _lines_to_fit(poles, highest_hz), 2 * np.pi * highest_hz, model.inputs
     right, shapes = inverse_lines(model, tried), _basis_functions(tried, poles, unit)
-    # Forces and positions apart, and each line alike: their entries differ by many orders of magnitude.
+    # Forces and positions are fitted separately, and each line is scaled: entries differ by many orders of magnitude.
     forces, positions = (
         _fit_coefficients(shapes, part.reshape(len(tried), -1)) for part in (right[:, :m], right[:, m:])
     )
@@ -71,17 +72,18 @@ def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callabl
 
 
 def _fit_coefficients(shapes: ComplexArray, right: ComplexArray) -> ComplexArray | None:
-    """(shapes, entries): least-squares coefficients from every other line; None where they miss the lines between."""
+    """(shapes, entries): least-squares coefficients from every other line; None where the error at the others is too
+    large."""
     size = np.abs(right).max(axis=1)[:, None]
     shapes, right = shapes / size, right / size
-    # So that no direction counts for less because of its unit.
+    # Columns scaled to equal norm, so that units do not matter.
     unit = np.linalg.norm(shapes[::2], axis=0)
     found = np.linalg.lstsq(shapes[::2] / unit, right[::2], rcond=1e-14)[0] / unit[:, None]
     return found if np.all(np.abs(shapes[1::2] @ found - right[1::2]) <= RIGHT_TO) else None
 
 
 def zeros_of(model: MechanicalModel, largest: float) -> ComplexArray:
-    """(k,), rad/s: transmission zeros with an imaginary part from 0 on."""
+    """(k,), rad/s: transmission zeros with non-negative imaginary part."""
     n, m = model.coordinates, model.inputs
     left, right = np.zeros((2 * n + m, 2 * n + m)), np.zeros((2 * n + m, 2 * n + m))
     left[:n, n : 2 * n] = np.eye(n)
@@ -98,7 +100,7 @@ def _lines_to_fit(poles: ComplexArray, highest_hz: float) -> FloatArray:
     """(lines,), Hz, rising: over the whole range and about each resonance."""
     width = np.maximum(np.abs(poles.real), 1e-6 * np.abs(poles))
     about = (np.abs(poles.imag)[:, None] + width[:, None] * NEAR).ravel() / (2 * np.pi)
-    # Halved steps: what is learned of and what is judged by take turns.
+    # Halved steps: fitted and test lines alternate.
     whole = np.geomspace(1e-4 * highest_hz, highest_hz, LEARNED_ON)
     even = np.linspace(0.0, highest_hz, LEARNED_ON)
     return np.unique(np.clip(np.concatenate([about, 1.01 * about, whole, even]), 1e-6 * highest_hz, highest_hz))

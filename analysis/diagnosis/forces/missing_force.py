@@ -1,7 +1,7 @@
 """The force along each driven axis that would explain a model's residual, and the motion that it causes.
 
-Deconvolution through the model, line by line, with the noise as the measure of what may be left (a latent force in the
-sense of Rogers and Friis 2021, by Wiener's filter).
+Deconvolution through the model, line by line, regularised by the noise (Wiener filter; a latent force in the sense of
+Rogers and Friis 2021).
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _SETTLING_S = 2.0
-"""Zeros behind the record, so that its end does not run into its start."""
+"""Zeros appended to the record, so that its end does not wrap around to its start."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,16 +22,16 @@ class MissingForce:
     force: FloatArray
     """(n, m), N"""
     position: FloatArray
-    """(n, m): what that force adds to the positions of the driven axes."""
+    """(n, m): contribution of that force to the positions of the driven axes."""
     velocity: FloatArray
-    """(n, m): what it adds to their velocities."""
+    """(n, m): contribution to their velocities."""
 
 
 def missing_force(
     model: MechanicalModel, residuals: FloatArray, unit: FloatArray, sample_rate_hz: float, expected_n: FloatArray
 ) -> MissingForce:
-    """residuals: (n, c) in units of `unit` (c,); the response's channels, then the position's. expected_n: (m,), rms
-    that such a force may have; larger ones are let through, with more noise."""
+    """residuals: (n, c) in units of `unit` (c,); the response's channels, then the position's. expected_n: (m,),
+    expected rms of such a force; larger values pass more force and more noise."""
     n, c = residuals.shape
     length = next_fast_len(n + int(_SETTLING_S * sample_rate_hz), real=True)
     seen = axis_transfer(model, sample_rate_hz, rfftfreq(length, 1 / sample_rate_hz))

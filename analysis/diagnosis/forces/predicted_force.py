@@ -1,4 +1,4 @@
-"""Error measure by force: the actuator's force against the force that the model needs along the measured motion."""
+"""Error measure by force: the applied force against the force that the model requires along the measured motion."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -6,9 +6,9 @@ from typing import Self, TypeVar, cast
 
 import numpy as np
 
-from analysis.diagnosis.data.as_recorded import add_carried_weight, under_conditions
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.forces.needed_force import BandMotion, NeededForce, band_motion, needed_force
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.forces.inverse_dynamics import BandMotion, RequiredForce, band_motion, required_force
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
 from equalizer.effects.simulation.along_motion import actuator_force, force_along
 from equalizer.effects.simulation.bodies import bodies_of
@@ -18,10 +18,10 @@ from equalizer.signals.band_limited import filter_low_pass
 from equalizer.signals.signal import FloatArray
 
 EDGE = 0.5
-"""Periods of the band's end."""
+"""Length of the distorted edge, in periods of the band's end."""
 _Found = TypeVar("_Found")
 WEAKEST = 1e-3
-"""Force of an actuator over its command at least, in rms."""
+"""Least ratio of an actuator's force to its command, in rms."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,19 +29,19 @@ class PredictedForce:
     """For a plant in closed loop, whose command depends on the response, and for one that drifts freely."""
 
     records: tuple[Observed, ...]
-    """Views: their `measured` is the force that entered, as far as it lies within the band."""
+    """Records whose `measured` is the applied force within the band."""
     motions: tuple[BandMotion, ...]
-    """Per record: of the model's first m outputs, as measured."""
+    """Per record: measured motion of the model's first m outputs."""
     unit: FloatArray
     noise: FloatArray
-    """(m,): rms of what the noise of the motion makes in the force."""
+    """(m,): rms of the force noise due to the noise of the motion."""
     band_hz: float
     name: str = "predicted force"
     known: tuple[PlacedEffect, ...] = ()
-    """What the model's own file names: it is part of every simulation."""
+    """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
     remembered: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
-    """Cache by kind and record of the last inputs and result: laws are compared on one model, models on one command."""
+    """Last inputs and result by kind and record: laws are compared on one model, models on one command."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
@@ -70,12 +70,12 @@ class PredictedForce:
         return replace(cut, fit=cut.fit & inside, choose=cut.choose & inside)
 
     def can_observe(self, effect: Effect) -> bool:
-        """Whether the effect changes forces; effects of sensors do not, for the reading is taken for the motion."""
+        """Whether the effect changes forces. Effects of sensors do not, because the reading is used as the motion."""
         return isinstance(effect.acts, (Structure, AxisForce, OnCommand))
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         return tuple(
-            self._balance(model, (*self.known, *effects), number).left / self.unit
+            self._balance(model, (*self.known, *effects), number).residual / self.unit
             for number in range(len(self.records))
         )
 
@@ -91,21 +91,21 @@ class PredictedForce:
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure
-        needed = self._remember("needed", number, (structure, motion), lambda: needed_force(structure, motion))
-        entered = self._actuator_force(model, effects, number)
-        ahead = np.concatenate([needed.force[1:], needed.force[-1:]])
-        course = needed.axis_position, needed.axis_velocity, needed.axis_acceleration
-        pushing = entered.within - (needed.force + ahead) / 2
+        required = self._remember("required", number, (structure, motion), lambda: required_force(structure, motion))
+        applied = self._actuator_force(model, effects, number)
+        next_force = np.concatenate([required.force[1:], required.force[-1:]])
+        axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
+        unbalanced = applied.within - (required.force + next_force) / 2
         effects = under_conditions(effects, record.recording)
-        added = force_along(structure, effects, course, (record.command, pushing), rate_hz)
-        # Both are means over the step that begins at a sample; the needed force is that around it.
-        total = entered.around
+        added = force_along(structure, effects, axis_motion, (record.command, unbalanced), rate_hz)
+        # Both are means over the step that begins at a sample; the required force is the mean around the sample.
+        total = applied.around
         if added.any():
             total = total + filter_low_pass(added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
-        # A weaker actuator must not make every error smaller.
+        # Scaled back by the actuator's gain: a weaker actuator must not make every error smaller.
         strength = _rms(record.command)
-        weaker = strength / np.maximum(_rms(entered.force), WEAKEST * strength + np.finfo(float).tiny)
-        return _Balance(needed, (total - needed.force) * weaker, total)
+        rescale = strength / np.maximum(_rms(applied.force), WEAKEST * strength + np.finfo(float).tiny)
+        return _Balance(required, (total - required.force) * rescale, total)
 
     def _actuator_force(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_ActuatorForce":
         record = self.records[number]
@@ -117,7 +117,7 @@ class PredictedForce:
             late = filter_low_pass(force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
             return _ActuatorForce(force, filter_low_pass(force, rate_hz, self.band_hz), late)
 
-        return found() if changed else self._remember("entered", number, (model.actuator, record.command), found)
+        return found() if changed else self._remember("applied", number, (model.actuator, record.command), found)
 
     def _remember(self, what: str, number: int, of: tuple[object, ...], find: Callable[[], _Found]) -> _Found:
         """The cached result where the inputs are the very same objects, else a new one."""
@@ -133,10 +133,10 @@ class PredictedForce:
             model=add_carried_weight(model, record.recording),
             sample_rate_hz=record.recording.sample_rate_hz,
             command=record.command,
-            axis_position=found.needed.axis_position,
-            axis_velocity=found.needed.axis_velocity,
-            axis_force=-found.left,
-            response=found.needed.force,
+            axis_position=found.required.axis_position,
+            axis_velocity=found.required.axis_velocity,
+            axis_force=-found.residual,
+            response=found.required.force,
             predicted=found.total,
             noise=self.noise,
             used=(record.fit | record.choose).astype(np.float64),
@@ -150,8 +150,8 @@ def edge_samples(sample_rate_hz: float, band_hz: float) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ActuatorForce:
-    """(n, m) each: the force that entered, mean over the step that begins at a sample; within the band; and there, as
-    the mean around the sample."""
+    """The applied force, (n, m) each: mean over the step that begins at a sample; the same within the band; and, within
+    the band, the mean around the sample."""
 
     force: FloatArray
     within: FloatArray
@@ -160,12 +160,11 @@ class _ActuatorForce:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Balance:
-    needed: NeededForce
-    left: FloatArray
-    """(n, m): what entered, effects included, less what the motion needed; as if the actuator were as strong as it is
-    said to be."""
+    required: RequiredForce
+    residual: FloatArray
+    """(n, m): applied force, effects included, less the required force; scaled to the actuator's nominal gain."""
     total: FloatArray
-    """(n, m): what entered, effects included."""
+    """(n, m): applied force, effects included."""
 
 
 def _rms(samples: FloatArray) -> FloatArray:

@@ -1,5 +1,6 @@
 """A linear model of a device in closed loop, where none is given: masses, dampers and springs by least squares on
-forces, as rigid robots are identified (Gautier, Vandanjon and Pressé 1994). Spectra would be bent by the controller."""
+forces, as rigid robots are identified (Gautier, Vandanjon and Pressé 1994). Estimates by spectra would be biased by the
+controller."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,7 +11,7 @@ from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.forces.force_views import force_views
-from analysis.diagnosis.forces.needed_force import needed_force
+from analysis.diagnosis.forces.inverse_dynamics import required_force
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.noise_floor import noise_floor
 from analysis.diagnosis.settings import MASSLESS_SHARE, RIGID_MASS_SHARE, RIGID_SHARE, SPRING_SHARE
@@ -34,7 +35,8 @@ def can_be_rigid(recordings: Sequence[Recording]) -> bool:
 
 
 def rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
-    """One body per command. Raises MechanicalModelError where the forces give no mass."""
+    """Least-squares model with one body per command. Raises MechanicalModelError where the forces give no positive
+    mass."""
     model = _unit_masses(recordings[0], name)
     records = observed_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
@@ -61,10 +63,15 @@ def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
 def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
     rows, aims = [], []
     for record, motion in zip(measure.records, measure.motions, strict=True):
-        moved = needed_force(model, motion)
+        motion_and_force = required_force(model, motion)
         used = record.fit | record.choose
-        courses = moved.axis_acceleration, moved.axis_velocity, moved.axis_position, np.ones((len(used), 1))
-        rows.append(np.hstack(courses)[used])
+        columns = (
+            motion_and_force.axis_acceleration,
+            motion_and_force.axis_velocity,
+            motion_and_force.axis_position,
+            np.ones((len(used), 1)),
+        )
+        rows.append(np.hstack(columns)[used])
         aims.append(record.measured[used])
     shapes, aim, m = np.vstack(rows), np.vstack(aims), model.inputs
     whole, left = _least_squares(shapes, aim)
@@ -73,7 +80,8 @@ def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalMod
     mass, damping = ((matrix + matrix.T) / 2 for matrix in (whole if sprung else loose)[: 2 * m].reshape(2, m, m))
     mass = mass + np.diag(np.maximum(_least_mass(shapes[:, :m], aim) - np.diagonal(mass), 0.0))
     stiffness = (whole[2 * m : 3 * m] + whole[2 * m : 3 * m].T) / 2 if sprung else np.zeros((m, m))
-    # A body that pushes itself is no linear model; what makes it seem so is for the diagnosis.
+    # Negative damping or stiffness is set to zero: a linear model must be passive, and the diagnosis looks for the
+    # cause.
     damping = damping if np.linalg.eigvalsh(damping)[0] >= 0 else np.diag(np.maximum(np.diagonal(damping), 0.0))
     stiffness = stiffness if np.linalg.eigvalsh(stiffness)[0] >= 0 else np.zeros((m, m))
     largest = [float(np.abs(np.diagonal(matrix)).max()) for matrix in (mass, damping, stiffness)]
@@ -84,12 +92,13 @@ def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalMod
 
 
 def _least_mass(acceleration: FloatArray, force: FloatArray) -> FloatArray:
-    """(m,): least masses, for bodies whose inertia shows in no force: a simulation needs some."""
+    """(m,): least masses, for bodies whose inertia is not measurable in the force: a simulation needs a positive
+    mass."""
     return np.asarray(MASSLESS_SHARE * force.std(axis=0) / np.maximum(acceleration.std(axis=0), 1e-300))
 
 
 def _least_squares(shapes: FloatArray, aim: FloatArray) -> tuple[FloatArray, float]:
-    """(k, m), and the mean square that is left."""
+    """(k, m): coefficients; and the mean square of the residual."""
     size = np.maximum(np.linalg.norm(shapes, axis=0), np.finfo(float).tiny)
     found = np.linalg.lstsq(shapes / size, aim, rcond=None)[0] / size[:, None]
     return np.asarray(found), float(np.mean((aim - shapes @ found) ** 2))

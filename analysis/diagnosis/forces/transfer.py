@@ -15,7 +15,7 @@ _WELL_CONDITIONED = 1e8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisTransfer:
-    """From a force held over each sample along each driven axis; (lines, rows, m)."""
+    """From a force held over each sample along each driven axis; each (lines, rows, m)."""
 
     response: ComplexArray
     """To the response, as the sensor reads it."""
@@ -25,13 +25,13 @@ class AxisTransfer:
 
 
 def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: FloatArray) -> AxisTransfer:
-    """frequency_hz: (lines,). Effects and actuator apart."""
+    """Transfer functions without effects and actuator. frequency_hz: (lines,)."""
     steps = linear_steps(model, 1 / sample_rate_hz)
     m, p = model.inputs, model.outputs
     z = np.exp(2j * np.pi * frequency_hz / sample_rate_hz)
     rows = np.vstack([steps.motion[: 2 * m], steps.response, steps.position])
     seen = _frequency_response(steps.advance, steps.by_axis_force, rows, z)
-    # A force counts from the next sample on; what it does at once is seen one sample late.
+    # A force takes effect from the next sample on; its direct feedthrough is read one sample late.
     response = seen[:, 2 * m : 2 * m + p] + steps.response_by_axis_force * (1 / z)[:, None, None]
     if model.sensor.bandwidth_hz > 0:
         decay = np.exp(-2 * np.pi * model.sensor.bandwidth_hz / sample_rate_hz)

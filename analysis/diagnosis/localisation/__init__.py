@@ -1,7 +1,8 @@
-"""Localisation of a mismatch: in which cells and states it is significant, and through what it enters.
+"""Localisation of a mismatch: in which cells and states it is significant, and through which component it enters.
 
-In this order: `residual_lines` and `residual_spectra` take a residual's power, `mismatch_cells` tests it cell by cell
-(channel, input, octave, level; `clean_floor`), `mismatch_maps` does so for each stage of the model, `state_dependence`
-and `state_regions` ask in which state of motion it sits, `entry_point` through which component it enters, and
-`distortion` of what kind it is. `result.looks` calls them, by `localisation`, which `localisation_words` says.
+In this order: `residual_lines` and `residual_spectra` estimate the residual's power, `mismatch_cells` tests it cell by
+cell (channel, input, octave, level; `clean_floor`), `mismatch_maps` for each stage of the model; `state_dependence` and
+`state_regions` test its dependence on the state of motion, `entry_point` finds the component, and `distortion` the kind
+of nonlinearity. `result.post_search` calls them through `localisation`; `localisation_words` puts the results into
+sentences.
 """

@@ -14,11 +14,11 @@ IntArray = npt.NDArray[np.int64]
 _MEMORIES = 3.0
 """Length of a block, in correlation times."""
 _COUNTED = 10
-"""Shuffles as large as the statistic from which on they are counted instead of fitted."""
+"""Number of permutations with a larger statistic from which the p-value is counted instead of fitted."""
 SMALLEST = 1e-6
-"""Least p-value: the fitted tail is not trusted beyond."""
+"""Least p-value: the fitted tail is not trusted below it."""
 _LEAST_BLOCKS = 8
-"""Blocks per stratum at least."""
+"""Least number of blocks per stratum."""
 
 
 def correlation_time(series: FloatArray) -> float:
@@ -31,7 +31,7 @@ def correlation_time(series: FloatArray) -> float:
     covariance = np.fft.irfft(spectrum)[:lags]
     if covariance[0] <= 0:
         return 1.0
-    # At each lag, chance alone leaves an n-th of the result.
+    # Chance correlations add 1 / n at each lag on average; the divisor corrects for it.
     return float((2 * np.sum((covariance / covariance[0]) ** 2) - 1) / (1 + 2 * lags / n))
 
 
@@ -64,13 +64,13 @@ def permutation_p_values(
     permutations: int,
     random: np.random.Generator,
 ) -> FloatArray:
-    """(tests,): upper tails of a gamma distribution with the shuffles' mean and variance (Winkler and others 2016),
-    never less than it says. statistics: of the indices by which the series is shuffled, (tests,)."""
+    """(tests,): upper tails of a gamma distribution with the mean and variance of the permutations (Winkler and others
+    2016), or counted, whichever applies. statistics: from permuted indices to statistics (tests,)."""
     seen = statistics(np.arange(len(strata)))
     chance = np.array([statistics(shuffle_blocks(strata, block, random)) for _ in range(permutations)])
     mean, variance = chance.mean(axis=0), np.maximum(chance.var(axis=0, ddof=1), np.finfo(np.float64).tiny)
     p_values = gammaincc(mean**2 / variance, seen * mean / variance)
-    # Shuffles that were as large are believed before the curve through them.
+    # Where enough permutations had a larger statistic, their share is used instead of the fitted tail.
     counted = (np.sum(chance >= seen, axis=0) + 1) / (permutations + 1)
     believed = np.where(counted > _COUNTED / (permutations + 1), counted, np.maximum(p_values, SMALLEST))
     return np.asarray(believed, dtype=np.float64)

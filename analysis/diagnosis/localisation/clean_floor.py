@@ -1,4 +1,5 @@
-"""The mismatch that a model leaves on clean recordings, by cell and by channel, which is no evidence for an effect."""
+"""The mismatch that a model leaves on clean recordings, by cell and by channel; it counts as model error, not as
+evidence for an effect."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,16 +18,16 @@ class CleanFloor:
     """Rms mismatch over the rms signal of clean recordings, raised by `beyond`."""
 
     shares: Mapping[tuple[str, str, str, Band], float] = field(default_factory=dict)
-    """By output, its quantity, input and octave."""
+    """Shares by output, its quantity, input and octave."""
     channels: tuple[float, ...] = ()
-    """By channel, the response's and then the position's, over all octaves. Empty where nothing was learned."""
+    """Shares by channel, the response's and then the position's, over all octaves. Empty without clean recordings."""
     error: str = ""
-    """How it was measured, as `diagnosis.json` says it."""
+    """Name of the error measure, as in `diagnosis.json`."""
     recordings: int = 0
 
     @property
     def beyond(self) -> float:
-        """Factor by which the largest observed share was raised: the fewer recordings, the more."""
+        """Factor by which the largest observed share was raised; larger for fewer recordings."""
         return 1 + 1 / max(self.recordings, 1)
 
     def share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
@@ -40,7 +41,7 @@ class CleanFloor:
 
 
 def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
-    """Empty where nothing was learned."""
+    """Sentence about the clean recordings; empty without any."""
     if not floor.channels:
         return ""
     shares = conjoin([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])

@@ -1,5 +1,5 @@
 """Nonlinear distortion by kind (odd, even, varying), from repeats and from silent lines of a periodic excitation, by
-channel, input, level and band. `Distortions.remarks` say which kinds the recording cannot show."""
+channel, input, level and band. `Distortions.remarks` names the kinds that the recording cannot show."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
 Kind = Literal["odd", "even", "either", "varying"]
-"""Odd and even distortion; distortion of either kind where even lines were driven; what differs between periods beyond
-the noise."""
+"""Odd and even distortion; distortion of either kind where even lines were driven; variation between periods beyond the
+noise."""
 
 
 class _Where(NamedTuple):
@@ -33,7 +33,7 @@ class _Where(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Distortion:
-    """One kind in one cell."""
+    """One kind of distortion in one cell."""
 
     output: str
     quantity: str
@@ -43,19 +43,19 @@ class Distortion:
     amplitude: float
     band_hz: Band
     whole_band: bool
-    """True: all that was driven, not one octave of it."""
+    """True: the whole driven band; False: one octave of it."""
     kind: Kind
     rms: float
     """Rms distortion in the output's unit, over all lines of the band that this kind reaches; 0 where not above the
     noise."""
     limit_rms: float
-    """Detection limit."""
+    """Detection limit, rms in the output's unit."""
     signal_rms: float
-    """The response on the driven lines."""
+    """Rms response on the driven lines."""
     p_value: float
-    """Chance of as much from noise alone."""
+    """p-value: probability of such a value from noise alone."""
     lines: int
-    """Number of lines that it was measured on."""
+    """Number of lines that were evaluated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +80,8 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
         signals.append((recording.position, floor.position))
     cells: list[Distortion] = []
     for signal, noise in signals:
-        for look in segment_spectra(recording, signal, noise, floor.frequency_hz, periods):
-            cells += _cells(look, signal)
+        for spectrum in segment_spectra(recording, signal, noise, floor.frequency_hz, periods):
+            cells += _cells(spectrum, signal)
     return Distortions(tuple(cells), tuple(_untestable_remarks(periods)))
 
 
@@ -102,49 +102,49 @@ def _untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> li
     return remarks
 
 
-def _cells(look: SegmentSpectrum, signal: Signal) -> list[Distortion]:
-    lowest, highest = (float(line) for line in look.frequency_hz[look.lines.driven][[0, -1]])
+def _cells(spectrum: SegmentSpectrum, signal: Signal) -> list[Distortion]:
+    lowest, highest = (float(line) for line in spectrum.frequency_hz[spectrum.lines.driven][[0, -1]])
     cells = []
     octaves = octaves_between(lowest, highest)
     for band in dict.fromkeys(((octaves[0][0], octaves[-1][1]), *octaves)):
-        inside = lines_in_band(look.frequency_hz, band)
-        if (inside & look.lines.driven).any():
+        inside = lines_in_band(spectrum.frequency_hz, band)
+        if (inside & spectrum.lines.driven).any():
             for number, name in enumerate(signal.channels):
-                where = _Where(name, signal.quantities[number], look.input, look.amplitude, band)
-                cells += _kinds(look, number, inside, where, band == (octaves[0][0], octaves[-1][1]))
+                where = _Where(name, signal.quantities[number], spectrum.input, spectrum.amplitude, band)
+                cells += _kinds(spectrum, number, inside, where, band == (octaves[0][0], octaves[-1][1]))
     return cells
 
 
-def _kinds(look: SegmentSpectrum, channel: int, inside: Mask, where: _Where, whole: bool) -> list[Distortion]:
-    power, error = np.abs(look.mean[:, channel]) ** 2, look.error[:, channel]
-    signal_rms = float(np.sqrt(2 * np.sum(power[inside & look.lines.driven])))
+def _kinds(spectrum: SegmentSpectrum, channel: int, inside: Mask, where: _Where, whole: bool) -> list[Distortion]:
+    power, error = np.abs(spectrum.mean[:, channel]) ** 2, spectrum.error[:, channel]
+    signal_rms = float(np.sqrt(2 * np.sum(power[inside & spectrum.lines.driven])))
     found: list[tuple[Kind, tuple[float, float, float], float, int]] = []
-    for kind, chosen, reached in _detection_masks(look, inside):
-        freedom = float(2 * max(look.count - 1, 1) * chosen.sum())
+    for kind, chosen, reached in _detection_masks(spectrum, inside):
+        freedom = float(2 * max(spectrum.count - 1, 1) * chosen.sum())
         beyond = excess(power[chosen], error[chosen], freedom)
         found.append((kind, beyond, reached / chosen.sum(), int(chosen.sum())))
-    if look.count > 1:
-        # Each line is known from looks - 1 differences.
-        seen = np.repeat(look.spread[inside, channel], look.count - 1)
+    if spectrum.count > 1:
+        # Each line has count - 1 differences between periods.
+        seen = np.repeat(spectrum.spread[inside, channel], spectrum.count - 1)
         beyond = excess(
-            seen, np.repeat(look.floor[inside, channel], look.count - 1), float(look.floor_freedom[channel])
+            seen, np.repeat(spectrum.floor[inside, channel], spectrum.count - 1), float(spectrum.floor_freedom[channel])
         )
-        found.append(("varying", beyond, 1 / (look.count - 1), int(inside.sum())))
+        found.append(("varying", beyond, 1 / (spectrum.count - 1), int(inside.sum())))
     return [
         Distortion(*where, whole, kind, _rms(share * beyond), _rms(share * limit), signal_rms, p_value, lines)
         for kind, (beyond, limit, p_value), share, lines in found
     ]
 
 
-def _detection_masks(look: SegmentSpectrum, inside: Mask) -> list[tuple[Kind, Mask, int]]:
-    """Kinds of detection lines, those in the band, and how many lines of the band that kind of distortion reaches."""
+def _detection_masks(spectrum: SegmentSpectrum, inside: Mask) -> list[tuple[Kind, Mask, int]]:
+    """Kinds of distortion with their lines in the band, and the number of lines of the band that each kind reaches."""
     numbers = np.arange(1, len(inside) + 1)
-    multiple = inside & (numbers % look.lines.step == 0)
-    odd = numbers // look.lines.step % 2 == 1
+    multiple = inside & (numbers % spectrum.lines.step == 0)
+    odd = numbers // spectrum.lines.step % 2 == 1
     kinds: list[tuple[Kind, Mask, int]] = [
-        ("odd", np.asarray(inside & look.lines.odd), int((multiple & odd).sum())),
-        ("even", np.asarray(inside & look.lines.even), int((multiple & ~odd).sum())),
-        ("either", np.asarray(inside & look.lines.either), int(multiple.sum())),
+        ("odd", np.asarray(inside & spectrum.lines.odd), int((multiple & odd).sum())),
+        ("even", np.asarray(inside & spectrum.lines.even), int((multiple & ~odd).sum())),
+        ("either", np.asarray(inside & spectrum.lines.either), int(multiple.sum())),
     ]
     return [kind for kind in kinds if kind[1].any()]
 

@@ -1,8 +1,9 @@
-"""Finds through which component a mismatch enters: a force at an axis, of any cause, moves all channels in
-proportions that the model knows; an error of one sensor shows in that channel alone.
+"""Finds through which component a mismatch enters: a force at an axis, of any cause, moves all channels in proportions
+that the model knows; an error of one sensor appears in its channel alone.
 
-The score is the mean logarithm of the power that an entry leaves unexplained, line by line. A share of the power summed
-over lines says little, for where the device moves as one rigid body nearly all directions look alike.
+The score is the mean over lines of the logarithm of the power that an entry leaves unexplained. A share of the power
+summed over lines would be dominated by lines at which the device moves as a rigid body, where nearly all directions are
+alike.
 """
 
 from collections.abc import Sequence
@@ -29,23 +30,24 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _BLOCK_LINES = 8
-"""Neighbouring lines, which are correlated, that count as one when two entries are compared."""
+"""Number of neighbouring (correlated) lines that count as one when two entries are compared."""
 _TINY = np.finfo(np.float64).tiny
 
 
-# A mismatch of the response that the position does not show is the sensor's: a force would move both.
+# A mismatch of the response without one of the position belongs to the response sensor: a force would move both.
 @dataclass(frozen=True, slots=True)
 class SensorRule:
     verdict: Literal["response sensor", "motion", "undecided"]
     expected: float
-    """What the response's residual would leave in position if the device moved so, in units of position's noise
-    (power), on the lines where that would be seen."""
+    """Power of the position that corresponds to the response's residual, if it were real motion, in units of the
+    position's noise, on the lines where that could be measured."""
     seen: float
-    """The power found in position, in the same unit, noise subtracted."""
+    """Power of the position's residual in the same unit, noise subtracted."""
 
 
 def sensor_rule(spectra: ResidualSpectra, derivative: int) -> SensorRule | None:
-    """derivative: which of position the response is. None without position of as many channels as the response."""
+    """derivative: order of the position's time derivative that the response is. None where position and response have
+    different numbers of channels."""
     p = spectra.responses
     if spectra.residual.shape[2] != 2 * p:
         return None
@@ -58,7 +60,7 @@ def sensor_rule(spectra: ResidualSpectra, derivative: int) -> SensorRule | None:
         return SensorRule("undecided", 0.0, 0.0)
     expected = float(np.mean((moved / noise)[telling]))
     seen = float(np.mean(((position - noise) / noise)[telling]))
-    # Per line, so that a few strong lines do not speak for all.
+    # Per line, so that a few strong lines do not dominate.
     share = float(np.median(np.clip((position - noise)[telling] / moved[telling], 0, 2)))
     if share < SENSOR_ABSENT:
         return SensorRule("response sensor", expected, seen)
@@ -74,7 +76,7 @@ class Entry:
     """(lines, channels, k): frequency response of the channels to k independent inputs there; (1, channels, k) where it
     is the same at all lines."""
     of_position: bool = False
-    """A sensor entry of the position sensor."""
+    """Whether this is an error of the position sensor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,27 +87,28 @@ class EntryScore:
     score: float
     """Mean log of unexplained power, noise = 0. Lower is better."""
     share: float
-    """Share of the residual's power beyond noise that it explains, median over lines."""
+    """Median over lines of the explained share of the residual's power beyond noise."""
     p_value: float
-    """p-value of explaining as much as the best; 1 for the best and for entries like it."""
+    """p-value of explaining as much as the best entry; 1 for the best and for entries equivalent to it."""
     alike: tuple[str, ...]
-    """Entries that these channels cannot tell from it."""
+    """Entries that cannot be distinguished from it by these channels."""
 
 
 @dataclass(frozen=True, slots=True)
 class EntryPoint:
     ranking: tuple[EntryScore, ...]
-    """Best first."""
+    """Entries, best first."""
     rule: SensorRule | None
-    """What position and response together say; None without position."""
+    """Result of comparing position and response; None without position."""
     lines: int
-    """That were loud enough to count."""
+    """Number of lines with enough power to count."""
 
 
 def entry_point(
     spectra: ResidualSpectra, entries: Sequence[Entry], derivative: Literal[0, 1, 2] | None = 2
 ) -> EntryPoint:
-    """derivative: which of position the response is, channel by channel (2 = acceleration); None where it is not.
+    """derivative: order of the position's time derivative that the response is, channel by channel (2 = acceleration);
+    None where it is none.
 
     Raises ValueError where an entry's directions do not fit the lines and channels.
     """
@@ -153,7 +156,8 @@ def _unexplained_power(whitened: ComplexArray, total: FloatArray, basis: Complex
 
 
 def _score_penalty(rule: SensorRule | None, entry: Entry, dimensions: int) -> float:
-    """Penalty on a score: for more dimensions, and where the sensor rule contradicts the entry."""
+    """Penalty on a score: for more dimensions, and where the comparison of position and response contradicts the
+    entry."""
     parsimony = ENTRY_PER_DIMENSION * (dimensions - 1)
     if rule is None or rule.verdict == "undecided":
         return parsimony
@@ -171,7 +175,7 @@ def _angle(first: ComplexArray, other: ComplexArray) -> float:
 
 
 def _p_value_as_good(log: FloatArray, best: FloatArray, loud: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> float:
-    """One-sided paired t-test over blocks of neighbouring loud lines."""
+    """One-sided paired t-test over blocks of neighbouring lines with enough power."""
     difference = (log - best)[loud]
     blocks = len(difference) // _BLOCK_LINES
     if blocks < 3:

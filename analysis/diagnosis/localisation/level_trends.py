@@ -1,7 +1,8 @@
-"""Trends of distortion with level, which point at a kind of physics before any fit.
+"""Trends of distortion with level, which indicate a kind of physics before any fit.
 
-Relative to the linear response, friction and dead zones fall with level, stiffness and drag rise, limits rise from
-nothing, what is tied to position stays, timing makes more of what varies, and noise from outside takes no notice of it.
+Relative to the linear response, distortion by friction and dead zones falls with the level; by nonlinear stiffness and
+drag it rises; by saturation it rises from nothing; by position-dependent forces it stays. Timing errors increase the
+variation between periods; external noise does not depend on the level.
 """
 
 from collections.abc import Sequence
@@ -29,17 +30,18 @@ class LevelTrend:
     p_value: float
     """p-value of no distortion: the smallest over levels, corrected for their number."""
     db_per_doubling: float | None
-    """Slope of the relative size with the level; None where seen at no level, or with one level only."""
+    """Slope of the relative distortion with the level; None where it is not significant at any level, or with one level
+    only."""
     from_nothing: bool
-    """It was not seen at the lowest level: the slope is a lower bound."""
+    """Not significant at the lowest level: the slope is a lower bound."""
 
     @property
     def present(self) -> bool:
         return self.p_value < DISTORTION_P
 
     @property
-    def course(self) -> str:
-        """ "falls", "rises", "rises from nothing", "stays", or "" where nothing can be said."""
+    def level_dependence(self) -> str:
+        """ "falls", "rises", "rises from nothing", "stays", or "" where the trend is unknown."""
         if not self.present or self.db_per_doubling is None:
             return ""
         if abs(self.db_per_doubling) < STEADY_DB:
@@ -52,7 +54,7 @@ class LevelTrend:
 def level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
     groups: dict[tuple[str, str, str, Band, bool, Kind], list[Distortion]] = {}
     for cell in cells:
-        # Realisations differ a little in the band that they drive.
+        # Realisations differ slightly in the band that they drive.
         band = _ALL if cell.whole_band else cell.band_hz
         key = (cell.output, cell.quantity, cell.input, band, cell.whole_band, cell.kind)
         groups.setdefault(key, []).append(cell)
@@ -74,8 +76,8 @@ def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distorti
 
 
 def _slope_with_limits(levels: FloatArray, relative_db: FloatArray, lines: FloatArray, seen: Mask) -> float | None:
-    """Slope. Where nothing was seen at a level, the limit of what would have been bounds the slope: from
-    below where that is the lowest level, from above where it is the highest."""
+    """Slope. Where the distortion is not significant at a level, the detection limit there bounds the slope: from below
+    at the lowest level, from above at the highest."""
     if not seen.any() or not (levels > 0).all() or len(set(levels)) < 2:
         return None
     bounded = _slope(np.log2(levels), relative_db, lines)

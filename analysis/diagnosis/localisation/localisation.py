@@ -1,4 +1,4 @@
-"""Localises a mismatch: in which state of motion it sits, through which component it enters, and of what kind it is."""
+"""Localises a mismatch: the state of motion that it depends on, the component through which it enters, and its kind."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -26,7 +26,7 @@ from equalizer.signals.signal import FloatArray
 _DERIVATIVES: Mapping[str, Literal[0, 1, 2]] = {
     "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2,
 }  # fmt: skip
-"""Which of position a response is, by its quantity."""
+"""Order of the position's time derivative, by the response's quantity."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,14 +34,15 @@ class Localisation:
     states: Mapping[str, tuple[StateMismatch, ...]] = field(default_factory=dict)
     """Significant state dependences, by "before", "retuned", "after"."""
     entry: EntryPoint | None = None
-    """Entry point of what re-tuning leaves; None where that is nothing, the model drifts, or the noise is not known."""
+    """Entry point of the re-tuned model's residual; None where that is noise, the model drifts, or the noise is not
+    known."""
     distortions: Distortions = field(default_factory=lambda: Distortions((), ()))
 
 
 def find_entry_point(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, floor: NoiseFloor, cells: Sequence[MismatchCell]
 ) -> EntryPoint | None:
-    """The entry point by the first recording, which stands for the device. cells: of this fit, the re-tuned model's."""
+    """The entry point by the first recording, which represents the device. cells: of this fit, the re-tuned model's."""
     if measure.name != "free simulation" or not any(cell.beyond_noise for cell in cells):
         return None
     record = measure.records[0]

@@ -1,4 +1,4 @@
-"""Sentences about where a mismatch sits."""
+"""Sentences about the localisation of a mismatch."""
 
 from collections.abc import Sequence
 
@@ -14,13 +14,13 @@ _FORCES = "drives, mechanism and a hand enter so, and so does timing, which shif
 
 
 def localisation_sentences(local: Localisation) -> tuple[str, ...]:
-    """Sentences about what re-tuning leaves: where it enters, and the states that it depends on."""
+    """Sentences about the residual of the re-tuned model: where it enters, and the states that it depends on."""
     said = (entry_sentence(local.entry), states_sentence(local.states.get("retuned", ())))
     return tuple(sentence for sentence in said if sentence)
 
 
 def entry_sentence(entry: EntryPoint | None) -> str:
-    """Where the mismatch enters; empty where too few lines are loud."""
+    """Where the mismatch enters; empty with too few lines of enough power."""
     if entry is None or not entry.ranking or entry.lines < ENTRY_LEAST_LINES:
         return ""
     best = entry.ranking[0]
@@ -51,7 +51,7 @@ def states_sentence(states: Sequence[StateMismatch]) -> str:
 def _rival_entry(entry: EntryPoint) -> str:
     best, others = entry.ranking[0], [score for score in entry.ranking[1:] if score.name not in entry.ranking[0].alike]
     alike = f"; so does {conjoin(best.alike)}, which looks the same" if best.alike else ""
-    # Forces along several axes hold each single one, and errors of several channels each channel's.
+    # Entries along several axes contain those along each, and errors of several channels contain each channel's.
     rivals = [other for other in others if not (other.axis is None and other.place == best.place)]
     if not rivals:
         return alike

@@ -1,7 +1,7 @@
 """Tests a prediction against a recording, per cell: channel x driving input x octave x level.
 
-The residual is tested against noise and an equivalence margin, which includes what clean recordings have, where there
-are any; `model_error` tests it against the model's error elsewhere.
+The residual is tested against noise and an equivalence margin, which includes the mismatch of clean recordings, if
+there are any; `model_error` tests it against the model's error in other cells.
 """
 
 from collections.abc import Hashable, Sequence
@@ -22,7 +22,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
-    """A model's answer to the recorded command; NaN where it has none."""
+    """A model's response to the recorded command; NaN where not computed."""
 
     response: FloatArray
     """(n, p)"""
@@ -45,7 +45,7 @@ class Margin:
 class MismatchCell:
     output: str
     quantity: str
-    """Of the output: response and position channels may share a name."""
+    """Quantity of the output: response and position channels may share a name."""
     input: str
     """Driven inputs, joined by "+"."""
     band_hz: Band
@@ -54,30 +54,30 @@ class MismatchCell:
     rms: float
     """Rms mismatch in the output's unit, noise subtracted."""
     signal_rms: float
-    """Rms response in the cell, or a tenth of the loudest channel's, whichever is larger."""
+    """Rms response in the cell, or a tenth of that of the strongest channel, whichever is larger."""
     in_noise: float
-    """The residual's rms in units of what noise alone would leave."""
+    """Rms of the residual, in units of that from noise alone."""
     margin: float
-    """Share of the signal that was taken for equivalent."""
+    """Equivalence margin, as a share of the signal."""
     p_value: float
-    """Chance of as much from noise and a mismatch of the margin's size."""
+    """p-value: probability of such a residual from noise and a mismatch of the margin's size."""
     adjusted_p_value: float
-    """Adjusted for the number of cells, within channel and band."""
+    """p-value adjusted for the number of cells, within channel and band."""
     seconds: float
     lines: float = 1.0
     """Number of independent lines."""
     freedom: float = 1.0
-    """Degrees of freedom that the noise is known with."""
+    """Degrees of freedom of the noise estimate."""
     signal_in_noise: float = 0.0
     """Power of `signal_rms` over the noise's, mean over the lines."""
     part: int = 0
-    """Number of the recordings' part in which it lies."""
+    """Index of the recordings' part that contains the cell."""
     beyond_noise: bool = False
-    """Significant beyond noise and margin, independent of the model's error elsewhere."""
+    """Whether it is significant beyond noise and margin, regardless of the model's error in other cells."""
 
     @property
     def share(self) -> float:
-        """Mismatch / signal, rms; above 1 where the prediction is worse than none."""
+        """Mismatch over signal, rms; above 1 where the prediction is worse than zero."""
         return self.rms / self.signal_rms if self.signal_rms > 0 else 0.0
 
     @property
@@ -94,7 +94,7 @@ def mismatch_cells(
 ) -> tuple[MismatchCell, ...]:
     """All cells of a recording. used: (n,), the samples that count; None = all. Empty where the noise is not known.
 
-    Raises ValueError where a prediction has another shape than what it predicts.
+    Raises ValueError where a prediction has another shape than the recording.
     """
     seen = _observations(recording, prediction, floor)
     if not floor.known:
@@ -156,8 +156,8 @@ def adjust_for_cells(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, ...]:
 
 
 def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
-    """The largest share of each cell over clean recordings and levels, raised the more, the fewer recordings there are.
-    clean: the cells of each recording."""
+    """The largest share of each cell over clean recordings and levels, raised by a factor that is larger for fewer
+    recordings. clean: the cells of each recording."""
     shares: dict[tuple[str, str, str, Band], float] = {}
     for cells in clean:
         for cell in cells:

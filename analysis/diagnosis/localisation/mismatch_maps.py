@@ -18,7 +18,7 @@ from analysis.diagnosis.types import Mapper
 
 Cells = tuple[MismatchCell, ...]
 STRETCHES = 16
-"""Stretches of a record, over which error powers are compared with noise."""
+"""Stretches of a record over which error powers are compared with noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +45,7 @@ def mismatch_maps(
     map_: Mapper = map,
 ) -> Maps:
     """Maps of all stages. stages: see `Explanation.stages`. learned: the mismatch of clean recordings, which does not
-    count; neither does the error of the last stage on held-out samples."""
+    count; nor does the error of the last stage on held-out samples."""
     # Stages with the same fit are tested once.
     fits = list({id(fitted): fitted for fitted in stages.values()}.values())
 
@@ -60,8 +60,8 @@ def mismatch_maps(
 
 
 def whole_mismatch(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tuple[Mismatch, ...]:
-    """One row for the worst channel over the whole band, where no place stands out. Its p-value is that of more than
-    noise, in the mean over stretches (one-sided t test) or in their sum."""
+    """One row for the worst channel over the whole band, where no cell is significant. Its p-value is that of an error
+    above the noise, in the mean over stretches (one-sided t test) or in their sum."""
     record = measure.records[0].recording
     errors = np.fmax(np.maximum(score.fit, score.choose), score.test)
     worst = int(np.argmax(errors))
@@ -74,11 +74,11 @@ def whole_mismatch(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tu
 
 
 def _p_value_of_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> float:
-    """p-value of a larger error power than noise's, over stretches of time: within one, errors hang together.
+    """p-value of an error power above that of noise, over stretches of time, within which errors are correlated.
 
-    By what stretches have in common (t test), or by their sum, were each stretch a single sample of noise (chi-square):
-    where a few of them err by far, their spread hides from the first what the second shows. Twice the smaller of the
-    two (Bonferroni).
+    Either by the mean over stretches (t test), or by their sum with each stretch as a single sample of noise
+    (chi-squared test): where a few stretches have large errors, their scatter hides from the first what the second
+    detects. Twice the smaller p-value of the two (Bonferroni).
     """
     powers = []
     for record, residuals in zip(measure.records, fitted.residuals, strict=True):
@@ -100,7 +100,7 @@ def cells_of(
     learned: CleanFloor | None = None,
     held_out: bool = False,
 ) -> Cells:
-    """Cells of all records for one fit. held_out: only of samples that nothing was fitted to."""
+    """Cells of all records for one fit. held_out: only the samples that nothing was fitted to."""
     margin = Margin(learned=learned or CleanFloor())
     cells: list[MismatchCell] = []
     for part, (record, residuals, floor) in enumerate(zip(measure.records, fitted.residuals, floors, strict=True)):

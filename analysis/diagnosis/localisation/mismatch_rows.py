@@ -25,9 +25,9 @@ class StateMismatch:
 def mismatch_rows(
     cells: Sequence[MismatchCell], states: Sequence[StateMismatch] = (), most: int = MOST_ROWS
 ) -> tuple[Mismatch, ...]:
-    """Significant rows: states first, those that hold most of the mismatch's power at the top; then cells, by the share
-    of their channel's whole signal that is missing there. `share` of a cell's row is that of the signal within the
-    cell (rms, at most 1), which is large in bands without signal and says little by itself."""
+    """Significant rows: states first, in the order of the mismatch power that they contain; then cells, by their
+    missing share of the channel's whole signal. `share` of a cell's row is relative to the signal within the cell (rms,
+    at most 1), which is large in bands without signal and has little meaning by itself."""
     tied = [state for state in states if state.region.p_value <= FALSE_DISCOVERY_RATE]
     found = [cell for cell in cells if cell.significant]
     whole = _whole_signals(cells)
@@ -42,7 +42,7 @@ def _channel(cell: MismatchCell) -> tuple[str, str]:
 
 
 def _whole_signals(cells: Sequence[MismatchCell]) -> dict[tuple[str, str], float]:
-    """Rms of each channel's response over all bands, where it was excited most."""
+    """Rms of each channel's response over all bands, in the segment that excited it most."""
     powers: dict[tuple[str, str], dict[tuple[str, float], float]] = {}
     for cell in cells:
         driven = powers.setdefault(_channel(cell), {})

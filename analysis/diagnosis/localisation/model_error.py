@@ -1,10 +1,10 @@
 """A model's typical error on held-out data, by channel and band, beyond which a mismatch is significant.
 
-No model is exact, and noise says nothing of how far it is off. So the residual in a cell is taken for noise and model
-error, both random, the error's power a share of the signal's that changes slowly with frequency. The share is learned
-from the held-out cells of the most complete model, of the same channel, in the same octave and those beside it: other
-levels, other axes, other recordings. Its robust estimate is the median, so that a mismatch at one level or in one
-octave does not raise what it is compared with.
+No model is exact, and its error does not follow from the noise. The residual in a cell is therefore modelled as noise
+plus model error, both random, with the error's power a share of the signal's that varies slowly with frequency. The
+share is learned from the held-out cells of the most complete model, of the same channel, in the same octave and those
+beside it: other levels, other axes, other recordings. Its robust estimate is the median, so that a mismatch at one
+level or in one octave does not raise its own reference.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ BESIDE = 2.1
 @dataclass(frozen=True, slots=True)
 class _HeldOutShare:
     fold: tuple[int, str, float]
-    """Part, input and level."""
+    """Key of a cell: part, input and level."""
     band_hz: Band
     share: float
 
@@ -41,7 +41,7 @@ class ModelError:
             if 1 / BESIDE < held.band_hz[0] / cell.band_hz[0] < BESIDE
             and (held.fold, held.band_hz) != (_fold(cell), cell.band_hz)
         ]
-        # The power of one line is exponential, with a median of ln 2 of its mean.
+        # The power of one line is exponentially distributed, with a median of ln 2 times its mean.
         return (float(np.median(near) / np.log(2)), len(near)) if near else (0.0, 0)
 
     def typical(self) -> Mapping[tuple[str, str], float]:
@@ -64,7 +64,7 @@ def adjust_for_model_error(cells: Sequence[MismatchCell], error: ModelError) -> 
 
 def _p_value(cell: MismatchCell, error: ModelError) -> float:
     """p-value of an F ratio of two sums of powers, each with the degrees of freedom of a chi-squared variable of its
-    mean and variance (Satterthwaite 1946). In the cell, the model error counts as if on a single line."""
+    mean and variance (Satterthwaite 1946). The model error in the cell has the degrees of freedom of a single line."""
     share, count = error.of(cell)
     erred = share * cell.signal_in_noise
     if not count or erred <= 0:

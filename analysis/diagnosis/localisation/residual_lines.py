@@ -21,14 +21,15 @@ _DRIVEN_IN_BAND = 1e-4
 _DRIVEN_IN_WINDOW = 1e-2
 """Share of its band's strongest window below which a window does not count for the band."""
 _HANN_NEIGHBOURS = 1.944
-"""1 + 2 (4/9 + 1/36): factor by which neighbouring lines of a Hann window lower the degrees of freedom."""
+"""1 + 2 (4/9 + 1/36): factor by which the correlation of neighbouring lines of a Hann window reduces the degrees of
+freedom."""
 _HANN_OVERLAP = 1.056
 """1 + 2/36: the same for windows that overlap by half."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualLines:
-    """One segment in one band, one signal; each array (channels,)."""
+    """Powers of one signal in one band of one segment; each array (channels,)."""
 
     input: str
     amplitude: float
@@ -38,7 +39,7 @@ class ResidualLines:
     lines: float
     """Number of independent lines."""
     residual: FloatArray
-    """Power per second, summed over lines: mean square, noise included."""
+    """Mean square of the residual, summed over lines, noise included."""
     noise: FloatArray
     """The same expected from noise alone."""
     signal: FloatArray
@@ -46,13 +47,13 @@ class ResidualLines:
     whitened: FloatArray
     """Mean over lines of residual power / noise power: 1 for noise alone."""
     signal_to_noise: FloatArray
-    """Signal over noise power, summed over independent lines; weak channels count with a tenth of the loudest's
-    amplitude."""
+    """Signal over noise power, summed over independent lines; weak channels count with a tenth of the strongest
+    channel's amplitude."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """One signal with its prediction; (n, channels)."""
+    """One signal with its prediction; each (n, channels)."""
 
     measured: FloatArray
     predicted: FloatArray
@@ -62,13 +63,13 @@ class Observation:
 
 
 _LEAST_AMPLITUDE = 0.1
-"""Amplitude of a channel at least, over the loudest channel of its quantity: what leaks into a channel that is hardly
-driven is a matter of a degree of misalignment, and is judged by the loudest."""
+"""Least amplitude of a channel, relative to the strongest of its quantity: the response of a channel that is hardly
+driven depends on fractions of a degree of misalignment, so the strongest is the reference."""
 
 
 def residual_lines(recording: Recording, seen: Observation, used: Mask) -> list[ResidualLines]:
-    """Residual power by segment and band. used: (n,), the samples that count. Segments without a whole period or window
-    of them are left out."""
+    """Residual power by segment and band. used: (n,), the samples that count. Segments without a complete period or
+    window are left out."""
     whole = used & np.isfinite(seen.measured).all(axis=1) & np.isfinite(seen.predicted).all(axis=1)
     periods = {period.index: period for period in settled_periods(recording)}
     left = seen.measured - seen.predicted
@@ -152,14 +153,15 @@ def _of_windows(
 def _window_power(samples: FloatArray, starts: Sequence[int], length: int) -> FloatArray:
     """(windows, lines, channels)"""
     hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
-    looks = np.stack([samples[start : start + length] for start in starts])
-    return np.abs(spectra((looks - looks.mean(axis=1, keepdims=True)) * hann[:, None])) ** 2
+    periods = np.stack([samples[start : start + length] for start in starts])
+    return np.abs(spectra((periods - periods.mean(axis=1, keepdims=True)) * hann[:, None])) ** 2
 
 
-def _noise_power(seen: Observation, lines_hz: FloatArray, looks: int) -> FloatArray:
-    """Noise power times length, of the mean of `looks` periods; the repeating part of rounding does not average out."""
+def _noise_power(seen: Observation, lines_hz: FloatArray, periods: int) -> FloatArray:
+    """Noise power times length, of the mean of `periods` periods; the repeating part of rounding does not average
+    out."""
     density = np.stack([np.interp(lines_hz, seen.noise_hz, channel) for channel in seen.noise.density.T], axis=1)
-    return (density - seen.noise.rounding) / looks + seen.noise.rounding
+    return (density - seen.noise.rounding) / periods + seen.noise.rounding
 
 
 def _sum_lines(

@@ -42,8 +42,8 @@ def residual_spectra(
     model_error: float = 0.01,
 ) -> ResidualSpectra | None:
     """Spectra of mean periods; of windows of two seconds where nothing is periodic. None where there is neither, or the
-    noise is not known. used: (n,), the samples that count. model_error: share of the response on each line that the
-    model is not trusted for, counted as noise: else what re-tuning leaves on other axes passes for a second force."""
+    noise is not known. used: (n,), the samples that count. model_error: share of the response on each line that counts
+    as noise: otherwise residuals of the re-tuned model on other axes would appear as a second force."""
     left = [recording.response.samples - prediction.response]
     noises = [floor.response]
     if recording.position is not None and prediction.position is not None and floor.position is not None:
@@ -51,25 +51,27 @@ def residual_spectra(
         noises.append(floor.position)
     residual = np.hstack(left)
     whole = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
-    looks = [
+    segments = [
         period for period in (_whole_periods(periods, whole) for periods in settled_periods(recording)) if period.starts
     ]
-    if not looks:
-        looks = _windows(recording, whole)
-    looks = [look for look in looks if look.length == looks[0].length]
-    if not looks or not floor.known:
+    if not segments:
+        segments = _windows(recording, whole)
+    segments = [segment for segment in segments if segment.length == segments[0].length]
+    if not segments or not floor.known:
         return None
-    lines_hz = looks[0].frequency_hz(recording.sample_rate_hz)
-    excitation = np.stack([period_spectra(instrument_signal(recording), look).mean(axis=0) for look in looks])
+    lines_hz = segments[0].frequency_hz(recording.sample_rate_hz)
+    excitation = np.stack([period_spectra(instrument_signal(recording), segment).mean(axis=0) for segment in segments])
     together = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
     driven = detection_lines(together, hold_length(instrument_signal(recording)))
     if driven is None:
         return None
     first, last = np.flatnonzero(driven.driven)[[0, -1]]
     inside = slice(int(first), int(last) + 1)
-    spectra = np.stack([period_spectra(residual, look).mean(axis=0)[inside] for look in looks])
-    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], look) for look in looks])
-    noise += model_error**2 * np.stack([_response_power(recording, look, len(noises) > 1)[inside] for look in looks])
+    spectra = np.stack([period_spectra(residual, segment).mean(axis=0)[inside] for segment in segments])
+    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], segment) for segment in segments])
+    noise += model_error**2 * np.stack(
+        [_response_power(recording, segment, len(noises) > 1)[inside] for segment in segments]
+    )
     return ResidualSpectra(lines_hz[inside], spectra, noise, left[0].shape[1])
 
 
@@ -91,7 +93,8 @@ def _windows(recording: Recording, whole: Mask) -> list[Periods]:
 
 
 def _response_power(recording: Recording, periods: Periods, position: bool) -> FloatArray:
-    """(lines, channels): squared magnitudes; a channel counts for a tenth of the loudest of its signal at least."""
+    """(lines, channels): squared magnitudes; a weak channel counts with a tenth of the strongest channel of its
+    signal."""
     signals = [recording.response, *([recording.position] if position and recording.position is not None else [])]
     parts = []
     for signal in signals:

@@ -1,4 +1,4 @@
-"""Mean spectrum and standard error of each periodic segment, the command's own part on silent lines removed."""
+"""Mean spectrum and standard error of each periodic segment, corrected for the command's content on silent lines."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ from equalizer.signals.signal import FloatArray, Signal
 
 _SMOOTHED_LINES = 9
 _CLEAN = 1e-5
-"""Share of a command's strongest line below which a silent one brings nothing."""
+"""Share of a command's strongest line below which its content on a silent line is negligible."""
 _LEAST_INDEPENDENCE = 1e-3
 _INTERPOLATED = 0.1
-"""Relative error of a response between driven lines."""
+"""Relative error of a response that is interpolated between driven lines."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,8 +67,8 @@ def segment_spectra(
             if linear is not None:
                 brought, doubt = command_contribution(linear, np.where(lines.driven[:, None], 0, command))
                 mean, error = mean - brought, error + doubt
-            look = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
-            found.append(SegmentSpectrum(inputs_of(recording, period), period.segment.amplitude, *look))
+            spectrum = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
+            found.append(SegmentSpectrum(inputs_of(recording, period), period.segment.amplitude, *spectrum))
     return found
 
 
@@ -78,17 +78,17 @@ def inputs_of(recording: Recording, periods: Periods) -> str:
 
 
 def _noise_on_lines(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatArray) -> FloatArray:
-    """Density of what differs between periods: the noise without the repeating part of rounding."""
+    """Noise density of the differences between periods: the noise without the repeating part of rounding."""
     return np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1) - noise.rounding
 
 
 def _mean_and_errors(
     answer: ComplexArray, floor: FloatArray, rounding: FloatArray
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    looks = len(answer)
-    spread = period_variance(answer) if looks > 1 else floor
+    count = len(answer)
+    spread = period_variance(answer) if count > 1 else floor
     larger = np.maximum(floor, smooth_over_lines(spread, _SMOOTHED_LINES))
-    return answer.mean(axis=0), larger / looks + rounding, spread
+    return answer.mean(axis=0), larger / count + rounding, spread
 
 
 def _linear_response(
@@ -102,8 +102,8 @@ def _linear_response(
     return None if clean else interpolate_response(line_responses(driven, [answer.mean(axis=0) for answer in answers]))
 
 
-# The command's own contribution on silent lines: under feedback the device's distortion returns through the command,
-# and a linear device responds to that, too.
+# The command's content on silent lines: under feedback the device's distortion returns through the command,
+# and a linear device responds to it, too.
 def line_responses(commands: Sequence[ComplexArray], responses: Sequence[ComplexArray]) -> ComplexArray:
     """(lines, outputs, inputs): the linear response at lines where the experiments drive every direction; NaN
     elsewhere. commands: each (lines, inputs), zero where not driven; responses: each (lines, outputs)."""

@@ -1,4 +1,4 @@
-"""Tests which states a mismatch depends on, for the missing force along each axis or a sensor's error."""
+"""Tests on which states a mismatch depends, for the missing force along each axis or a sensor's error."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ from equalizer.signals.unit_system import UnitSystem
 
 _SEED = 20
 _DRIVEN = 0.02
-"""Rms of an axis's command over the loudest segment's, from which on it counts as driven."""
+"""Least rms of an axis's command, relative to the strongest segment, for the axis to count as driven."""
 
 
 def force_states(
@@ -97,7 +97,7 @@ def _is_informative(region: StateRegion) -> bool:
 
 
 def _strata(recording: Recording, used: Mask, driven: FloatArray) -> IntArray:
-    """Number of the segment; -1 where samples do not count, or next to nothing drives them. (n,)"""
+    """(n,): number of the segment; -1 where samples do not count, or hardly any command drives them."""
     n = len(driven)
     strata = np.full(n, -1, dtype=np.int64)
     parts = [(s.start, min(s.stop, n)) for s in recording.segments if s.kind != "rest" and s.start < n] or [(0, n)]

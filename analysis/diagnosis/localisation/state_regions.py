@@ -15,12 +15,12 @@ StateKind = Literal["position", "velocity", "command", "response", "time"]
 _BINS = 12
 PERMUTATIONS = 60
 _CONCENTRATED = 1.5
-"""Mean square of a bin over the expected one, from which on a bin belongs to a region."""
+"""Least ratio of a bin's mean square to the expected one, for the bin to belong to a region."""
 _LEAST_SHARE = 0.05
-"""Share of the power that bin means must explain."""
+"""Least share of the power that bin means must explain."""
 _TINY = np.finfo(np.float64).tiny
 _LEAST_EXPECTED = 1e-9
-"""Expected power of a bin over the mean at least; bins with less, as at rest, are not tested."""
+"""Least expected power of a bin, relative to the mean; bins below it, such as those at rest, are not tested."""
 _READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 
 
@@ -28,7 +28,7 @@ _READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 class State:
     kind: StateKind
     symbol: str
-    """The symbol as it is read: "v", "x", "fx", "ax", "t"."""
+    """Symbol in the result: "v", "x", "fx", "ax", "t"."""
     unit: str
     values: FloatArray
     """(n,)"""
@@ -41,10 +41,11 @@ class Disturbance:
     values: FloatArray
     """(n,)"""
     strata: IntArray
-    """(n,): a number for each condition, or segment; -1 = not used. What is driven, and how hard, differs between them,
-    so samples are compared within them."""
+    """(n,): number of the condition or segment; -1 = not used. Conditions differ in what is driven and at which level,
+    so samples are compared within them only."""
     signal: FloatArray | None = None
-    """(n,): what the disturbance is a part of. Needed for elapsed time: asked is whether its share of it changes."""
+    """(n,): the signal that contains the disturbance. Needed for elapsed time: tested is whether the disturbance's
+    share of it changes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,20 +53,20 @@ class StateRegion:
     kind: StateKind
     symbol: str
     by: Literal["size", "sign"]
-    """Whether the mismatch is larger there, or has a mean that follows the state."""
+    """size: the mismatch is larger in the region; sign: its mean follows the state."""
     share: float
     """Share of the mismatch's power: inside the region (size), or explained by the bin means (sign)."""
     occupied: float
     """Share of the samples in the region; 1 for sign."""
     p_value: float
     words: str
-    """For `Mismatch.state`: "near v = 0"."""
+    """Text for `Mismatch.state`: "near v = 0"."""
 
 
 def state_regions(
     disturbance: Disturbance, states: Sequence[State], seed: int, permutations: int = PERMUTATIONS
 ) -> tuple[StateRegion, ...]:
-    """Smallest p-value first, then largest share; only regions that stand out. p-values are of single tests, by block
+    """Smallest p-value first, then largest share; only significant regions. p-values are of single tests, by block
     permutation within segments; they depend on the seed in their third digit.
 
     Raises ValueError where a state has another length than the disturbance.
@@ -98,11 +99,11 @@ def state_regions(
 class _Sample:
     values: FloatArray
     expected: FloatArray
-    """Mean square that each sample would have if the state did not matter."""
+    """Expected mean square of each sample if it did not depend on the state."""
     strata: IntArray
     block: int
     even: bool
-    """Whether `expected` is the same throughout each stratum, so that shuffling leaves it as it is."""
+    """Whether `expected` is constant within each stratum, so that permutation does not change it."""
 
 
 def _test_states(
@@ -184,7 +185,7 @@ def _mean_square_in(values: FloatArray, strata: IntArray) -> FloatArray:
 
 
 def _equal_bins(values: FloatArray) -> IntArray:
-    """(n,): bin numbers of values (n,), in equally filled bins as far as equal values allow."""
+    """(n,): bin numbers of values (n,), in bins of equal count as far as equal values allow."""
     edges = np.unique(np.quantile(values, np.linspace(0, 1, _BINS + 1)[1:-1]))
     return np.unique(np.searchsorted(edges, values, side="right"), return_inverse=True)[1].astype(np.int64)
 
@@ -201,7 +202,8 @@ def _has_sign(state: State) -> bool:
 def region_in_words(
     kind: str, symbol: str, unit: str, bins: tuple[int, int, int], centre: float, one_stratum: bool
 ) -> str:
-    """bins: first and last of the region, and how many there are. centre: mean state of the mismatch in it."""
+    """Words for a region. bins: first and last of it, and the number of all. centre: mean state of the mismatch in
+    it."""
     first, last, count = bins
     low, high = first == 0, last == count - 1
     if kind == "time":
@@ -216,7 +218,7 @@ def region_in_words(
 
 
 def dependence_in_words(symbol: str, means: FloatArray) -> str:
-    """means: over bins of equal filling, in the order of the state."""
+    """Words for the trend. means: over bins of equal count, in the order of the state."""
     lower, upper = means[: len(means) // 2].mean(), means[len(means) // 2 :].mean()
     larger = max(abs(lower), abs(upper))
     if larger > 0 and lower * upper < 0 and min(abs(lower), abs(upper)) > larger / 3:

@@ -1,5 +1,5 @@
-"""Optimal design of the next experiment: which recording would tell rivals apart.
+"""Optimal design of the next experiment: which recording would discriminate between rivals.
 
-`experiment_menu` lists what could be driven, `choose_experiment` foresees what each would part, `propose_experiment`
-says it.
+`experiment_menu` lists the possible experiments, `choose_experiment` predicts how well each discriminates,
+`propose_experiment` formulates the result.
 """

@@ -1,7 +1,7 @@
 """Optimal experiment to discriminate two rivals: where they differ most after the rival was re-tuned.
 
-Hunter and Reiner (1965), with what has been recorded so far holding the rival's numbers. A difference that the rival
-can tune away, or that its tolerance covers, is none.
+Hunter and Reiner (1965), with the information of the existing recordings as the prior of the rival's parameters. A
+difference that re-tuning of the rival removes within its tolerance does not count.
 """
 
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.as_recorded import add_mass
+from analysis.diagnosis.data.recorded_conditions import add_mass
 from analysis.diagnosis.document import NextExperiment
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import MOVED, Fitted
@@ -22,7 +22,7 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 RETUNED = 3
-"""Steps of the rival towards the named one."""
+"""Gauss-Newton steps of the rival's re-tuning."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,12 +103,12 @@ def _squares_after_retuning(
         except (MechanicalModelError, np.linalg.LinAlgError):
             break
         rest = wanted - there
-        with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+        with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
             squares = float(rest @ rest + tuned @ known @ tuned)
         if not squares < least:
             break
         least = squares
-    # Where the steps led away, what a straight line foresees: rather too little is promised.
+    # Where the steps diverge, the linear prediction is used: it promises rather too little.
     return least if least < whole else max(straight, 0.0)
 
 
@@ -117,7 +117,7 @@ def _simulate(
 ) -> FloatArray:
     model: MechanicalModel = bench.tuning.tune(deviations)
     model = add_mass(model, experiment.added) if experiment.added else model
-    with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
         played = simulate_mechanism(
             model, experiment.commands, bench.sample_rate_hz, hypothesis.placed_effects(point), bench.hold
         )

@@ -1,4 +1,4 @@
-"""Recordings that a laboratory could make next, as commands to play on paper first."""
+"""Recordings that a laboratory could make next, as commands for a simulation."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -11,13 +11,13 @@ from equalizer.signals.excitation import apply_fades, log_sweep, sine
 from equalizer.signals.signal import FloatArray
 
 SLOWEST_HZ, SLOWEST_SHARE = 1.0, 0.1
-"""Where sweeps begin: there, or at such a share of the usual end where the sample rate is low."""
+"""Lowest frequency of sweeps: absolute, or as a share of the usual end where the sample rate is low."""
 CYCLES, LONGER = 8.0, 5.0
 """Length of an experiment in cycles of the sweep's lowest frequency, and how many times as long the longest is."""
 USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
-"""How far sweeps go: to the first, or such a share of the sample rate."""
+"""Highest frequency of sweeps: absolute, or as a share of the sample rate."""
 ADDED_SHARE = 0.12
-"""Known weight that is strapped on, over the grounded mass."""
+"""Known weight to attach, relative to the grounded mass."""
 _FADE = 1 / 16
 """Fade at both ends, over an experiment's usual length."""
 
@@ -31,13 +31,13 @@ class Experiment:
     kind: Literal["sweep", "slow"]
     """Kind of the recording's segment."""
     added: float = 0.0
-    """Mass (or inertia) that is strapped on beforehand."""
+    """Mass (or inertia) to attach beforehand."""
     minutes: float = 1.0
-    """What it costs."""
+    """Duration in minutes, which counts as the cost."""
 
 
 def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, level: float) -> tuple[Experiment, ...]:
-    """axis: where the rivals sit. level: the highest that was recorded; nothing louder is proposed."""
+    """axis: where the rivals act. level: the highest that was recorded; no higher one is proposed."""
     usual_hz = min(USUAL_HZ, USUAL_SHARE * sample_rate_hz)
     fastest_hz = FASTEST_SHARE * sample_rate_hz
     slowest_hz = min(SLOWEST_HZ, SLOWEST_SHARE * usual_hz)

@@ -1,4 +1,4 @@
-"""Proposes the next recording for a finished search whose data could not tell two effects apart."""
+"""Proposes the next recording for a finished search whose data could not distinguish two effects."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
-    """The menu's predicted gains for two rivals that the data do not tell apart."""
+    """The menu's predicted gains for two rivals that the data do not distinguish."""
 
     names: tuple[str, str]
     axis: int
@@ -28,7 +28,7 @@ class Proposal:
 
     @property
     def document(self) -> NextExperiment | None:
-        """None where no recording of the menu would tell."""
+        """The best experiment; None where none would discriminate."""
         return as_document(self.foreseen[0], self.names)
 
 
@@ -59,7 +59,7 @@ def propose_experiment(context: SearchContext, found: Explanation) -> Proposal |
 
 
 def _best_rival(fitted_candidates: tuple[FittedCandidate, ...]) -> FittedCandidate | None:
-    """The best rival that the data do not tell from the named effect."""
+    """The best rival that the data do not distinguish from the named effect."""
     best = fitted_candidates[0]
     name = best.newest
     for other in fitted_candidates[1:]:
@@ -69,7 +69,7 @@ def _best_rival(fitted_candidates: tuple[FittedCandidate, ...]) -> FittedCandida
 
 
 def _recorded_information(context: SearchContext, candidate: FittedCandidate) -> FloatArray:
-    """Information matrix of a candidate's numbers from what has been recorded, calibration included."""
+    """Information matrix of a candidate's parameters from the existing recordings, calibration included."""
     fitted = candidate.fitted
     own = hypothesis_sensitivity(
         context.measure, context.tuning, fitted, residuals_to_fit(context.measure, fitted.residuals)

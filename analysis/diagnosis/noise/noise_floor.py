@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray, Signal
 
 How = Literal["repeats", "rest", "quiet band", "unknown"]
 _LINES = 511
-"""Where no period gives a grid."""
+"""Number of lines where no period gives a grid."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,16 +26,16 @@ class NoiseFloor:
     response: ChannelNoise
     position: ChannelNoise | None
     remarks: tuple[str, ...]
-    """How it was found and what is weak about that, a sentence each."""
+    """Sentences on how it was estimated, and on its weaknesses."""
 
     @property
     def response_rms(self) -> FloatArray:
-        """(p,); NaN where `how` is "unknown"."""
+        """Noise of the response (p channels); NaN where `how` is "unknown"."""
         return self.response.rms
 
     @property
     def position_rms(self) -> FloatArray | None:
-        """(d,)"""
+        """Noise of the position (d channels)."""
         return None if self.position is None else self.position.rms
 
     @property
@@ -44,8 +44,8 @@ class NoiseFloor:
 
 
 def noise_floor(recording: Recording) -> NoiseFloor:
-    """From periods that should be alike; else from rest; else from the lines above all that was driven, the noise
-    below taken to be as strong; else `how` is "unknown" and every rms NaN."""
+    """From repeated periods; else from rest; else from the lines above the driven band, assumed to be white; else `how`
+    is "unknown" and every rms NaN."""
     periods = tuple(period for period in settled_periods(recording) if period.count > 1)
     if periods:
         return _from_repeats(recording, periods)

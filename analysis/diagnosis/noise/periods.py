@@ -13,7 +13,8 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 _TRANSIENT_RATIO = 2.0
-"""Energy of a period's difference from the last one, first third over last third, above which it has not settled."""
+"""Ratio of a period's difference from the last one, first third over last third (energy), above which it has not
+settled."""
 _SHORTEST = 8
 
 
@@ -25,9 +26,9 @@ class Periods:
     """Number of the segment in the recording."""
     segment: Segment
     starts: tuple[int, ...]
-    """First samples of the periods that are whole and settled; one at least."""
+    """First samples of the complete, settled periods; at least one."""
     settled: bool
-    """False: only the first period is there, with its transient."""
+    """False: there is only the first period, with its transient."""
 
     @property
     def length(self) -> int:
@@ -44,8 +45,8 @@ class Periods:
 
 
 def settled_periods(recording: Recording) -> tuple[Periods, ...]:
-    """The usable periods of every periodic segment. The first period is left out, and further ones while they still
-    settle; periods with missing samples are left out, too. Segments without a usable period are not among them."""
+    """The usable periods of every periodic segment. The first period is left out, and further ones until the transient
+    has decayed; so are periods with missing samples. Segments without a usable period are left out."""
     found = []
     for index, segment in enumerate(recording.segments):
         if segment.period < _SHORTEST:
@@ -69,14 +70,14 @@ def period_spectra(samples: FloatArray, periods: Periods) -> ComplexArray:
 
 
 def mean_spectrum(samples: FloatArray, periods: Periods) -> ComplexArray:
-    """(lines, channels): that of the mean period."""
+    """(lines, channels): spectrum of the mean period."""
     return np.asarray(spectra(period_samples(samples, periods).mean(axis=0, keepdims=True))[0])
 
 
-def spectra(looks: FloatArray) -> ComplexArray:
+def spectra(periods: FloatArray) -> ComplexArray:
     """Spectra (periods, lines, channels) of samples (periods, length, channels)."""
-    length = looks.shape[1]
-    return np.asarray(np.fft.rfft(looks, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
+    length = periods.shape[1]
+    return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
 
 
 def _is_whole(recording: Recording, start: int, length: int) -> bool:

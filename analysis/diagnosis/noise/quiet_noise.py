@@ -10,12 +10,12 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 _LEAST_SAMPLES = 8
-"""Samples of a window at least: a recording at less than 32 Hz has none."""
+"""Least samples of a window: recordings at less than 32 Hz have no window."""
 _WINDOW_S = 0.25
 _SILENT = 1e-4
-"""Share of the strongest smoothed power of the command that counts as none."""
+"""Share of the strongest smoothed power of the command below which nothing is driven."""
 _CLEAR = 1.3
-"""Times the highest driven line: where the flanks of windows have died away."""
+"""Ratio to the highest driven line above which leakage of the windows is negligible."""
 _LEAST_LINES = 16
 _DIFFERENCE_GAIN, _DIFFERENCE_LOSS = 20.0, 2.31
 """Third differences of white noise: gain of variance, and loss of degrees of freedom by correlation."""
@@ -23,7 +23,7 @@ _DIFFERENCE_GAIN, _DIFFERENCE_LOSS = 20.0, 2.31
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FastNoise:
-    """Variance of the fast part of the noise at rest, scaled as if it were white."""
+    """Variance of the noise at rest at high frequencies, scaled as if it were white."""
 
     variance: FloatArray
     """(windows, channels)"""
@@ -40,9 +40,9 @@ def fast_noise_at_rest(recording: Recording, samples: FloatArray) -> FastNoise |
     variances = []
     for start, stop in _rests(recording, _WINDOW_S):
         for at in range(start, stop - length + 1, length):
-            look = samples[at : at + length]
-            if np.isfinite(look).all():
-                variances.append(np.mean(np.diff(look, n=3, axis=0) ** 2, axis=0) / _DIFFERENCE_GAIN)
+            stretch = samples[at : at + length]
+            if np.isfinite(stretch).all():
+                variances.append(np.mean(np.diff(stretch, n=3, axis=0) ** 2, axis=0) / _DIFFERENCE_GAIN)
     if not variances:
         return None
     variance: FloatArray = np.array(variances)
@@ -50,8 +50,8 @@ def fast_noise_at_rest(recording: Recording, samples: FloatArray) -> FastNoise |
 
 
 def rest_noise(recording: Recording, samples: FloatArray, frequency_hz: FloatArray) -> tuple[FloatArray, float] | None:
-    """(lines, channels) density and its degrees of freedom; None where nothing rests for a quarter of a second, or a
-    reading stands still at rest: an encoder's steps then hide its noise."""
+    """(lines, channels) density and its degrees of freedom; None without a rest of a quarter of a second, or where a
+    reading is constant at rest: an encoder's steps then hide its noise."""
     length = round(_WINDOW_S * recording.sample_rate_hz)
     if length < _LEAST_SAMPLES:
         return None
@@ -59,9 +59,9 @@ def rest_noise(recording: Recording, samples: FloatArray, frequency_hz: FloatArr
     powers = []
     for start, stop in _rests(recording, SETTLING_S):
         for at in range(start, stop - length + 1, length // 2):
-            look = samples[at : at + length]
-            if np.isfinite(look).all():
-                spectrum = np.fft.rfft((look - look.mean(axis=0)) * hann[:, None], axis=0)[1 : length // 2]
+            stretch = samples[at : at + length]
+            if np.isfinite(stretch).all():
+                spectrum = np.fft.rfft((stretch - stretch.mean(axis=0)) * hann[:, None], axis=0)[1 : length // 2]
                 powers.append(np.abs(spectrum) ** 2 / length)
     if not powers:
         return None
@@ -72,15 +72,15 @@ def rest_noise(recording: Recording, samples: FloatArray, frequency_hz: FloatArr
     mean[:2] = mean[2:3]
     smooth = smooth_over_lines(mean, 9)
     density = np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)
-    # Windows overlap by half and a Hann window spreads each line over its neighbours: about half of all count.
+    # Windows overlap by half, and a Hann window correlates neighbouring lines: about half of all lines are independent.
     return density, float(len(powers) * length / 2)
 
 
 def quiet_band_noise(
     recording: Recording, samples: FloatArray, frequency_hz: FloatArray
 ) -> tuple[FloatArray, float] | None:
-    """White density (lines, channels) as strong as the median line above all that is driven, and its degrees of
-    freedom; None where no band is left above. The median, so that the lines of harmonics do not count."""
+    """White density (lines, channels) with the power of the median line above the driven band, and its degrees of
+    freedom; None without such a band. The median excludes the lines of harmonics."""
     instrument = instrument_signal(recording)
     start, stop = _longest_whole(np.hstack([samples, instrument]))
     samples, command = samples[start:stop], instrument[start:stop]
@@ -113,7 +113,7 @@ def _longest_whole(samples: FloatArray) -> tuple[int, int]:
 
 
 def _rests(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
-    """Stretches without excitation, settled. Recordings begin at rest."""
+    """Stretches without excitation, after settling. Recordings begin at rest."""
     driven = ~(instrument_signal(recording) == 0).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[True], driven, [True]]).astype(np.int8)))
     settling = round(settling_s * recording.sample_rate_hz)

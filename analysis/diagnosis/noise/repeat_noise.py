@@ -1,7 +1,7 @@
 """Noise from the differences between repeated periods.
 
-Noise is as strong with any drive; a device that varies or rattles differs the more, the more it is driven. So the
-quietest segments count, and where even they differ by more than what is heard at rest, the rest does.
+Noise does not depend on the excitation, whereas a device that varies or rattles differs more the more it is driven.
+Therefore the quietest segments are used and, where even they vary more than the noise at rest, that noise.
 """
 
 from collections.abc import Sequence
@@ -20,9 +20,9 @@ from equalizer.signals.signal import FloatArray
 
 _SMOOTHED_LINES = 9
 _ALIKE = 1e-4
-"""Chance that equal noise is taken for unequal."""
+"""Significance level of the test for equal noise."""
 _STEPS_MOVED = 1.2
-"""Rms of a movement in steps of rounding: with less, rounding may hide noise or add to it by chance."""
+"""Least rms of a movement in rounding steps: below it, rounding may hide noise or add to it."""
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -59,7 +59,7 @@ def repeat_noise(
 
 
 def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The density with what repeats of the rounding, and that part alone: (lines, channels), (channels,)."""
+    """The density with the repeating part of rounding, and that part alone: (lines, channels), (channels,)."""
     parts = [
         undo_rounding(float(variance), rounding_step(channel)).repeating if np.isfinite(variance) else 0.0
         for variance, channel in zip(density.mean(axis=0), samples.T, strict=True)
@@ -69,7 +69,7 @@ def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray,
 
 
 def quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
-    """Which rows are as quiet as the quietest of their column. Both (rows, channels)."""
+    """Which rows do not differ significantly from the quietest of their column. Both (rows, channels)."""
     least = np.argmin(variance, axis=0)
     columns = np.arange(variance.shape[1])
     bound = fdtri(freedom, freedom[least, columns], 1 - _ALIKE)
@@ -94,7 +94,7 @@ def _spread(
 
 
 def _moves_over_steps(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
-    """(segments, channels): where a channel moves over its steps of rounding; all where it never does."""
+    """(segments, channels): whether a channel moves over its rounding steps; True for all where it never does."""
     steps = np.array([rounding_step(channel) for channel in samples.T])
     moved = np.array([period_samples(samples, period).std(axis=(0, 1)) >= _STEPS_MOVED * steps for period in periods])
     return np.asarray(moved | ~moved.any(axis=0), dtype=np.bool_)

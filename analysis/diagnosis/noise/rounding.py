@@ -13,7 +13,7 @@ from equalizer.signals.signal import FloatArray
 _TERMS = np.arange(1, 200)
 _EXAMINED, _HALVES = 20_000, 40
 _TOLERANCE = 1e-3
-"""Deviation from multiples of a step at most, over the step: float32 storage leaves no exact multiples."""
+"""Largest deviation from multiples of a step, relative to the step: float32 storage leaves no exact multiples."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class RoundedNoise:
 
     total: float
     repeating: float
-    """Part of the total that is alike in each repeat."""
+    """Part of the total that is the same in each repeat."""
 
 
 def rounding_step(samples: FloatArray) -> float:
@@ -31,13 +31,13 @@ def rounding_step(samples: FloatArray) -> float:
     if len(values) < 3:
         return 0.0
     gaps = np.diff(values)
-    # Values that ought to be equal lie apart by rounding of the storage.
+    # Values that should be equal differ by rounding in storage.
     gaps = gaps[gaps > 1e-3 * np.median(gaps)]
     step = float(np.median(gaps[gaps <= 1.5 * gaps.min()]))
     steps = np.round((values - values[0]) / step)
     within = max(_TOLERANCE * step, float(np.spacing(np.float32(np.abs(values).max()))))
     regular = bool(np.max(np.abs(values - values[0] - step * steps)) < 0.1 * step + within)
-    # A fine-grained float also has a smallest gap: a rounded channel comes back to each of its values.
+    # A fine-grained float also has a smallest gap, but a rounded channel returns to each of its values.
     return step if regular and len(values) < 0.5 * min(len(samples), _EXAMINED) else 0.0
 
 

@@ -9,7 +9,7 @@ from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.localisation_words import localisation_sentences
 from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, HeldOutStretch, OwnNumber, RealAnswer
 from analysis.diagnosis.result.candidate_wording import candidate_sentences
-from analysis.diagnosis.result.findings import Course, Findings
+from analysis.diagnosis.result.findings import Findings, TimeSeries
 from analysis.diagnosis.result.wording import (
     answer_of,
     device_of,
@@ -53,8 +53,8 @@ def answer_of_findings(
         left=remainder_sentence(diagnosis, device_of(found)),
         remarks=found.remarks,
         numbers=own_numbers(found, nominal),
-        stretches=held_out_stretches(found.courses),
-        excerpt=drawn_excerpt(found.courses),
+        stretches=held_out_stretches(found.time_series),
+        excerpt=drawn_excerpt(found.time_series),
         further=(),
         pair=None,
         objections=(),
@@ -89,23 +89,23 @@ def model_sentence(found: Findings) -> str:
     return f"{capitalise(given.name)}: linear, {bodies}, {driven}, {seen} ({given.quantity})."
 
 
-def held_out_stretches(courses: Sequence[Course]) -> tuple[HeldOutStretch, ...]:
+def held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutStretch, ...]:
     found = []
-    for course in courses:
-        for start, stop in course.tested:
+    for series in time_series:
+        for start, stop in series.tested:
             part = slice(start, stop)
-            for c, channel in enumerate(course.channels):
-                measured = course.measured[part, c]
+            for c, channel in enumerate(series.channels):
+                measured = series.measured[part, c]
                 known = np.isfinite(measured)
                 if not known.any():
                     continue
                 sizes = [
                     float(np.sqrt(np.mean((measured - other)[known] ** 2)))
-                    for other in (measured[known].mean(), course.retuned[part, c], course.after[part, c])
+                    for other in (measured[known].mean(), series.retuned[part, c], series.after[part, c])
                 ]
-                times = start / course.sample_rate_hz, stop / course.sample_rate_hz
+                times = start / series.sample_rate_hz, stop / series.sample_rate_hz
                 if np.isfinite(sizes).all():
-                    found.append(HeldOutStretch(course.name, channel, course.units[c], *times, *sizes))
+                    found.append(HeldOutStretch(series.name, channel, series.units[c], *times, *sizes))
     return tuple(found)
 
 
@@ -113,29 +113,29 @@ DRAWN = 900
 """Samples of an excerpt, around where re-tuned and final prediction differ most."""
 
 
-def drawn_excerpt(courses: Sequence[Course]) -> DrawnExcerpt | None:
-    stretches = [(course, *ends) for course in courses for ends in course.tested]
+def drawn_excerpt(time_series: Sequence[TimeSeries]) -> DrawnExcerpt | None:
+    stretches = [(series, *ends) for series in time_series for ends in series.tested]
     if not stretches:
         return None
-    course, first, last = max(stretches, key=lambda stretch: float(_change(*stretch).max(initial=0.0)))
-    changed = _change(course, first, last)
+    series, first, last = max(stretches, key=lambda stretch: float(_change(*stretch).max(initial=0.0)))
+    changed = _change(series, first, last)
     at, c = divmod(int(np.argmax(changed)), changed.shape[1])
     begin = max(min(first + at - DRAWN // 2, last - DRAWN), first)
     part = slice(begin, min(begin + DRAWN, last))
     measured, retuned, after = (
         tuple(np.nan_to_num(course_of[part, c]).tolist())
-        for course_of in (course.measured, course.retuned, course.after)
+        for course_of in (series.measured, series.retuned, series.after)
     )
-    step_s = 1 / course.sample_rate_hz
+    step_s = 1 / series.sample_rate_hz
     return DrawnExcerpt(
-        course.name, course.channels[c], course.units[c], begin * step_s, step_s, measured, retuned, after
+        series.name, series.channels[c], series.units[c], begin * step_s, step_s, measured, retuned, after
     )
 
 
-def _change(course: Course, start: int, stop: int) -> FloatArray:
+def _change(series: TimeSeries, start: int, stop: int) -> FloatArray:
     """(samples, c): how far what was found moves the prediction, as a share of the channel's rms."""
-    size = np.maximum(np.nanstd(course.measured, axis=0), np.finfo(float).tiny)
-    return np.asarray(np.nan_to_num(np.abs(course.retuned - course.after)[start:stop] / size))
+    size = np.maximum(np.nanstd(series.measured, axis=0), np.finfo(float).tiny)
+    return np.asarray(np.nan_to_num(np.abs(series.retuned - series.after)[start:stop] / size))
 
 
 # The simple model's own numbers after a diagnosis, with their intervals, where it is one body.

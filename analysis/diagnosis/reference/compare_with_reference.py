@@ -1,4 +1,5 @@
-"""Recordings of a real device beside clean ones of the same: what sets them apart (`contrast`), or shows by itself."""
+"""Comparison of recordings of a real device with clean ones of the same device: faults by `contrast`, and faults that
+the recordings show directly."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,12 +26,12 @@ FORESEEN = 0.02
 """Prediction error of a model on a clean recording, as a share, up to which it is used alone to find faults. By hand,
 as the next."""
 NOISY = 0.1
-"""Share of the signal from which what does not repeat is more than noise: a device that slips and sticks."""
+"""Share of the signal above which the variation between repeats is more than noise: a device with stick-slip."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contrast:
-    """What sets recordings apart from clean ones: at most one of the first three."""
+    """Faults that distinguish the recordings from clean ones; at most one of the first three."""
 
     shown: Hypothesis | None
     """A sensor fault that the readings themselves show."""
@@ -41,7 +42,7 @@ class Contrast:
     decision: Decision | None
 
     def without_name(self, why_not: str) -> "Contrast":
-        """What was named by comparison is a candidate then; what readings, spectra or steps show stays."""
+        """The result with its named fault made a candidate; faults that readings, spectra or steps show stay named."""
         if self.decision is None or self.decision.named is None:
             return self
         left = ((self.decision.named, why_not), *self.decision.others)
@@ -56,7 +57,7 @@ class Contrast:
 
     @property
     def named_effects(self) -> frozenset[str]:
-        """The effect that is named, and those that cannot be told from it."""
+        """The named effect, and those that cannot be distinguished from it."""
         if self.shown is not None:
             return frozenset(claim.effect.name for claim in self.shown.claims)
         if self.line is not None:
@@ -66,12 +67,12 @@ class Contrast:
         return frozenset({self.decision.named.fault.effect, *self.decision.alike})
 
     def contradicts(self, names: frozenset[str], explained: bool) -> bool:
-        """Whether it speaks against what a search by simulation says of the same recordings. names: of the effects that
-        the search names, with their classes; explained: they leave noise alone.
+        """Whether it contradicts the result of a search by simulation on the same recordings. names: the effects that
+        the search names, with their classes; explained: whether their residual is noise.
 
-        A search that leaves more than noise may have put several effects in the place of one that it does not know,
-        such as a spring that came in; and where the sets differ no more than stretches of either do, an effect that the
-        comparison tested mends the model."""
+        A search with a larger residual may have replaced one unknown effect by several; and where the sets do not
+        differ significantly, an effect that the comparison tested only corrects the model.
+        """
         if self.named_effects:
             return not (explained or names & self.named_effects)
         differ = self.comparison is None or self.comparison.differ

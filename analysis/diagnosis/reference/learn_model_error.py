@@ -23,7 +23,7 @@ from equalizer.signals.signal import FloatArray
 
 LEARNING = "learning from the clean recordings"
 BEGUN = 0.02
-"""Share of the whole diagnosis that is done when learning ends."""
+"""Progress (share of the whole diagnosis) at the end of learning."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ class _Lesson:
     """(c,): share of the signal."""
 
     @property
-    def courses(self) -> tuple[FloatArray, ...]:
+    def residuals(self) -> tuple[FloatArray, ...]:
         """Residuals, (n, c) each, in the channels' own units; NaN where samples do not count."""
         return tuple(
             np.where((record.fit | record.choose | record.test)[:, None], residual * self.measure.unit, np.nan)
@@ -64,8 +64,9 @@ class LearnedError:
 def learn_model_error(
     clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
 ) -> LearnedError:
-    """clean: of the same device, alike in channels and units; the model is re-tuned to each by itself, for days differ.
-    diagnosed: what is to be diagnosed, measured alike. Raises NothingLearned where that cannot be."""
+    """clean: of the same device, alike in channels and units; the model is re-tuned to each separately, because
+    recordings of different days differ. diagnosed: the recordings to diagnose, with the same measure. Raises
+    NothingLearned where that cannot be."""
     error = measure_of(diagnosed, model, clean).measure.name
     lessons: list[_Lesson] = []
     for number, recording in enumerate(clean):
@@ -99,10 +100,10 @@ def require_alike(learned_by: str, error: str) -> None:
 
 
 def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> LearnedError:
-    courses = [course for lesson in lessons for course in lesson.courses]
-    colour = whitening_filter(courses, np.min([lesson.measure.noise for lesson in lessons], axis=0))
+    residuals = [each for lesson in lessons for each in lesson.residuals]
+    colour = whitening_filter(residuals, np.min([lesson.measure.noise for lesson in lessons], axis=0))
     shares = [
-        _rms([colour.apply(course) for course in lesson.courses])
+        _rms([colour.apply(residual) for residual in lesson.residuals])
         / _signal(lesson.measure, lesson.retuned.fitted.residuals)
         for lesson in lessons
     ]
@@ -120,16 +121,16 @@ def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) ->
 
 
 def _signal(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
-    """(c,): standard deviation of the measured or the predicted signal, the smaller of both, so that neither hum or
-    drift nor a model that is far off makes it larger."""
+    """(c,): standard deviation of the measured or the predicted signal, the smaller of both, so that neither hum and
+    drift nor a bad model increases it."""
     measured = [record.measured for record in measure.records]
-    foreseen = [course - left * measure.unit for course, left in zip(measured, residuals, strict=True)]
-    sizes = [np.nanstd(np.vstack(courses), axis=0) for courses in (measured, foreseen)]
+    predicted = [each - left * measure.unit for each, left in zip(measured, residuals, strict=True)]
+    sizes = [np.nanstd(np.vstack(series), axis=0) for series in (measured, predicted)]
     return np.asarray(np.maximum(np.fmin(*sizes), np.finfo(float).tiny))
 
 
-def _rms(courses: Sequence[FloatArray]) -> FloatArray:
-    return np.asarray(np.sqrt(np.nanmean(np.vstack(courses) ** 2, axis=0)))
+def _rms(residuals: Sequence[FloatArray]) -> FloatArray:
+    return np.asarray(np.sqrt(np.nanmean(np.vstack(residuals) ** 2, axis=0)))
 
 
 def _learn_from_recording(chosen: Chosen, model: MechanicalModel, recording: Recording, map_: Mapper) -> _Lesson:

@@ -1,6 +1,6 @@
 """Finds sensor faults without a model: quantized readings, clipped readings, repeated readings (lost samples).
 
-Reference recordings of the device without the fault say how often each is usual.
+Reference recordings of the device without the fault give the usual frequency of each.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,13 +18,14 @@ from equalizer.signals.signal import FloatArray
 ALIKE = 1e-3
 """Relative difference of the steps of two channels up to which they count as the same."""
 LONG_RUNS = 2.0
-"""Mean length of runs of repeats, as where half of all samples are lost: longer is play, or a sensor at rest."""
+"""Largest mean length of runs of repeats, as with half of all samples lost: longer runs are backlash, or a sensor at
+rest."""
 CATCHES_UP = 0.75
-"""Step after a repeat at least, over the median step: after play it is half of that or less."""
+"""Least step after a repeat, relative to the median step: after backlash it is half of that or less."""
 STRETCHES = 3
-"""Stretches of each reference recording: what is usual in any of them is no fault."""
+"""Stretches of each reference recording: a frequency that occurs in any of them is usual."""
 SAME = 1e-9
-"""Relative difference of readings at a limit at most."""
+"""Largest relative difference of readings at a limit."""
 
 
 def find_sensor_faults(
@@ -90,7 +91,7 @@ def _find_clipping(new: FloatArray, references: Sequence[FloatArray]) -> Found |
 
 
 def _repeats_below_top(values: FloatArray) -> int:
-    """Number of repeats below the largest magnitude: play holds readings at any level, a limit does not."""
+    """Number of repeats below the largest magnitude: backlash holds readings at any level, a limit does not."""
     sizes = np.abs(values[1:])
     return int(np.count_nonzero((np.diff(values) == 0) & (sizes < sizes.max() * (1 - SAME))))
 
@@ -118,7 +119,7 @@ def _lost_samples(new: FloatArray, references: Sequence[FloatArray]) -> Found | 
 
 def _catches_up(values: FloatArray, repeated: Mask) -> bool:
     """Whether the step after a repeat is about as large as others, as after lost samples, and not small as after
-    play."""
+    backlash."""
     sizes = np.abs(np.diff(values, axis=0)).sum(axis=1)[1:]
     after = repeated[:-1] & ~repeated[1:]
     other = ~repeated[:-1] & ~repeated[1:]

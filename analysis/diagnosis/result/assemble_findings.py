@@ -9,7 +9,7 @@ import numpy as np
 from analysis.diagnosis.data.measured_motion import is_quasi_static
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.measure_rule import IN_SAMPLES
+from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.first_model.reversed_commands import as_recorded
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, learned_sentence
@@ -19,9 +19,9 @@ from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
 from analysis.diagnosis.next_experiment.propose_experiment import Proposal, propose_experiment
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.error_table import channel_errors, errors_of, held_out_stands_still
-from analysis.diagnosis.result.findings import Course, Findings
-from analysis.diagnosis.result.looks import looks_of
+from analysis.diagnosis.result.findings import Findings, TimeSeries
 from analysis.diagnosis.result.named_effects import Labels, labels_of, named_effects
+from analysis.diagnosis.result.post_search import examine_fits
 from analysis.diagnosis.result.unconfirmed import with_gains
 from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
 from analysis.diagnosis.search.explain import Explanation
@@ -48,30 +48,30 @@ def assemble_findings(
     said, (improved, retuned) = labels_of(recording, tuning.model), _models(result, recording)
     channels, errors = channel_names(recording, len(measure.noise)), _standard_errors(result)
     maps = mismatch_maps(measure, found.stages, floors, learned, context.map_)
-    courses = _time_series(measure, found, names)
-    looked = looks_of(result, floors[0], maps)
+    time_series = _time_series(measure, found, names)
+    examined = examine_fits(result, floors[0], maps)
     in_samples = "" if recording.is_timed or is_quasi_static(recording) else IN_SAMPLES
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
     return Findings(
-        diagnosis=_document(result, errors, (maps, looked.local), proposal),
+        diagnosis=_document(result, errors, (maps, examined.local), proposal),
         explanation=found,
         given=tuning.model,
         improved=improved,
         retuned=retuned,
         named=placed,
-        evidence=looked.evidence,
-        courses=courses,
+        evidence=examined.evidence,
+        time_series=time_series,
         noise_rms=dict(zip(channels, measure.noise.tolist(), strict=True)),
         channel_errors=channel_errors(found, channels),
         mismatch=maps.rows,
         is_timed=recording.is_timed,
-        signatures=looked.signatures,
-        black_box=looked.black_box,
+        signatures=examined.signatures,
+        black_box=examined.black_box,
         remarks=_remarks(
-            (_still_sentence(measure), learned_sentence(learned, channels), in_samples), courses, tuning, floors
+            (_still_sentence(measure), learned_sentence(learned, channels), in_samples), time_series, tuning, floors
         ),
         maps=maps.cells,
-        local=looked.local,
+        local=examined.local,
         floor=floors[0],
         tuning=tuning,
         axes=tuple(axis_letter(name, said.inputs) for name in said.inputs),
@@ -100,10 +100,10 @@ def _still_sentence(measure: ErrorMeasure) -> str:
 
 
 def _remarks(
-    first: Sequence[str], courses: Sequence[Course], tuning: Tuning, floors: tuple[NoiseFloor, ...]
+    first: Sequence[str], time_series: Sequence[TimeSeries], tuning: Tuning, floors: tuple[NoiseFloor, ...]
 ) -> tuple[str, ...]:
     of_noise = (remark for floor in floors for remark in floor.remarks)
-    said = (*first, *unit_sentences(courses), constant_sentence(tuning.model), *of_noise)
+    said = (*first, *unit_sentences(time_series), constant_sentence(tuning.model), *of_noise)
     return tuple(dict.fromkeys(filter(None, said)))
 
 
@@ -131,11 +131,11 @@ def _standard_errors(result: SearchResult) -> FloatArray:
 
 
 def _document(
-    result: SearchResult, errors: FloatArray, looked: tuple[Maps, Localisation], proposal: Proposal | None
+    result: SearchResult, errors: FloatArray, examined: tuple[Maps, Localisation], proposal: Proposal | None
 ) -> Diagnosis:
     found, judged = result.found, result.judgement
     measure, tuning, fitted = result.context.whole, result.context.tuning, found.after.fitted
-    maps, local = looked
+    maps, local = examined
     said = labels_of(measure.records[0].recording, tuning.model)
     return Diagnosis(
         verdict=judged.verdict,
@@ -177,16 +177,16 @@ def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
     return (*recording.response.channels, *position)[:count]
 
 
-def _time_series(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) -> tuple[Course, ...]:
-    courses = []
+def _time_series(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) -> tuple[TimeSeries, ...]:
+    time_series = []
     for number, record in enumerate(measure.records):
         count = record.measured.shape[1]
         before, retuned, after = (
             record.measured - candidate.fitted.residuals[number] * measure.unit
             for candidate in (found.before, found.retuned, found.after)
         )
-        courses.append(
-            Course(
+        time_series.append(
+            TimeSeries(
                 name=names[number] if number < len(names) else f"recording {number + 1}",
                 sample_rate_hz=record.recording.sample_rate_hz,
                 channels=channel_names(record.recording, count),
@@ -198,7 +198,7 @@ def _time_series(measure: ErrorMeasure, found: Explanation, names: Sequence[str]
                 tested=_stretches(record.test),
             )
         )
-    return tuple(courses)
+    return tuple(time_series)
 
 
 def _units(recording: Recording) -> tuple[str, ...]:
@@ -215,7 +215,7 @@ def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
     return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
 
 
-# Rows of the remainder where impacts are compared by band power: no simulation predicts single blows.
+# Rows of the residual where impacts are compared by band power: no simulation predicts single impacts.
 def impact_remainder(measure: ErrorMeasure, found: Explanation) -> tuple[Mismatch, ...]:
     """One row for each channel whose band powers differ by more than chance; the share is the rms logarithm of the
     ratio of amplitudes. Empty where samples were compared."""

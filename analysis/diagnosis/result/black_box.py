@@ -1,8 +1,8 @@
-"""A black-box correction as a reference for the named effects: where it predicts better, something is still missing.
+"""A black-box correction as a reference for the named effects: where it predicts better, physics is still missing.
 
-A polynomial of the re-tuned model's own signals is added to each channel of its prediction, term by term as each takes
-most of what is left (orthogonal least squares; Chen, Billings and Luo 1989), as many terms per channel as the physics
-has numbers.
+A polynomial of the re-tuned model's own signals is added to each channel of its prediction, term by term, each time the
+one that explains most of the residual (orthogonal least squares; Chen, Billings and Luo 1989), as many terms per
+channel as the physics has parameters.
 """
 
 from collections.abc import Sequence
@@ -18,9 +18,9 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 SELECTION_SAMPLES = 20_000
-"""Samples that terms are selected by, evenly spaced among the fit samples; the final fit uses all of these."""
+"""Most samples for the selection of terms, evenly spaced among the fit samples; the final fit uses all."""
 _LEAST_RMS = 1e-6
-"""Rms of a term at least, on the samples that terms are selected by; over all samples it is about 1."""
+"""Least rms of a term on the samples for the selection; over all samples it is about 1."""
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -30,13 +30,13 @@ def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, phy
     if physics is None or not any(record.test.any() for record in measure.records):
         return None
     fitted = [record.fit for record in measure.records]
-    courses = [
-        # Where nothing was measured, nothing is fitted or tested either.
-        _courses(record.command, np.nan_to_num(record.measured - left * measure.unit))
+    signals = [
+        # Missing samples are neither fitted nor tested, so their value does not matter.
+        _signals_and_changes(record.command, np.nan_to_num(record.measured - left * measure.unit))
         for record, left in zip(measure.records, retuned.fitted.residuals, strict=True)
     ]
-    courses = _clip_to_fitted_range(courses, fitted)
-    rows = np.vstack([course[mask] for course, mask in zip(courses, fitted, strict=True)])
+    signals = _clip_to_fitted_range(signals, fitted)
+    rows = np.vstack([signal[mask] for signal, mask in zip(signals, fitted, strict=True)])
     left = np.vstack([residual[mask] for residual, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
     every = max(len(rows) // SELECTION_SAMPLES, 1)
     seen = _terms(rows[::every], range(_term_count(rows)))
@@ -48,8 +48,8 @@ def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, phy
         its = [picked.index(number) for number in each]
         weights[its, channel] = np.linalg.lstsq(whole[:, its], left[:, channel], rcond=None)[0]
     corrected = [
-        residual[record.test] - _terms(course[record.test], picked) / scale[picked] @ weights
-        for record, residual, course in zip(measure.records, retuned.fitted.residuals, courses, strict=True)
+        residual[record.test] - _terms(signal[record.test], picked) / scale[picked] @ weights
+        for record, residual, signal in zip(measure.records, retuned.fitted.residuals, signals, strict=True)
     ]
     return BlackBox(
         "polynomial of the model's signals",
@@ -66,13 +66,13 @@ def _scale(rows: FloatArray) -> FloatArray:
     return np.where(rms > _LEAST_RMS, rms, np.inf)
 
 
-def _clip_to_fitted_range(courses: list[FloatArray], fitted: list[Mask]) -> list[FloatArray]:
+def _clip_to_fitted_range(signals: list[FloatArray], fitted: list[Mask]) -> list[FloatArray]:
     """The signals clipped to the range that was fitted to: beyond it, a polynomial extrapolates badly."""
-    seen = np.vstack([course[mask] for course, mask in zip(courses, fitted, strict=True)])
-    return [np.clip(course, seen.min(axis=0), seen.max(axis=0)) for course in courses]
+    seen = np.vstack([signal[mask] for signal, mask in zip(signals, fitted, strict=True)])
+    return [np.clip(signal, seen.min(axis=0), seen.max(axis=0)) for signal in signals]
 
 
-def _courses(command: FloatArray, predicted: FloatArray) -> FloatArray:
+def _signals_and_changes(command: FloatArray, predicted: FloatArray) -> FloatArray:
     """(n, 2 signals): commands and predictions, one sample before, and their changes; each with an rms of 1."""
     signals = np.hstack([command, predicted])
     signals = signals / np.maximum(np.sqrt(np.mean(signals**2, axis=0)), _TINY)
@@ -95,8 +95,8 @@ def _terms(base: FloatArray, numbers: Sequence[int]) -> FloatArray:
     for place, number in enumerate(numbers):
         power, at = divmod(number, width)
         if power < 4:
-            course = base[:, at]
-            found[:, place] = course * (1.0, course, np.abs(course), course**2)[power]
+            signal = base[:, at]
+            found[:, place] = signal * (1.0, signal, np.abs(signal), signal**2)[power]
         else:
             first, other = products[number - 4 * width]
             found[:, place] = base[:, first] * base[:, other]
@@ -104,7 +104,7 @@ def _terms(base: FloatArray, numbers: Sequence[int]) -> FloatArray:
 
 
 def _select_terms(seen: FloatArray, wanted: FloatArray, count: int) -> list[int]:
-    """Numbers of the terms selected by orthogonal least squares, one after the other."""
+    """Indices of the terms selected by orthogonal least squares, one after the other."""
     picked: list[int] = []
     rest = wanted
     power = np.sum(seen**2, axis=0)

@@ -1,4 +1,4 @@
-"""Sentences about laws that the data cannot tell apart, and about unconfirmed candidates."""
+"""Sentences about laws that the data cannot distinguish, and about unconfirmed candidates."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,25 +46,25 @@ _FAMILIES = (
 """Families of laws that act alike: short name, title of a sentence, and members."""
 
 REFINED = "it holds the named law as a special case, and what it allows beyond that brings nothing on held-out data"
-"""Why a law that refines the named one is passed over."""
+"""Reason for which a law that refines the named one is not reported as a rival."""
 SENTENCES = 3
-"""Candidates that are said in sentences; the document and the page's table have them all."""
+"""Number of candidates in the sentences; the document and the page's table list all."""
 
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """What sentences need to know about the device."""
+    """Facts about the device that sentences need."""
 
     single: bool
-    """It has one axis, which then needs no name."""
+    """Whether it has a single axis, which is then not named."""
     system: UnitSystem
     noise: str = ""
     """`NoiseFloor.how`; empty where it is not known."""
 
 
 def class_noun(effect: NamedEffect) -> str:
-    """What an effect is called together with what these data cannot part from it: "friction (dry friction or 2 laws
-    like it)"; its own noun where there is nothing like it."""
+    """Name of an effect with those that these data cannot distinguish from it: "friction (dry friction or 2 laws like
+    it)"; its own noun where there are none."""
     names = _class_names(effect)
     others = len(names) - 1
     family = _family(names)

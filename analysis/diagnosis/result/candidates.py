@@ -1,4 +1,5 @@
-"""What a force balance adds to the findings: classes of laws that cannot be parted, candidates, what all laws reach."""
+"""Contribution of a force balance to the findings: classes of laws that cannot be distinguished, candidates, and the
+gain of all laws together."""
 
 import re
 from collections.abc import Sequence
@@ -25,11 +26,11 @@ REFINING = {
     "condition_dependent_friction": ("coulomb_friction",),
     "drifting_force": ("constant_force",),
 }
-"""Laws that no simulation plays, and what each holds as a special case."""
+"""Laws that are not simulated, and the special cases that each contains."""
 PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further numbers are open"
 ALIKE = "as good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
-"""Where one response was measured, a late command is as good as a late reading."""
+"""With a single measured response, a late command and a late reading are equivalent."""
 
 
 BEYOND = "a mode, lag or relaxation that the model lacks: linear dynamics, which simulations did not confirm"
@@ -69,7 +70,7 @@ def beside_given(
 
 
 def _class_of(effect: NamedEffect, alike: tuple[str, ...]) -> tuple[str, ...]:
-    """Rivals that neither the simulation nor the balance can part from it."""
+    """Rivals that neither the simulation nor the balance can distinguish from it."""
     passed = {rival.effect for rival in effect.rivals if not rival.inseparable}
     names = [rival.effect for rival in effect.rivals if rival.inseparable]
     names += [name for name in alike if name not in passed]
@@ -82,8 +83,8 @@ def with_balances(
     channels: tuple[str, ...],
     unconfirmed: Sequence[Candidate] = (),
 ) -> Diagnosis:
-    """channels: of the commands; unconfirmed: effects of actuator and sensor that a search found, told behind the laws
-    of the motion. A constant force that no balance names is a number of the model, no effect."""
+    """channels: of the commands; unconfirmed: effects of actuator and sensor that a search found, listed after the laws
+    of the motion. A constant force that no balance names is a parameter of the model, not an effect."""
     if not balances:
         return diagnosis
     weighed = [
@@ -132,7 +133,7 @@ def _weighed_law(
 
 
 def _form(formula: str) -> list[str]:
-    """Its signals and functions in order, those of an axis called as a balance calls its own."""
+    """Signals and functions of a law's formula in order, those of an axis named as in a balance."""
     names = (_FREE.sub("", name) for name in _NAME.findall(_NUMBER.sub("", formula)))
     return [_OWN_SIGNAL.sub(lambda own: own[1] or "q", name) for name in names if name]
 
@@ -144,8 +145,8 @@ def _names_covered_by(effect: NamedEffect) -> tuple[str, ...]:
 
 
 def _rank(weighed: JudgedLaw) -> int:
-    """Missing physics that is sure to gain and can have such numbers before what is not or cannot; then a linear model
-    of a higher order; and last what takes next to nothing."""
+    """Order of candidates: physics with a significant gain and possible parameters first; then a linear model of a
+    higher order; and last laws that explain almost nothing."""
     if weighed.law.linear:
         return 2
     if weighed.share < LAW_OF_CEILING:
@@ -154,8 +155,8 @@ def _rank(weighed: JudgedLaw) -> int:
 
 
 def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...], in_samples: bool = False) -> tuple[str, ...]:
-    """What the first model holds beside mass, damping and stiffness; channels: of the commands. in_samples: samples are
-    counted as time."""
+    """Remarks on the first model's linear terms beside mass, damping and stiffness; channels: of the commands.
+    in_samples: samples are counted as time."""
     said = []
     for channel, balance in zip(channels, balances, strict=False):
         beside, motion = balance.search.regression.beside, balance.search.regression.motions[0]

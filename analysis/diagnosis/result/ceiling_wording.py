@@ -9,7 +9,7 @@ from analysis.diagnosis.unit_wording import error_of_signal, error_text, share_t
 from analysis.wording import capitalise
 
 SAME = 1e-9
-"""Share by which two errors of the same numbers may differ by rounding."""
+"""Share by which two errors of the same data may differ by rounding."""
 
 
 def black_box_sentence(box: BlackBox | None, named: bool) -> str:
@@ -54,7 +54,8 @@ def _ceiling_sentence(reached: BalanceErrors, single: bool) -> str:
 
 
 _NOISE_SOURCES = {"rest": "as it is heard at rest", "quiet band": "as it is above the driven band"}
-"""Noise that was not measured from repeats: its level under a drive is not known, so errors are not counted in it."""
+"""Ways of estimating noise other than from repeats: its level during excitation is then unknown, so errors are not
+stated in units of it."""
 
 
 def times_text(ratio: float) -> str:

@@ -17,8 +17,8 @@ from equalizer.signals.signal import FloatArray
 
 
 def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
-    """Root mean square over the channels of each one's rms error over its rms signal. "fit" holds the samples to choose
-    by, too."""
+    """Rms error relative to the rms signal, root mean square over the channels. "fit" includes the samples to choose
+    by."""
     if found.statistic is not None:
         return Fit(*(_by_statistic(found, found.statistic, parts) for parts in (("fit", "choose"), ("test",))))
     return Fit(_errors(measure, found, ("fit", "choose")), _errors(measure, found, ("test",)))
@@ -31,7 +31,7 @@ def channel_errors(found: Explanation, names: tuple[str, ...]) -> Mapping[str, M
 
 
 def _by_statistic(found: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
-    """Root mean square over the channels of the logarithm that a prediction is off by."""
+    """Root mean square over the channels of the logarithmic error of a prediction."""
 
     def error(candidate: FittedCandidate) -> float | None:
         off = np.array([getattr(candidate.score, part) for part in parts]) * statistic.chance
@@ -57,18 +57,18 @@ def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -
 
     noise = float(np.sqrt(np.mean((measure.noise / size) ** 2)))
     before, retuned, after = (error(each) for each in (found.before, found.retuned, found.after))
-    # Noise that is larger than an error refutes its own estimate, such as one from above the driven band.
+    # An error smaller than the noise refutes the estimate of the noise, such as one from above the driven band.
     known = all(each is None or noise <= SAME_TO_READERS * each for each in (before, retuned, after))
     return Errors(before, retuned, after, noise if known else None)
 
 
 def held_out_stands_still(records: Sequence[Observed], noise: FloatArray) -> bool:
-    """Whether something is held out, and no channel moves in it as it does in what is fitted. noise: (c,), rms."""
+    """Whether samples are held out, and no channel moves in them as it does in the fitted ones. noise: (c,), rms."""
     if not any(each.test.any() for each in records):
         return False
     held = _mean_power(records, [each.test for each in records])
     known = _mean_power(records, [each.fit | each.choose for each in records])
-    # A channel that only holds noise everywhere never falls below a share of what is fitted.
+    # A channel that contains only noise is never below a share of that in the fitted samples.
     still = np.fmax(STILL_SHARE * known, (SEALED_SURPRISE * noise) ** 2)
     return bool((STILL_SHARE * known > noise**2).any() and (held <= still).all())
 
@@ -80,7 +80,7 @@ def _mean_power(records: Sequence[Observed], masks: Sequence[Mask]) -> FloatArra
 
 
 def _about_rest(record: Observed, mask: Mask) -> FloatArray:
-    """(n, c): speeds as they are, for rest is zero; all else about its mean over the masked samples."""
+    """(n, c): speeds unchanged, because rest is zero; other channels about their mean over the masked samples."""
     signals = (record.recording.response, record.recording.position)
     quantities = [word for signal in signals if signal is not None for word in signal.quantities]
     speeds = [DERIVATIVE_OF_QUANTITY.get(word) == 1 for word in quantities[: record.measured.shape[1]]]

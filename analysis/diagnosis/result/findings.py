@@ -20,7 +20,7 @@ from equalizer.signals.summary import Summarised, Summary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class TimeSeries:
     """One recording, measured and predicted; channels are the response's, then the position's; all (n, c), SI."""
 
     name: str
@@ -32,23 +32,24 @@ class Course:
     retuned: FloatArray
     after: FloatArray
     tested: tuple[tuple[int, int], ...]
-    """Stretches of samples that nothing was fitted to or chosen by."""
+    """Stretches of held-out samples, which nothing was fitted to or chosen by."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signature:
-    """A curve that shows a named effect: the missing force or error against its variable, with the fitted law."""
+    """A curve that shows a named effect: the missing force or the residual against its variable, with the fitted
+    law."""
 
     effect: str
     axis: str | None
     along: str
-    """What the abscissa is, with unit: "velocity of x (m/s)"."""
+    """Label of the abscissa with unit: "velocity of x (m/s)"."""
     of: str
-    """What the ordinate is, with unit."""
+    """Label of the ordinate with unit."""
     measured_at: FloatArray
     """(k,)"""
     measured: FloatArray
-    """(k,): mean of what is missing there."""
+    """(k,): mean of the missing quantity there."""
     spread: FloatArray
     """(k,): its standard error."""
     law_at: FloatArray
@@ -56,12 +57,12 @@ class Signature:
     law: FloatArray
     """(q,)"""
     visited: tuple[float, float] | None = None
-    """Range of the abscissa that the recordings visited, where the law is drawn beyond it."""
+    """Range of the abscissa that the recordings visited; the law is drawn beyond it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlackBox:
-    """A model without physics and with as many numbers, fitted to the same samples."""
+    """A model without physics and with as many parameters, fitted to the same samples."""
 
     kind: str
     numbers: int
@@ -86,65 +87,67 @@ class BalanceErrors:
     tested: bool = True
     """Whether the held-out samples move enough to test laws by."""
     given: bool = False
-    """The model was given: `linear` is what it leaves, re-tuned."""
+    """Whether the model was given: `linear` is then the error of the re-tuned model."""
 
     @property
     def share(self) -> float:
-        """Share of the error power that all laws together take which the named laws take."""
+        """Share of the gain of all laws together that the named laws reach."""
         room = self.linear**2 - self.ceiling**2
         return min(max((self.linear**2 - self.named**2) / room, 0.0), 1.0) if room > 0 else 0.0
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class Findings(Summarised):
-    """What a diagnosis found: what is written (`diagnosis`), the improved model, and what figures and page show."""
+    """Findings of a diagnosis: the document (`diagnosis`), the improved model, and the data of figures and page."""
 
     diagnosis: Diagnosis
     explanation: Explanation
     given: MechanicalModel
-    """What it began from; see `fitted`."""
+    """The initial model; see `fitted`."""
     improved: MechanicalModel
-    """Re-tuned, with the named effects among its `effects`; driven by the commands as they were recorded."""
+    """The re-tuned model with the named effects among its `effects`; driven by the commands as they were recorded."""
     named: tuple[PlacedEffect, ...]
     evidence: tuple[Evidence, ...]
     """Evidence of the re-tuned model, per recording."""
-    courses: tuple[Course, ...]
+    time_series: tuple[TimeSeries, ...]
     noise_rms: Mapping[str, float]
-    """By channel, SI."""
+    """Noise rms by channel, SI."""
     channel_errors: Mapping[str, Mapping[str, float]]
     """By "before", "retuned", "after", then by channel: rms over the test samples in units of the noise."""
     mismatch: tuple[Mismatch, ...]
-    """All cells that were looked at, not only the significant ones (p_value and share say which)."""
+    """All tested cells, not only the significant ones (see p_value and share)."""
     signatures: tuple[Signature, ...]
     black_box: BlackBox | None
     remarks: tuple[str, ...]
-    """Sentences that a reader must know: what was assumed, what is weak, what is not sensible physically."""
+    """Remarks as sentences: assumptions, weaknesses, implausible results."""
     maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
     """By "before", "retuned", "after": every cell of the map, in units of the noise."""
     local: Localisation = field(default_factory=Localisation)
     """Localisation of the mismatch: in which states, through which input, and of which kind."""
     fitted: bool = False
-    """`given` was fitted to these recordings by the program: no calibration says how far its numbers may be off."""
+    """Whether `given` was fitted to these recordings by the program: there is then no calibration of its parameters."""
     floor: NoiseFloor | None = None
     """Noise of the first recording: how it was measured, and its spectrum."""
     is_timed: bool = True
-    """Whether time is known: where not, what is in hertz is in cycles per sample."""
+    """Whether the time axis is known: if not, frequencies are in cycles per sample."""
     tuning: Tuning | None = None
-    """What the deviations of `explanation` count: names, units, sizes."""
+    """Free parameters of the model that the deviations of `explanation` belong to: names, units, standard
+    deviations."""
     axes: tuple[str, ...] = ()
-    """The driven axes, as a reader calls them; empty = x, y, z."""
+    """Displayed names of the driven axes; empty = x, y, z."""
     proposal: Proposal | None = None
     """The next recording proposed, where rivals are as good as what is named."""
     reached: tuple[BalanceErrors, ...] = ()
-    """Per axis; empty where no force balance was weighed."""
+    """Force balance per axis; empty where none was computed."""
     state_maps: tuple[StateMaps, ...] = ()
-    """Per axis, the one to be drawn first."""
+    """Maps per axis, in the order of drawing."""
     split_s: Mapping[str, float] = field(default_factory=dict)
-    """Seconds by "fit", "choose", "test"."""
+    """Duration in seconds by "fit", "choose", "test"."""
     retuned: MechanicalModel | None = None
-    """Without new physics; as `improved`."""
+    """The re-tuned model without new physics; as `improved`."""
     own_errors: FloatArray | None = None
-    """(t,): standard errors of the changes of the model's own numbers, as `tuning` counts them; NaN = not computed."""
+    """(t,): standard errors of the deviations of the model's own parameters, as `tuning` counts them; NaN = not
+    computed."""
 
     def summary(self) -> Summary:
         errors = self.diagnosis.fit.test

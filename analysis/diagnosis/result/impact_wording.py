@@ -1,4 +1,4 @@
-"""What is said where impacts were compared by the band powers of the response instead of sample by sample."""
+"""Sentences for diagnoses that compare impacts by the band powers of the response instead of sample by sample."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The named effects for the document: numbers with intervals, rivals with reasons, probabilities."""
+"""The named effects for the document: parameters with intervals, rivals with reasons, probabilities."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -39,7 +39,7 @@ _SAME_ERROR = 0.005
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Labels:
-    """Channel names and units that the numbers are reported with."""
+    """Channel names and units for the document."""
 
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
@@ -127,7 +127,7 @@ def _chances_of_names(fitted_candidates: Sequence[FittedCandidate], chances: Seq
 
 
 def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: tuple[Labels, str]) -> str:
-    """Why a rival was not chosen. words: labels of the device, and the unit of errors."""
+    """Reason for not choosing a rival. words: labels of the device, and the unit of errors."""
     said, unit = words
     worst, least = other.score.worst_channel, best.score.worst_channel
     claim = other.fitted.hypothesis.claims[-1]
@@ -207,10 +207,10 @@ def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[
     return [dict(effect.values) for effect in placed[first : first + whole.claims[number].groups]]
 
 
-# How likely each candidate is the right one, from how far apart they stand.
+# Probability of each candidate, from the differences of their log errors.
 def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> tuple[float, ...]:
-    """One each, in sum less than 1; the first candidate is the preferred one, and its refinements count for it. left:
-    errors of the whole explanation in the worst channel, in units of the noise."""
+    """One probability each, with a sum below 1; the first candidate is the preferred one, and its refinements count for
+    it. left: errors of the whole explanation in the worst channel, in units of the noise."""
     if not fitted_candidates:
         return ()
     best = fitted_candidates[0]
@@ -223,6 +223,6 @@ def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> 
 
 
 def probability_of_none(left: float) -> float:
-    """The probability that no candidate is right, though none in the catalogue is better."""
+    """The probability that no candidate is right, although none in the catalogue is better."""
     odds = (max(left - 1.0, 0.0) / ELSEWHERE_HALFWAY) ** ELSEWHERE_STEEPNESS
     return float(ELSEWHERE_LEAST + (ELSEWHERE_MOST - ELSEWHERE_LEAST) * odds / (1 + odds))

@@ -1,4 +1,4 @@
-"""Implausible results of a fit, such as a negative damping, a sentence each."""
+"""Implausible results of a fit, such as negative damping, one sentence each."""
 
 from collections.abc import Iterator, Sequence
 
@@ -74,6 +74,6 @@ def _unit(effect: str, parameter: str, found: Findings) -> str:
     known = EFFECTS_BY_NAME.get(effect)
     for known_parameter in known.parameters if known else ():
         if known_parameter.name == parameter:
-            response = found.courses[0].units[0] if found.courses else RESPONSE
+            response = found.time_series[0].units[0] if found.time_series else RESPONSE
             return known_parameter.unit_in(found.given.system, response)
     return "1"

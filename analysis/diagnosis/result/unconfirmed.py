@@ -18,8 +18,8 @@ from equalizer.signals.recording import Recording
 def unconfirmed_candidates(
     found: Sequence[Unconfirmed], box: BlackBox | None, recording: Recording, model: MechanicalModel
 ) -> tuple[Candidate, ...]:
-    """The unconfirmed effects as candidates; of several in one hypothesis the last, unless one is meant. Shares are of
-    what a black box takes, or, where physics takes more, of the largest gain."""
+    """The unconfirmed effects as candidates; of several in one hypothesis the last, unless one is specified. Shares are
+    relative to the gain of a black box, or, where physics gains more, to the largest gain."""
     if not found:
         return ()
     said, most = labels_of(recording, model), max(max(each.gain for each in found), _gain_of(box), 1e-300)
@@ -43,7 +43,7 @@ def unconfirmed_candidates(
 
 
 def _gain_of(box: BlackBox | None) -> float:
-    """Share of the error power of a model without named effects that the black box beside it takes."""
+    """Share of the error power of a model without named effects that the black box explains."""
     return 0.0 if box is None or not box.physics > 0 else 1 - (box.test / box.physics) ** 2
 
 

@@ -1,33 +1,33 @@
-"""Channels that differ from the prediction by a constant factor or a sign: a wrong unit or wire is likelier than such a
-device."""
+"""Channels that differ from the prediction by a constant factor or a sign: a wrong unit or reversed wiring is then more
+likely than such a device."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.diagnosis.result.findings import Course
+from analysis.diagnosis.result.findings import TimeSeries
 from analysis.diagnosis.settings import UNIT_CORRELATION, UNIT_FACTOR
 from equalizer.plant.mechanical_model import MechanicalModel
 
 
-def unit_sentences(courses: Sequence[Course]) -> tuple[str, ...]:
+def unit_sentences(time_series: Sequence[TimeSeries]) -> tuple[str, ...]:
     """A sentence for each channel that differs from the given model's prediction by a constant factor."""
     found: dict[str, float] = {}
-    for course in courses:
-        for channel, name in enumerate(course.channels):
-            factor = _factor(course, channel)
+    for series in time_series:
+        for channel, name in enumerate(series.channels):
+            factor = _factor(series, channel)
             if factor is not None and not 1 / UNIT_FACTOR < factor < UNIT_FACTOR:
                 found.setdefault(name, factor)
     return tuple(
-        f"{name} has the course that the model foresees, but {_words(factor)}: its {_what(factor)}, the command's or "
+        f"{name} has the shape that the model predicts, but {_words(factor)}: its {_what(factor)}, the command's or "
         "one in the model may be wrong."
         for name, factor in found.items()
     )
 
 
-def _factor(course: Course, channel: int) -> float | None:
+def _factor(series: TimeSeries, channel: int) -> float | None:
     """Ratio of measured to predicted amplitude, signed; None where the two are not well correlated."""
-    measured, predicted = course.measured[:, channel], course.before[:, channel]
+    measured, predicted = series.measured[:, channel], series.before[:, channel]
     known = np.isfinite(measured) & np.isfinite(predicted)
     if not known.any():
         return None

@@ -24,7 +24,7 @@ from analysis.diagnosis.result.ceiling_wording import (
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import impact_sentence
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.retuned_numbers import (
+from analysis.diagnosis.result.retuned_parameters import (
     MovedNumber,
     better_alone,
     better_model,
@@ -137,7 +137,7 @@ def _inseparable(effect: NamedEffect) -> str:
 
 
 def remainder_sentence(diagnosis: Diagnosis, device: Device | None = None) -> str:
-    """What is still unexplained, in the document's order: what misses most of the signal comes first."""
+    """Sentences on the remaining mismatch, in the document's order: rows with the largest share of the signal first."""
     left = significant(diagnosis.remainder)
     if not left:
         return "Nothing significant is left unexplained."
@@ -147,7 +147,7 @@ def remainder_sentence(diagnosis: Diagnosis, device: Device | None = None) -> st
 
 
 def significant(rows: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
-    """The rows that are significant: a verdict without repeats comes with a remainder, however small."""
+    """The significant rows: without repeats, a verdict comes with a residual, however small."""
     return tuple(row for row in rows if row.p_value <= FALSE_DISCOVERY_RATE)
 
 

@@ -1,10 +1,10 @@
-"""Identifiability: an effect is named only where the interval of one of its numbers does not hold none.
+"""Identifiability: an effect is named only where the interval of one of its parameters excludes zero.
 
-Intervals are linearised first. Where an effect has one such number and its interval holds none, but not by far, its
-profile decides: beside numbers that act alike, and where a law is bent, the linearised interval is too wide. The
-deviance between the fit without an effect and the fit with it needs no slope. Summed over stretches longer than the
-errors remember, its mean over its own spread is half of the number over its standard error, for any
-variance and colour of the residuals (Vuong, Econometrica 57:307, 1989; for a quadratic deviance).
+Linearised intervals are computed first. Where an effect has one such parameter, and its interval contains zero by a
+small margin, the likelihood profile decides: with correlated parameters or a nonlinear law the linearised interval is
+too wide. The deviance between the fits without and with an effect needs no derivative. Summed over stretches longer
+than the errors' correlation time, its mean over its standard deviation is half of the parameter over its standard
+error, for any variance and colour of the residuals (Vuong, Econometrica 57:307, 1989; for a quadratic deviance).
 """
 
 from collections.abc import Iterator

@@ -11,13 +11,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.data.growth import growth_rate
+from analysis.diagnosis.data.growth_rate import growth_rate
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, residuals_to_fit
+from analysis.diagnosis.forces.inverse_dynamics import band_motion
 from analysis.diagnosis.forces.inverse_lines import zeros_of
-from analysis.diagnosis.forces.needed_force import band_motion
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.periods import settled_periods
 from analysis.diagnosis.search.search_context import SearchContext

@@ -11,7 +11,7 @@ from analysis.diagnosis.types import Mapper
 from equalizer.effects.clock_drift import LARGEST_PPM
 from equalizer.effects.effect import ALL_SITES, Effect, Values
 from equalizer.effects.placing import place_of_effect
-from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.simulation.interpolated_response import read_other_times
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 

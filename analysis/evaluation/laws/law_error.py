@@ -16,9 +16,9 @@ class FreshMotion:
 
     columns: Mapping[str, FloatArray]
     added: Mapping[str, FloatArray]
-    """By axis: what the true laws add to its force (N), or to its reading (m/s^2)."""
+    """By axis: contribution of the true laws to its force (N), or to its reading (m/s^2)."""
     response: bool
-    """To its reading."""
+    """Whether `added` belongs to the reading, not to the force."""
     rate_hz: float
 
 

@@ -36,14 +36,14 @@ class LawOutcome:
     axes: tuple[str, ...]
     truth: TrueLaw | None
     adds: float
-    """By how much it changes the readings: rms over the noise's, in the worst channel."""
+    """Change of the readings by the law: rms over the noise's, in the worst channel."""
     said: Diagnosis | None
-    """None: the diagnosis broke down."""
+    """The diagnosis; None: it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
     """By "before", "retuned", "after", then by channel: rms over the noise's, on held-out samples."""
     seconds: float
     errors: tuple[float, ...] = ()
-    """Of the laws that were said (`law_error`): in the visited range, and louder."""
+    """Error of the reported laws (`law_error`): in the visited range, and at a higher level."""
 
     @property
     def named(self) -> tuple[Law, ...]:
@@ -60,7 +60,7 @@ class LawOutcome:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the catalogue."""
+        """Names of the effects that the catalogue holds."""
         return () if self.said is None else tuple(each.effect for each in self.said.effects if each.law is None)
 
     @property

@@ -64,7 +64,7 @@ def classify_outcome(outcome: Outcome) -> str:
 
 
 def shares_by_size(singles: Sequence[Outcome]) -> tuple[Part, ...]:
-    """In parts of equal count, the smallest effects first."""
+    """Detection rate in groups of equal count, the smallest effects first."""
     order = sorted(singles, key=lambda single: single.adds)
     found = []
     for part in np.array_split(np.arange(len(order)), min(PARTS, len(order))):

@@ -14,9 +14,9 @@ class FollowUp:
     effect: str
     """The concealed one."""
     returned: tuple[str, ...]
-    """At first."""
+    """Effects that were returned before the follow-up."""
     proposed: str
-    """What to record, in the diagnosis's words; empty where it foresaw that nothing of its menu would tell."""
+    """Proposed recording, in the diagnosis's words; empty where no recording of its menu would discriminate."""
     after_proposed: tuple[str, ...]
     """The returned set with that recording beside the first; empty where none was proposed."""
     drawn: str

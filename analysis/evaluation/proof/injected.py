@@ -17,9 +17,9 @@ JUDGED: tuple[Judged, ...] = get_args(Judged)
 class InjectedOutcome:
     recording: str
     effects: tuple[str, ...]
-    """None where nothing was injected; two where two faults came at once."""
+    """Injected faults; none, or two where two were injected at once."""
     places: tuple[str, ...]
-    """Of each."""
+    """Place of each fault."""
     strength: float
     values: Mapping[str, float]
     change: float | None
@@ -44,7 +44,8 @@ class InjectedOutcome:
 
     @property
     def judged(self) -> Judged:
-        """By the worst of the names. Of two faults at once, one that is named is right, and the other left open."""
+        """Judgement by the worst of the names. With two faults at once, naming one of them is right, and the other is
+        left open."""
         if not self.effects:
             return "wrong" if self.named or self.failed else "nothing named"
         if not self.named:
@@ -109,14 +110,14 @@ class Tally:
     what: str
     drawn: int
     counts: tuple[int, ...]
-    """Of the detectable ones, by JUDGED without its last."""
+    """Number of detectable faults per entry of JUDGED without its last."""
     right: Figure
     nothing: Figure
-    """Where nothing was injected: nothing named."""
+    """Cases without a fault in which nothing was named."""
 
 
 def tallies(outcomes: Sequence[InjectedOutcome], key: Callable[[InjectedOutcome], str]) -> tuple[Tally, ...]:
-    """By key, in order of its names; outcomes with an empty key are left out."""
+    """Groups by key, in the order of names; outcomes with an empty key are left out."""
     return tuple(
         _tally(name, [outcome for outcome in outcomes if key(outcome) == name])
         for name in sorted({*map(key, outcomes)} - {""})

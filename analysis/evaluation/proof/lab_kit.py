@@ -115,7 +115,7 @@ def _is_in_interval(label: Label, diagnosis: Diagnosis, wanted: Sequence[str]) -
 
 
 def kit_figures(rows: Sequence[Scored]) -> tuple[Figure, ...]:
-    """With Wilson's 95 % intervals."""
+    """Rates with Wilson's 95 % intervals."""
     changed = [row for row in rows if row.change != NOTHING]
     kinds = [change.name for change in CHANGES if any(row.change == change.name for row in changed)]
     return (

@@ -7,7 +7,8 @@ from math import hypot
 from analysis.diagnosis.document import Diagnosis, NamedEffect
 
 DETECTABLE = 1.25
-"""Of the re-tuned model's errors over the noise, in the worst channel, on samples that nothing was fitted to."""
+"""Ratio of the re-tuned model's rms error to the noise, in the worst channel, on held-out samples, above which an
+effect counts as detectable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +29,14 @@ class Outcome:
     """main, dirty (more hidden extras) or engine (a second physics engine)."""
     axes: tuple[str, ...]
     model: str
-    """How the model came about: calibrated, or retuned to the device as it is."""
+    """Origin of the model: calibrated, or re-tuned to the device."""
     concealed: tuple[Concealed, ...]
     strengths: tuple[float, ...]
     """0 = the weakest that is drawn, 1 = the strongest."""
     adds: float
-    """By how much the concealed effects change the readings: rms over the noise's, in the worst channel."""
+    """Change of the readings by the concealed effects: rms over the noise's, in the worst channel."""
     said: Diagnosis | None
-    """None: the diagnosis broke down."""
+    """The diagnosis; None: it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
     """By "before", "retuned", "after", then by channel: rms over the noise's, on held-out samples."""
     seconds: float

@@ -19,7 +19,7 @@ class Figure:
 
     name: str
     value: float | None
-    """None where nothing was drawn that it could be of."""
+    """The share; None without any case."""
     low: float | None
     high: float | None
     of: int

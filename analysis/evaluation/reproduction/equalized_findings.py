@@ -25,11 +25,11 @@ class EqualizedRows:
     equalized: PlayedResponse
     edge_plain: PlayedResponse
     edge: PlayedResponse
-    """With the model of the centre."""
+    """Results with the model of the centre."""
     edge_blended: PlayedResponse
-    """With the forces of models from other places, blended."""
+    """Results with blended forces of models from other places."""
     broad: PlayedResponse
-    """At the centre, all frequencies at once."""
+    """Result at the centre, all frequencies at once."""
     frictionless: PlayedResponse
     """The same on the device without friction, with a model identified on that."""
 

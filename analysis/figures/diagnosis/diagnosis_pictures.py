@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
+from analysis.diagnosis.result.residual_spectrum import remainder_spectra
 from analysis.diagnosis.search.guard import Guard, Part
 from analysis.figures.diagnosis.held_out import held_out_picture
 from analysis.figures.diagnosis.mismatch_map import driving_inputs, mismatch_map_picture
@@ -24,9 +24,9 @@ def diagnosis_pictures(found: Findings, guard: Guard | None = None) -> tuple[Pic
 def diagnosis_drawings(found: Findings) -> list[Part]:
     """Each gives some of the pictures, and needs nothing of the others."""
     # Where a motion is imposed and the force measured, levels are the motion's, in a unit of their own.
-    imposed = any(unit.startswith("N") for course in found.courses for unit in course.units)
+    imposed = any(unit.startswith("N") for series in found.time_series for unit in series.units)
     unit = "" if imposed else found.given.system.force
-    held = found.courses, found.noise_rms, found.channel_errors
+    held = found.time_series, found.noise_rms, found.channel_errors
 
     def mapped(number: int) -> Sequence[Picture]:
         return [mismatch_map_picture(found.maps, number, unit)]
@@ -47,5 +47,5 @@ def _with_time_labels(draw: Callable[[], Sequence[Picture]], timed: bool) -> Seq
 
 
 def _remainder(found: Findings) -> list[Picture]:
-    spectra = remainder_spectra(found.courses, found.floor)
+    spectra = remainder_spectra(found.time_series, found.floor)
     return [remainder_picture(spectra)] if spectra else []

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.diagnosis.result.findings import Course
+from analysis.diagnosis.result.findings import TimeSeries
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.diagnosis.stage_style import AFTER, BEFORE, MEASURED, RETUNED, STAGES, Stage
 from analysis.figures.picture import Picture
@@ -26,19 +26,21 @@ ChannelErrors = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True, slots=True)
 class Excerpt:
-    course: Course
+    series: TimeSeries
     channel: int
     start: int
     stop: int
 
 
-def held_out_picture(courses: Sequence[Course], noise_rms: Mapping[str, float], errors: ChannelErrors) -> Picture:
+def held_out_picture(
+    time_series: Sequence[TimeSeries], noise_rms: Mapping[str, float], errors: ChannelErrors
+) -> Picture:
     """errors: by stage and channel, in units of the noise."""
-    excerpt = find_excerpt(courses, noise_rms)
+    excerpt = find_excerpt(time_series, noise_rms)
     where = ""
     if excerpt is not None:
         where = (
-            f"Left: {excerpt.course.channels[excerpt.channel]} in {excerpt.course.name}, where what was found changes "
+            f"Left: {excerpt.series.channels[excerpt.channel]} in {excerpt.series.name}, where what was found changes "
             "the prediction most; below, what each prediction leaves, over twice the noise to either side (grey). "
         )
     return Picture(
@@ -51,16 +53,16 @@ def held_out_picture(courses: Sequence[Course], noise_rms: Mapping[str, float], 
     )
 
 
-def find_excerpt(courses: Sequence[Course], noise_rms: Mapping[str, float]) -> Excerpt | None:
+def find_excerpt(time_series: Sequence[TimeSeries], noise_rms: Mapping[str, float]) -> Excerpt | None:
     """The held-out excerpt and channel where re-tuned and final prediction differ most, in units of the noise; where
     they do not differ, those where given and final do. None without a difference."""
     for each in ("retuned", "before"):
         best: tuple[float, Excerpt] | None = None
-        for course in courses:
-            noise = np.array([noise_rms.get(name, np.nan) for name in course.channels])
-            change = np.nan_to_num((getattr(course, each) - course.after) / noise)
-            for start, stop in course.tested:
-                found = _strongest_excerpt(course, change[start:stop], start)
+        for series in time_series:
+            noise = np.array([noise_rms.get(name, np.nan) for name in series.channels])
+            change = np.nan_to_num((getattr(series, each) - series.after) / noise)
+            for start, stop in series.tested:
+                found = _strongest_excerpt(series, change[start:stop], start)
                 if found is not None and (best is None or found[0] > best[0]):
                     best = found
         if best is not None and best[0] > 0.1:
@@ -68,7 +70,7 @@ def find_excerpt(courses: Sequence[Course], noise_rms: Mapping[str, float]) -> E
     return None
 
 
-def _strongest_excerpt(course: Course, change: FloatArray, start: int) -> tuple[float, Excerpt] | None:
+def _strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) -> tuple[float, Excerpt] | None:
     if not len(change):
         return None
     channel = int(np.argmax(_visibility(change)))
@@ -77,13 +79,13 @@ def _strongest_excerpt(course: Course, change: FloatArray, start: int) -> tuple[
     if not signal.any():
         return None
     # The frequency at which a sine of this size would change as fast.
-    cycle_s = 2 * np.pi * rms / max(speed * course.sample_rate_hz, 1e-12)
-    length = int(np.clip(_CYCLES * cycle_s, _SHORTEST_S, _LONGEST_S) * course.sample_rate_hz)
+    cycle_s = 2 * np.pi * rms / max(speed * series.sample_rate_hz, 1e-12)
+    length = int(np.clip(_CYCLES * cycle_s, _SHORTEST_S, _LONGEST_S) * series.sample_rate_hz)
     length = min(max(length, 8), len(signal))
     places = np.unique(np.linspace(0, len(signal) - length, _STRETCHES).astype(int))
     strengths = [float(_visibility(signal[at : at + length])) for at in places]
     at = int(places[int(np.argmax(strengths))])
-    return max(strengths), Excerpt(course, channel, start + at, start + at + length)
+    return max(strengths), Excerpt(series, channel, start + at, start + at + length)
 
 
 def _visibility(change: FloatArray) -> FloatArray:
@@ -110,12 +112,12 @@ def draw_held_out(excerpt: Excerpt | None, noise_rms: Mapping[str, float], error
 
 
 def _draw_excerpt(above: Axes, below: Axes, excerpt: Excerpt, noise_rms: Mapping[str, float]) -> None:
-    course, part, k = excerpt.course, slice(excerpt.start, excerpt.stop), excerpt.channel
-    name, unit = course.channels[k], course.units[k]
-    seconds = np.arange(excerpt.start, excerpt.stop) / course.sample_rate_hz
-    measured = course.measured[part, k]
+    series, part, k = excerpt.series, slice(excerpt.start, excerpt.stop), excerpt.channel
+    name, unit = series.channels[k], series.units[k]
+    seconds = np.arange(excerpt.start, excerpt.stop) / series.sample_rate_hz
+    measured = series.measured[part, k]
     shown = scale_of(unit, float(np.max(np.abs(measured))))
-    left = [(stage, measured - getattr(course, stage.name)[part, k]) for stage in STAGES]
+    left = [(stage, measured - getattr(series, stage.name)[part, k]) for stage in STAGES]
     # The given model may be so far off that it would flatten the others.
     largest = max(float(np.max(np.abs(each))) for stage, each in left if stage is not BEFORE)
     small = scale_of(unit, largest)

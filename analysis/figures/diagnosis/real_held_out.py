@@ -28,7 +28,7 @@ def real_picture(answer: RealAnswer) -> Picture:
 
 
 def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
-    """What, share of the signal, colour."""
+    """Curve, share of the signal, colour."""
     if answer.held_out is None:
         return []
     errors = answer.held_out

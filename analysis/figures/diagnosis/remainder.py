@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from analysis.diagnosis.result.remainder_spectrum import RemainderSpectrum
+from analysis.diagnosis.result.residual_spectrum import RemainderSpectrum
 from analysis.diagnosis.unit_wording import typeset_unit
 from analysis.figures.diagnosis.stage_style import AFTER, RETUNED
 from analysis.figures.picture import Picture

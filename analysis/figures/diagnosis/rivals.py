@@ -31,9 +31,9 @@ class TriedExplanation:
 
     words: str
     seen: float
-    """On the data that were fitted to and chosen by."""
+    """Error on the data that were fitted to and chosen by."""
     test: float
-    """On held-out data; NaN where these were not looked at."""
+    """Error on held-out data; NaN where not computed."""
 
 
 def list_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) -> tuple[TriedExplanation, ...]:

@@ -13,7 +13,7 @@ Dash = Literal["-"] | tuple[float, tuple[float, ...]]
 @dataclass(frozen=True, slots=True)
 class Stage:
     name: str
-    """As `Findings` calls it."""
+    """Name of the field in `Findings`."""
     words: str
     colour: str
     dash: Dash

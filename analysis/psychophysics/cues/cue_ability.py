@@ -1,11 +1,11 @@
-"""How well each cue alone could tell the directions: difference over what a participant can notice.
+"""Discriminability of the directions by each cue alone: difference over the participant's internal noise.
 
-A sensor parts two nearly repeatable stimuli however little they differ, so its own error says nothing about people. A
-participant has an internal noise, which is declared here, and adds to how much the delivery varied from trial to trial
-(a roved level does): d' = difference / sqrt(internal noise^2 + spread^2). At d' = 1 the difference is one just
-noticeable difference of that participant; the cue alone then makes Phi(1/2) = 69 % of the answers right.
+A sensor distinguishes two nearly repeatable stimuli even with tiny differences, so that its own error says nothing
+about people. A participant has an internal noise, which is declared here, and adds to the variation of the delivery
+from trial to trial (a roved level): d' = difference / sqrt(internal noise^2 + spread^2). At d' = 1 the difference is
+one just noticeable difference of that participant; the cue alone then makes Phi(1/2) = 69 % of the answers right.
 
-Friction makes what arrives depend on the level in a way that a participant knows at any level: differences and spread
+With friction, the delivered stimulus depends on the level in a way that a participant can learn: differences and spread
 are those at the same level, which enters as a parabola in dB.
 
 Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapter 1.
@@ -58,8 +58,8 @@ class CueAbility:
 
 
 def cue_abilities(trials: DeliveredTrials) -> tuple[CueAbility, ...]:
-    """By cue and participant, over the trials measured for the cue; participants with too few of them for a spread are
-    left out."""
+    """Discriminability by cue and participant, over the trials measured for the cue; participants with too few trials
+    for a spread are left out."""
     found = []
     for cue, values_db in trials.values_db.items():
         for number, subject in enumerate(trials.subjects):

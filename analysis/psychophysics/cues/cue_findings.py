@@ -41,7 +41,7 @@ class CueFinding:
     """Participants for whom it is shown that a usual judge would notice the difference."""
     answers: AnswersOnDelivery
     p_holm: float | None
-    """Of `answers`, corrected for all cues and frequencies."""
+    """p-value of `answers`, corrected for all cues and frequencies."""
 
     @property
     def followed(self) -> bool:
@@ -49,7 +49,7 @@ class CueFinding:
 
 
 def cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
-    """By frequency and cue, over the test trials that were measured; empty where none was."""
+    """Findings by frequency and cue, over the measured test trials; empty without any."""
     parts = [
         (group, cue_abilities(group), regressed)
         for group in delivered_trials(trials)
@@ -96,8 +96,8 @@ def _observed_d_prime(group: DeliveredTrials) -> float | None:
 
 
 def cue_warnings(found: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tuple[str, ...]:
-    """What must be known before the thresholds are read; empty where nothing stands out. Of the gaps only those of
-    some trials: that a study measured no harmonics at all does not stand out."""
+    """Warnings for the interpretation of the thresholds; empty where no cue is notable. Of missing measurements only
+    those of some trials: that a study measured no harmonics at all is not listed."""
     noticed = [_noticed_text(each) for each in found if each.noticed_by]
     followed = [
         f"{each.cue.value} at {each.frequency_hz:g} Hz ({signed_number(each.answers.slope or 0.0)} logits per dB, "
@@ -122,7 +122,7 @@ def cue_warnings(found: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tu
 
 
 def gap_text(gaps: Sequence[CueGap]) -> str:
-    """Which trials tell nothing of a cue; empty where none is missing."""
+    """Sentence on trials without a measurement of a cue; empty where none is missing."""
     if not gaps:
         return ""
     parts = [

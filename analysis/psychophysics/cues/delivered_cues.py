@@ -1,7 +1,7 @@
-"""What differs between two directions as delivered, beside the direction: strength, spectrum, coupling.
+"""Differences between two directions as delivered, other than the direction itself: strength, spectrum, coupling.
 
-All in dB, so that they can be weighed against one internal noise. Harmonics and motion across the direction count by
-what they add to the amplitude where they are in phase with it: the most that they can change.
+All in dB, so that they can be compared with one internal noise. Harmonics and motion across the direction count by
+their contribution to the amplitude if in phase with it, an upper bound.
 """
 
 import math
@@ -20,9 +20,9 @@ class Cue(StrEnum):
     INTENSITY = "intensity"
     """Delivered along the direction, over the level of the staircase; varies as a roved level does."""
     SPECTRUM = "spectrum"
-    """What the harmonics add to it."""
+    """Contribution of the harmonics to the amplitude."""
     COUPLING = "coupling"
-    """What the motion across the direction adds to it."""
+    """Contribution of the motion across the direction to the amplitude."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +55,7 @@ class CueGap:
 
 
 def delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
-    """By rising frequency; only what was measured."""
+    """Cues by rising frequency; only measured trials."""
     chosen = [t for t in trials if t.phase is Phase.TEST and t.counts and t.delivered_mps2 and t.level_n > 0]
     turned = _turned_people(chosen)
     found = []

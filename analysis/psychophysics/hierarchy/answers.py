@@ -21,11 +21,11 @@ class Answers:
     frequencies_hz: tuple[float, ...]
     run: NDArray[np.intp]
     level_db: FloatArray
-    """In dB re 1 N, or re 1 of the unit that was chosen."""
+    """Levels in dB re 1 N, or re 1 of the chosen unit."""
     side: FloatArray
     """+1 where direction 1 was shown, -1 for direction 2."""
     right: FloatArray
-    """How many right answers."""
+    """Number of correct answers."""
     wrong: FloatArray
 
     @property

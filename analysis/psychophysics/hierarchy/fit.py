@@ -58,8 +58,8 @@ class HierarchicalFit:
 
 
 LOG_SD_BOUNDS = (-5.0, 3.5)
-"""Of all spreads: 0.007 to 33, in dB, log units and d'. Beyond the first nothing differs, beyond the second nothing is
-alike."""
+"""Bounds of the logarithm of all spreads: 0.007 to 33, in dB, log units and d'. At the lower bound persons do not
+differ, at the upper one they have nothing in common."""
 CURVATURE_STEP = 1e-3
 """In dB and in logarithms: far above the error of a gradient, far below what a spread or mean is known to."""
 LAPSE_BOUNDS = (float(logit(1e-4)), float(logit(0.3)))

@@ -9,7 +9,7 @@ from analysis.psychophysics.hierarchy.fit import HierarchicalFit
 from equalizer.signals.signal import FloatArray
 
 BINS = 8
-"""Of predicted shares, equally many trials each: some 400 trials in a study of ten."""
+"""Number of bins of predicted proportions with equal numbers of trials: about 400 trials each in a study of ten."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ BOUND_ROOT, BOUND_STEPS = 0.03, 8
 """A bound is found when its likelihood root, some 1.8, is met this closely: 95 % is then 94.8 to 95.2 %. The steps end
 a search on a likelihood that is no line at all, on the safe side."""
 FAR_DB = 32.0
-"""No bound is looked for further below the estimate than this."""
+"""Farthest search for a bound below the estimate, in dB."""
 
 
 FEWEST_PEOPLE = 3
@@ -36,7 +36,7 @@ class MedianThreshold:
     frequency_hz: float
     db: float
     lower_db: float | None
-    """None: the answers do not contradict a median `FAR_DB` below the estimate."""
+    """Lower bound; None: the answers do not contradict a median `FAR_DB` below the estimate."""
     upper_db: float | None
     """None where the median is above the cap: then lower_db is a one-sided bound, and no size is known."""
     above_cap: bool
@@ -59,11 +59,11 @@ class DirectionLimit:
     """Frequency at which the median participant's threshold reaches the cap."""
 
     frequency_hz: float | None
-    """None where that lies outside of what was played, or is reached more than once."""
+    """The frequency; None where it lies outside the range that was played, or is reached more than once."""
     lower_hz: float | None
-    """None: below the lowest frequency played."""
+    """Lower bound; None: below the lowest frequency played."""
     upper_hz: float | None
-    """None: above the highest frequency played."""
+    """Upper bound; None: above the highest frequency played."""
     words: str
 
 

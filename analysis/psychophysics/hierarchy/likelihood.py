@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Derivatives:
-    """Of the log-likelihood of each person, by their d = k + 2 latent numbers."""
+    """Derivatives of the log-likelihood of each person with respect to their d = k + 2 latent parameters."""
 
     value: FloatArray
     """(n,)"""

@@ -29,14 +29,14 @@ NEWTON_STEPS = 60
 SETTLED = 1e-11
 """Newton decrement of the log-likelihood at which a mode is found: then the gradient is right to some six digits."""
 LOWEST_CURVATURE = 1e-3
-"""Of a Newton step, per dB squared: below it the curvature tells no distance."""
+"""Least curvature of a Newton step, per dB squared: below it the step length is undetermined."""
 LONGEST_STEP_DB, LONGEST_STEP_SLOPE, LONGEST_STEP_D = 6.0, 0.7, 1.0
-"""Of a Newton step in a threshold, a log-slope and a criterion: the model is not quadratic over more than these."""
+"""Largest Newton step in a threshold, a log-slope and a criterion: the model is not quadratic over larger ones."""
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where each number of the population stands, for k frequencies."""
+    """Indices of the population's parameters, for k frequencies."""
 
     k: int
 
@@ -74,7 +74,7 @@ class Marginal:
         deviation = self.latent - centre
         inverse = np.linalg.inv(precision + found.information).astype(np.float64)
         by_latent, by_lapse = self.likelihood.trace_derivatives(self.latent, lapse, inverse)
-        # How the mode moves is a matter of the observed curvature; the volume is that of the expected one.
+        # The sensitivity of the mode depends on the observed curvature; the volume uses the expected one.
         adjoint = np.linalg.solve(precision - found.second, by_latent[..., None])[..., 0]
         pull = deviation @ precision
         value = (
@@ -145,7 +145,8 @@ def _centre(numbers: FloatArray, k: int) -> FloatArray:
 
 
 def _precision(numbers: FloatArray, k: int) -> FloatArray:
-    """Of the latent numbers (k + 2, k + 2): persons share one deviation, and have one more at every frequency."""
+    """Inverse covariance of the latent parameters, (k + 2, k + 2): a person has a deviation shared by all frequencies,
+    and another at each frequency."""
     shared, own = math.exp(2.0 * numbers[k]), math.exp(2.0 * numbers[k + 1])
     out = np.zeros((k + 2, k + 2))
     mean = np.full((k, k), 1.0 / k)

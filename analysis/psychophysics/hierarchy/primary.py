@@ -30,7 +30,7 @@ class PersonEstimate:
 
     subject: str
     thresholds_n: tuple[float, ...]
-    """At each frequency; above the cap: no more than a guess that the answers do not contradict."""
+    """At each frequency; above the cap, only an extrapolation that the answers do not contradict."""
     above_cap: tuple[bool, ...]
     slope: float
     criterion: float
@@ -63,9 +63,9 @@ class PrimaryAnalysis:
     goodness: GoodnessOfFit
     converged: bool
     missing_hz: tuple[float, ...] = ()
-    """Of the protocol, without any answer: the model leaves them out."""
+    """Frequencies of the protocol without any answer: the model leaves them out."""
     declared_contrast: Contrast | None = None
-    """Of the protocol's declared pair; None where none is declared, or where it cannot be judged."""
+    """Result for the protocol's declared pair; None where none is declared, or where it cannot be tested."""
 
 
 def primary_analysis(

@@ -1,7 +1,8 @@
-"""What simulated people feel of a device: strength, coupling and harmonics by frequency, direction and level.
+"""Stimuli of a device as simulated people feel them: strength, coupling and harmonics by frequency, direction and
+level.
 
 As `study.participants.delivered_feeler`: the felt amplitude is sqrt(along^2 - across^2), harmonics add to the threshold
-in squares, a run numbs. The level matters, because friction eats weak forces.
+in squares, and the threshold rises during a run (adaptation). The level matters, because friction absorbs weak forces.
 """
 
 from collections.abc import Iterable, Sequence
@@ -16,7 +17,7 @@ from protocols.trial import Trial
 Row = tuple[float, float, float, float]
 """Level in dB re 1 N; amplitudes along, across, and of harmonics, over that of a flawless device at this level."""
 Table = tuple[Row, ...]
-"""By rising level. In between straight lines over dB, beyond the ends constant."""
+"""Delivery by rising level; interpolated linearly over dB, constant beyond the ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,7 @@ class FeltDelivery:
     tables: tuple[tuple[Table, Table], ...]
     """Per frequency of the crowd: of direction 1 and 2."""
     masking: float = 1.0
-    """By how much harmonics add to the threshold, in squares."""
+    """Factor by which harmonics add to the threshold, in squares (masking)."""
     adaptation_db: float = 1.0
     """Rise of the threshold in a long run."""
     adaptation_trials: float = 20.0

@@ -26,16 +26,16 @@ class StudyVerdict:
     people: int
     trials: int
     primary_found: bool
-    """By the hierarchical model of all answers, t test over people. Not found, here and below, where the differences
-    of all people are equal and no test judges them."""
+    """Whether the hierarchical model of all answers finds the difference, by a t test over people. False, here and
+    below, where the differences of all people are equal, so that no test is possible."""
     primary_covers: bool
     primary_error_db: float
     """Estimated minus true difference."""
     means_found: bool
-    """By reversal means in dB, paired t test."""
+    """The same by reversal means in dB, paired t test."""
     means_error_db: float
     published_found: bool
-    """By reversal means in newtons, one-way, Tukey's pair."""
+    """The same by reversal means in newtons, one-way ANOVA, Tukey's test of the pair."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class PowerPoint:
     means: Share
     published: Share
     coverage: Share
-    """Of the primary analysis's 95 % interval."""
+    """Coverage of the primary analysis's 95 % interval."""
     primary_bias_db: float
     means_bias_db: float
 

@@ -31,12 +31,12 @@ class Crowd:
     79.37 %, normal in dB."""
 
     frequencies_hz: tuple[float, ...]
-    """In ascending order."""
+    """Frequencies in ascending order."""
     medians_n: tuple[float, ...]
     person_sd_db: float = 2.5
-    """Of what makes one person better or worse at all frequencies."""
+    """Standard deviation between people that all frequencies share."""
     frequency_sd_db: tuple[float, ...] | float = 1.7
-    """Of what differs from frequency to frequency, one for all or one each."""
+    """Standard deviation between people at single frequencies: one value for all, or one each."""
     slope: float | None = None
     """Median; None: as steep as a Weibull slope of 2 over newtons."""
     slope_log_sd: float = 0.25
@@ -46,13 +46,13 @@ class Crowd:
     guessers: float = 0.0
     """Share of people who guess."""
     criterion_drift_sd: float = 0.0
-    """Of criteria per 100 trials, between people; the runs then come in random order."""
+    """Standard deviation between people of the criterion's drift per 100 trials; the runs then come in random order."""
     unsure: float = 0.0
     """All ask for the same trial again within so many standard errors of their criterion, see `Participant`."""
     repeats: int = 0
-    """At most so often in a run."""
+    """Most such repeats in a run."""
     delivery: FeltDelivery | None = None
-    """What of the commands they feel; None: the commands. Thresholds are then those on a flawless device."""
+    """Delivery of the commands by a device; None: people feel the commands. Thresholds are those on an ideal device."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +123,7 @@ def _feeling(participant: Participant, delivery: FeltDelivery | None, place: int
 
 
 def _empty_tracks(runs: int, reversals: int) -> Track:
-    """Of all runs together, each with a leading axis (runs,)."""
+    """Empty tracks of all runs together, each with a leading axis (runs,)."""
     levels, sides, rights = (np.empty((runs, MOST_TRIALS)) for _ in range(3))
     return Track(levels, sides, rights, np.full((runs, reversals), np.nan))
 

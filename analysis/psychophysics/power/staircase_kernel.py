@@ -73,11 +73,11 @@ class Participant(NamedTuple):
     family: int
     criterion_per_trial: float = 0.0
     trials_before: int = 0
-    """In the session, before this run: a drifting criterion is begun with them."""
+    """Trials of the session before this run, from which a drifting criterion continues."""
     unsure: float = 0.0
     """Asks for the same trial again where the average of all looks lies within so many standard errors."""
     repeats: int = 0
-    """Of this run at the most."""
+    """Most repeats in this run."""
     felt_1: FloatArray = AS_COMMANDED
     """(n, 4): what is felt of direction 1, a `felt_delivery.Table` whose harmonics are weighted by how they mask."""
     felt_2: FloatArray = AS_COMMANDED
@@ -87,7 +87,7 @@ class Participant(NamedTuple):
 
 
 class Track(NamedTuple):
-    """What a run fills in."""
+    """Arrays that a run fills in."""
 
     level_db: FloatArray
     """(MOST_TRIALS,), as the next two."""

@@ -14,7 +14,7 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 RESTS = 0.01
-"""Of the rms speed: slower than that an axis without a mass to speak of may rest."""
+"""Share of the rms speed below which an axis with negligible mass may be at rest."""
 
 Motion = tuple[FloatArray, FloatArray, FloatArray]
 """Positions, velocities and accelerations of the driven axes, (n, m) each."""
@@ -60,11 +60,12 @@ def force_along(
 
 
 def _hold_light_axes(per_newton: FloatArray, velocity: FloatArray, commands: FloatArray, step_s: float) -> None:
-    """per_newton: (3, m), what 1 N over a step adds to position, velocity and acceleration; in place.
+    """Sets per_newton (3, m), what 1 N over a step adds to position, velocity and acceleration, to zero in place for an
+    axis without a real mass.
 
-    Where the commands could move an axis within a step by more than it ever moves, its mass is none: the floor of a
-    model without one, or of a recording without time. Friction would then be at rest everywhere, and would balance
-    all that is missing. So the motion is taken as it was measured, and the axis rests only where that does.
+    An axis has no real mass where the commands could move it within one step by more than it ever moves: its mass is
+    the lower bound of a model without one, or the recording has no time axis. Friction would then be at rest everywhere
+    and would balance the whole missing force. With the measured motion kept, it is at rest only where that is.
     """
     force, speed = (np.sqrt(np.mean(each**2, axis=0)) for each in (commands, velocity))
     light = (per_newton[2] * step_s * force > speed) & (speed > 0)

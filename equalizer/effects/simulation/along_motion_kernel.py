@@ -44,7 +44,8 @@ Motion = tuple[FloatArray, FloatArray, FloatArray]
 def _write_seen_axes(
     k: int, axis: int, motion: Motion, commands: FloatArray, per_newton: FloatArray, at: FloatArray
 ) -> None:
-    """Write the motion of all axes into `at`. What a force at one does to the others is in their motion already."""
+    """Write the motion of all axes into `at`. The effect of one axis's force on the others is contained in their
+    measured motion."""
     for other in range(commands.shape[1]):
         begin, own = LENGTH + SEEN * other, 1.0 if other == axis else 0.0
         at[begin + SEEN_X], at[begin + SEEN_V] = motion[0][k, other], motion[1][k, other]

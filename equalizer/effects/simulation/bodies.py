@@ -1,4 +1,5 @@
-"""The bodies of a model with its effects: another structure, forces in it, and their motion under a driven command."""
+"""The bodies of a model with its effects: the changed structure, its forces, and their motion under a driven
+command."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ class Bodies:
 
     structure: MechanicalModel
     axes: int
-    """How many are driven."""
+    """Number of driven axes."""
     ports: FloatArray
     """(n, r): the directions along which forces act; the driven axes first, then joints."""
     acts: tuple[AxisForce | JointForce, ...]
@@ -31,7 +32,7 @@ class Bodies:
 
     @property
     def sees(self) -> bool:
-        """Whether some law asks for all axes and commands."""
+        """Whether a law reads all axes and commands."""
         return any(isinstance(act, AxisForce) and act.sees for act in self.acts)
 
 
@@ -49,7 +50,7 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
     acts: list[AxisForce | JointForce] = []
     where: list[int] = []
     numbers: list[FloatArray] = []
-    # Joints come first: friction that is found after them knows what they do.
+    # Joints come first, so that friction found after them acts on the structure with joints.
     for placed in sorted(effects, key=lambda effect: isinstance(effect.effect.acts, AxisForce)):
         act = placed.effect.acts
         for site in placed.sites if isinstance(act, (AxisForce, JointForce)) else ():
@@ -71,7 +72,7 @@ class Restarts:
     """Restarts of a simulation from given states at regular intervals (multiple shooting)."""
 
     every: int
-    """Samples, from the first on."""
+    """Samples between restarts, from the first sample on."""
     states: FloatArray
     """(windows, 2n), of the model without effects: positions, then velocities."""
 
@@ -92,26 +93,29 @@ def simulate_bodies(
         if ports
         else unforced_stepping(linear, steps, stride)
     )
-    look = _output_matrix(linear, stepping.outward, ports, motion)
-    looked, added = np.empty((size[0], look.shape[1])), np.zeros((size[0], bodies.ports.shape[1] if motion else 0))
-    inner, rows = len(look) - driven.end.shape[1], stepping.rows
+    output = _output_matrix(linear, stepping.outward, ports, motion)
+    motion_rows, added = (
+        np.empty((size[0], output.shape[1])),
+        np.zeros((size[0], bodies.ports.shape[1] if motion else 0)),
+    )
+    inner, rows = len(output) - driven.end.shape[1], stepping.rows
     drive, last = driven.mean.reshape(size[0] * rows, -1), driven.end[stride - 1 :: stride]
-    spare = np.zeros((min(stepping.block, size[0]) * rows, len(look)))
-    # A fit may try a model that is unstable.
+    spare = np.zeros((min(stepping.block, size[0]) * rows, len(output)))
+    # A fit may try an unstable model.
     with np.errstate(over="ignore", invalid="ignore"):
         for first, end in _blocks(size[0], stepping.block, restarts):
             if restarts is not None and first % restarts.every == 0:
                 stepping.begin(extend_state(bodies.structure, restarts.states[first // restarts.every]))
-            course = spare[: (end - first) * rows]
-            np.matmul(drive[first * rows : end * rows], stepping.into, out=course[:, :inner])
-            stepping.run(course, first)
-            seen = course[::rows]
+            rows_of_block = spare[: (end - first) * rows]
+            np.matmul(drive[first * rows : end * rows], stepping.into, out=rows_of_block[:, :inner])
+            stepping.run(rows_of_block, first)
+            seen = rows_of_block[::rows]
             # An acceleration shows the force of its very instant, not the last step's mean.
             seen[0, inner:], seen[1:, inner:] = last[first - 1] if first else 0.0, last[first : end - 1]
-            np.matmul(seen, look, out=looked[first:end])
+            np.matmul(seen, output, out=motion_rows[first:end])
             if motion:
                 added[first:end, list(ports)] = seen[:, len(stepping.outward) : inner]
-    return looked, added
+    return motion_rows, added
 
 
 def _blocks(n: int, longest: int, restarts: Restarts | None) -> Iterator[tuple[int, int]]:

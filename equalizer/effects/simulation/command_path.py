@@ -16,9 +16,9 @@ from equalizer.signals.signal import FloatArray
 @dataclass(frozen=True, slots=True, eq=False)
 class ActuatorForce:
     mean: FloatArray
-    """(n steps, m): over each step."""
+    """(n steps, m): mean over each step."""
     end: FloatArray
-    """(n steps, m): just before the next one."""
+    """(n steps, m): at each step's end, just before the next command takes effect."""
     commanded: FloatArray | None = None
     """(n steps, m): before effects and actuator; None: the same as `mean`."""
 
@@ -76,11 +76,11 @@ def subdivide_commands(commands: FloatArray, steps: int, hold: Hold) -> Actuator
             (commands[:, None] + share[:, None] * change[:, None]).reshape(-1, commands.shape[1]) for share in places
         )
         return ActuatorForce(mean, end)
-    # Takes longer to import than a diagnosis without it.
+    # Imported here: SciPy takes longer to import than a diagnosis that does not need it.
     from scipy.signal import resample_poly
 
     samples = resample_poly(commands, 2 * steps, 1, axis=0)
-    # Every other one stands in the middle of a step, the ones between at its ends.
+    # Of the points on the finer grid, every other one is in the middle of a step, the others are at step ends.
     return ActuatorForce(samples[1::2], np.vstack([samples[2::2], samples[-1:]]))
 
 

@@ -1,7 +1,13 @@
-"""Dry friction over one step, compiled: a bristle that bends, slips and springs back within the step.
+"""Dry friction over one step, compiled: a bristle that is deflected, slips and springs back within the step.
 
-The bristle (LuGre, Canudas de Wit and others 1995) slips after tens of nanometres: far less than a position sensor
-resolves, but an accelerometer shows the jerk with which the force reverses.
+Friction with a jump at v = 0 has no solution at a fixed step. The bristle of LuGre (Canudas de Wit and others 1995)
+replaces the jump by a spring of stiffness level / 50 nm with a damper: dz/dt = v - |v| z / z_max, F = -(stiffness z +
+damping dz/dt). It slips after tens of nanometres, far less than a position sensor resolves, so that F = -level sgn(v)
+holds in sliding and any smaller force is balanced at rest; an accelerometer shows the finite time in which the force
+reverses.
+
+Within the step the deflection has a closed form for a given travel, and the travel is found by Newton's method, because
+it depends on the force.
 """
 
 import numpy as np
@@ -11,22 +17,23 @@ from equalizer.effects.simulation.instant import F_END, STEP_S, V_FREE, V_PER_N,
 from equalizer.signals.signal import FloatArray
 
 LONGEST_M = 50e-9
-"""Bend at which a bristle slips."""
+"""Deflection z_max at which the bristle slips."""
 DAMPED = 0.5
-"""A bristle's damping, over the root of its stiffness times the mass that it holds."""
+"""Damping of the bristle over sqrt(stiffness times the mass that it holds)."""
 PARTS = 12
-"""Of a step at most, in which the bristle is followed while it bends."""
+"""Most parts of a step in which the bristle is followed while it is deflected."""
 STUCK = 0.3
-"""So many longest bends per part make no difference to a bristle."""
+"""Travel per part, in units of z_max, that is fine enough for the bristle."""
 BENT = 1 - 1e-6
 _VECTOR = types.float64[::1]
 
 
 @njit(types.float64(types.float64, types.float64, types.float64, _VECTOR, _VECTOR), cache=True, error_model="numpy")
 def friction_force(forward: float, backward: float, start: float, memory: FloatArray, at: FloatArray) -> float:
-    """The mean force over a step of friction that is `forward` where v > 0 and `backward` where v < 0.
+    """Mean force over a step of friction with the level `forward` where v > 0 and `backward` where v < 0.
 
-    start: how far the bristle was bent, in its longest bends; memory: how far it is then.
+    start: deflection over z_max at the step's start; `memory[0]` becomes that at its end. `at[F_END]` becomes the force
+    at the end.
     """
     level, velocity, per_newton = max(forward, backward), at[V], at[V_PER_N]
     if level <= 0:

@@ -1,8 +1,8 @@
 """Force of a discovered law over one step, compiled: implicit solution by secant and bisection.
 
 The mean of the force at the step's start and end, where the motion at its end depends on it; with accelerations, the
-force at its end. Where the force answers so
-steeply to the motion that a mean of both would swing (dry friction, stops), only the end counts, which lets it stick.
+force at its end. Where the force depends so steeply on the motion that the mean would oscillate (dry friction, stops),
+only the end counts, so that the motion can stick.
 """
 
 from numba import njit
@@ -29,8 +29,8 @@ from equalizer.laws.program import DEEPEST
 from equalizer.signals.signal import FloatArray
 
 AXES, ACCELERATION, CONDITIONS, SAMPLES, RATE_HZ, TABLE = range(6)
-"""Places in `numbers`: how many axes are driven; whether the law reads an acceleration; how many conditions were
-recorded, in how many samples, at which rate; where these begin, sample by sample. The program follows them."""
+"""Indices in `numbers`: number of driven axes; whether the law reads an acceleration; number of recorded conditions, of
+their samples, and their rate; start of the conditions, sample by sample. The program follows them."""
 PER_AXIS = 4
 """Signals: the time, then each axis' position, velocity, acceleration and command, then the conditions."""
 CLOSE = 1e-7
@@ -42,8 +42,8 @@ TRIES = 60
 def _law_value(
     numbers: FloatArray, memory: FloatArray, at: FloatArray, phase: int, force: float, ahead: float
 ) -> float:
-    """The law at the step's start or end, if it gives this force over the step. Accelerations are means over the step;
-    ahead: 1 for those at its end."""
+    """The law's force at the step's start or end, if the given force acted over the step. Accelerations are means over
+    the step; ahead: 1 for those at its end."""
     axes, conditions, step_s = int(numbers[AXES]), int(numbers[CONDITIONS]), at[STEP_S]
     count = 1 + PER_AXIS * axes + conditions
     signals = memory[DEEPEST : DEEPEST + count]
@@ -61,7 +61,7 @@ def _law_value(
         signals[to + 3] = at[begin + SEEN_COMMAND]
     samples = int(numbers[SAMPLES])
     if conditions > 0:
-        # The middle of the step lies in its sample, however its ends are rounded.
+        # Sampled at the middle of the step, which lies in the right sample even when the ends are rounded.
         now = max(min(int((at[TIME_S] + 0.5 * step_s) * numbers[RATE_HZ]), samples - 1), 0)
         for k in range(conditions):
             signals[count - conditions + k] = numbers[TABLE + now * conditions + k]
@@ -107,7 +107,7 @@ def law_force(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
             if not within:
                 low, low_off = high, high_off
             high, high_off = force, off
-    # What sticks is held by a force between those of both ways.
+    # In sticking, the force is between those of the two sliding directions.
     at[F_END] = _law_value(numbers, memory, at, END, force, 1.0) if heavy else (force - (1 - late) * start) / late
     commit_step(numbers[TABLE + int(numbers[SAMPLES]) * conditions :], kept, at[TIME_S] + at[STEP_S])
     return float(force)

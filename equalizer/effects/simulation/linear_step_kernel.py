@@ -36,8 +36,8 @@ def advance_state(advance: FloatArray, added: FloatArray, state: FloatArray) -> 
 
 @njit(types.void(_MATRIX, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath=FAST)
 def advance_unforced(advance: FloatArray, rows: FloatArray, state: FloatArray) -> None:
-    """Motion without further forces. rows: (n, s ...), what the commands add over each step; becomes the state before
-    each. state: (s,), becomes that of the end."""
+    """Motion without further forces. rows: (n, s ...), contribution of the commands over each step; overwritten by the
+    state before each. state: (s,), overwritten by that at the end."""
     size = state.shape[0]
     added = np.empty(size)
     for k in range(rows.shape[0]):

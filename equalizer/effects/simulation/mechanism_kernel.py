@@ -40,7 +40,8 @@ from equalizer.effects.simulation.instant import (
 from equalizer.effects.simulation.linear_step_kernel import FAST, advance_state
 from equalizer.signals.signal import FloatArray
 
-# Laws are passed as values, so that a changed law never runs as it was in a kept kernel; numba calls that experimental.
+# Laws are passed as values, so that a changed law is never run from a stale cached kernel; numba calls that
+# experimental.
 # Set once for the process: `catch_warnings` around a call would, in a thread, undo that of another thread.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
@@ -54,7 +55,7 @@ _MATRIX = types.float64[:, ::1]
 READ_ONLY = types.Array(types.float64, 2, "C", readonly=True)
 _PLACES = types.int64[:, ::1]
 LAW = types.float64(_VECTOR, _VECTOR, _VECTOR)
-"""What every law of force is compiled as."""
+"""Signature that every force law is compiled with."""
 
 Integers = npt.NDArray[np.int64]
 Four = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
@@ -64,18 +65,18 @@ _LAWS = types.UniTuple(types.FunctionType(LAW), LAWS)  # type: ignore[no-untyped
 _COUNT = types.UniTuple(types.int64, 3)  # type: ignore[no-untyped-call]
 _NOW_X, _NOW_V, _NEXT_X, _NEXT_V, _A, _FORCE, _FORCE_END = range(7)
 PORT_ROWS = 7
-"""Rows of what is known of each port: position and velocity at a step's start and, so far, end; acceleration at its
-start without forces; forces over the step and at its end."""
+"""Rows of the port table: position and velocity at a step's start and, predicted, at its end; acceleration at its start
+without forces; forces over the step and at its end."""
 
 
 def compile_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:
-    """The law, ready to be called from the kernel. Its machine code is kept on disk with its own file."""
+    """The law, ready to be called from the kernel. Its machine code is cached beside its own file."""
     return njit(LAW, cache=True, error_model="numpy")(law)
 
 
 class LawAddress(types.WrapperAddressProtocol):
-    """A compiled law as a kernel takes it, with its address looked up once: numba would do that in every call, which
-    takes five times as long as all else that a call costs."""
+    """A compiled law in the form that a kernel takes, its address looked up once: numba would look it up in every call,
+    which takes five times as long as the rest of the call."""
 
     def __init__(self, law: Any) -> None:
         result = law.get_compile_result(LAW)
@@ -95,14 +96,14 @@ def law_address(law: Any) -> LawAddress:
 
 
 @njit(inline="always")
-def _predict_ports(look: FloatArray, state: FloatArray, ports: FloatArray) -> None:
-    """Positions and velocities at the step's end without forces. look: (2 r, s)"""
+def _predict_ports(output: FloatArray, state: FloatArray, ports: FloatArray) -> None:
+    """Positions and velocities at the step's end without forces. output: (2 r, s)"""
     count = ports.shape[1]
     for port in range(count):
         x = v = 0.0
         for i in range(state.shape[0]):
-            x += look[port, i] * state[i]
-            v += look[count + port, i] * state[i]
+            x += output[port, i] * state[i]
+            v += output[count + port, i] * state[i]
         ports[_NEXT_X, port], ports[_NEXT_V, port] = x, v
         ports[_FORCE, port] = ports[_FORCE_END, port] = 0.0
 
@@ -126,13 +127,13 @@ def _store_row(state: FloatArray, ports: FloatArray, row: FloatArray) -> None:
 
 
 @njit(inline="always")
-def _predict_accelerations(look: FloatArray, added: FloatArray, state: FloatArray, ports: FloatArray) -> None:
-    """Accelerations at the step's start without forces. look: (3 r, s). added: (s + r), the last r by commands."""
+def _predict_accelerations(output: FloatArray, added: FloatArray, state: FloatArray, ports: FloatArray) -> None:
+    """Accelerations at the step's start without forces. output: (3 r, s). added: (s + r), the last r by commands."""
     count = ports.shape[1]
     for port in range(count):
         total = added[state.shape[0] + port]
         for i in range(state.shape[0]):
-            total += look[2 * count + port, i] * state[i]
+            total += output[2 * count + port, i] * state[i]
         ports[_A, port] = total
 
 
@@ -195,7 +196,8 @@ def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
     own: FloatArray, at: FloatArray,
 ) -> None:  # fmt: skip
-    """Solve for several forces. own: (3, items), scratch. A force is not solved again where no other has changed."""
+    """Solve for several forces in turn (Gauss-Seidel). own: (3, items), scratch. A force is solved again only where
+    another has changed."""
     before = memory.copy()
     own[:] = 0.0
     for sweep in range(SWEEPS):
@@ -227,17 +229,18 @@ def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
     commands: FloatArray, ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
 ) -> None:  # fmt: skip
-    """Motion under forces. rows: (n stride, s + r ...): what commands add to the state over a step and to the
-    ports' accelerations at its start; a sample's first row becomes the state before it and the forces (r,) just
-    then. commands: (n stride, m), or (0, 0) where no law sees them. ports: (PORT_ROWS, r) and state: (s,) become
-    those of the end.
+    """Motion under forces; rows, ports and state are overwritten.
 
-    places: (items, 6) law, port, begin and end in `numbers`, begin and end in `memory`. step: how the state advances,
-    the ports' positions and velocities (2 r, s), where laws ask with accelerations (3 r, s), what forces do to the
-    state (r, s), and `per_newton`. count: steps per sample; stride, which is 1 where commands are held over all of
-    them, else so many; the first sample's number.
+    rows: (n stride, s + r ...), contribution of the commands to the state over a step and to the ports' accelerations
+    at its start; a sample's first row becomes the state before it and the forces (r,) at that instant. commands: (n
+    stride, m), or (0, 0) where no law reads them. ports: (PORT_ROWS, r) and state: (s,) become those of the end.
+
+    places: (items, 6) law, port, begin and end in `numbers`, begin and end in `memory`. step: matrix that advances the
+    state; output matrix of the ports' positions and velocities (2 r, s), with accelerations (3 r, s) where a law reads
+    them; effect of the forces on the state (r, s); and `per_newton`. count: steps per sample; stride (1 where commands
+    are held over all steps, else the number of steps); number of the first sample.
     """
-    advance, look, by_force, per_newton = step
+    advance, output, by_force, per_newton = step
     steps, stride, begun = count
     size, r = state.shape[0], ports.shape[1]
     sees = commands.shape[0] > 0
@@ -254,10 +257,10 @@ def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
                     at[LENGTH + SEEN * axis + SEEN_COMMAND] = commands[k * stride + now, axis]
             if now == 0:
                 _store_row(state, ports, rows[k * stride])
-            if look.shape[0] > 2 * r:
-                _predict_accelerations(look, added, state, ports)
+            if output.shape[0] > 2 * r:
+                _predict_accelerations(output, added, state, ports)
             advance_state(advance, added, state)
-            _predict_ports(look, state, ports)
+            _predict_ports(output, state, ports)
             at[TIME_S] = ((begun + k) * steps + now) * step_s
             if places.shape[0] == 1:
                 _solve_force(law, its, its_memory, places[0, 1], per_newton, ports, at)

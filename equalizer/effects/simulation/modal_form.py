@@ -14,12 +14,13 @@ used."""
 LARGEST_REST = 1e-12
 """Largest residual coupling between the pairs that is neglected."""
 NEARLY_ONE = 1e-3
-"""Two directions of a pair this alike are found anew, as the plane that both span."""
+"""Ratio of the singular values of a pair's two directions below which they count as parallel; they are then replaced by
+a basis of the invariant plane."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepForm:
-    """Coordinates z, x = outward z, and what a step without forces makes of them."""
+    """Coordinates z with x = outward z, and one step without forces in them."""
 
     advance: FloatArray
     """Pairs: (4, s / 2), z_i becomes a_0i z_i + a_1i z_j and z_j becomes a_2i z_i + a_3i z_j, where j = i + s / 2. Else

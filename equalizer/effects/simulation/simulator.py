@@ -25,7 +25,7 @@ class Measurement:
     position: FloatArray | None = None
     """(n, p), of the same rows"""
     whole: int = 0
-    """Samples of the whole recording, where these are its first; 0 = these are all."""
+    """Length of the whole recording in samples where these are its first; 0 = these are all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,7 +99,7 @@ def _simulate_motion(
     axes: bool = True,
     restarts: Restarts | None = None,
 ) -> SimulationResult:
-    """Before the sensor."""
+    """The simulation without the sensor."""
     bodies, (rate_hz, hold) = bodies_of(model, effects), sampled
     moves = moves_between_samples(model, effects, hold)
     steps = max((acts.steps for acts in bodies.acts), default=STEPS if moves else 1)

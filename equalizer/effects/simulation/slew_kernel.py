@@ -15,7 +15,7 @@ def limit_rate(commands: FloatArray, reach: float, mean: FloatArray, end: FloatA
     for k in range(commands.shape[0]):
         missing = commands[k] - force
         if abs(missing) <= reach:
-            # On the way for a share of the step.
+            # Still ramping for a share of the step.
             on_way = abs(missing) / reach
             mean[k] = commands[k] - missing * on_way / 2
             force = commands[k]

@@ -12,7 +12,7 @@ from equalizer.plant.linear_simulation import LinearSteps
 from equalizer.signals.signal import FloatArray
 
 BLOCK, BLOCK_UNDER_FORCES = 4096, 32768
-"""Samples. The first stays in a processor's cache; to hand over laws takes some 0.1 ms each time."""
+"""Samples per block. The first fits a processor's cache; passing laws to the kernel takes about 0.1 ms each time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,33 +20,34 @@ class Forces:
     """Forces in the form that the compiled kernel takes; see `mechanism_kernel.step_mechanism`."""
 
     ports: tuple[int, ...]
-    """Where they act."""
+    """Indices of the ports at which the forces act."""
     laws: tuple[object, ...]
     places: Integers
     """(items, 6)"""
     numbers: FloatArray
     memory: FloatArray
     acceleration: bool
-    """Some law asks for it."""
+    """Whether a law reads accelerations."""
     sees: bool
-    """Some law asks for all axes and commands."""
+    """Whether a law reads the motion of all axes and the commands."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stepping:
     rows: int
-    """Per sample, of what drives, each as wide as `into` is high; and of the course."""
+    """Rows per sample: of the drive, as wide as `into` is high, and of what `run` takes."""
     into: FloatArray
     """(inputs, s + r): what a row of these adds to the state, and to the accelerations of the ports with forces."""
     outward: FloatArray
     """(2n, s): from the stepped coordinates to positions and velocities."""
     block: int
-    """Samples to be stepped at once."""
+    """Samples stepped per call."""
     run: Callable[[FloatArray, int], None]
-    """Block after block from rest: course (block rows, s + r ...), the first sample's number. What was added over each
-    step becomes, in each sample's first row, the state and the forces just before it."""
+    """Steps one block after another, from rest. Arguments: rows (block rows, s + r ...) and the number of the first
+    sample. On entry a row holds what is added over its step; on return, the first row of each sample holds the state
+    and the forces just before it."""
     begin: Callable[[FloatArray], None]
-    """Lets the next block begin from another state (2n,) than that which was reached."""
+    """Continues from the given state (2n,) at the next block."""
 
 
 def unforced_stepping(linear: LinearSteps, steps: int, stride: int) -> Stepping:
@@ -59,8 +60,8 @@ def unforced_stepping(linear: LinearSteps, steps: int, stride: int) -> Stepping:
     form = step_form(np.linalg.matrix_power(linear.advance, steps))
     state = np.zeros(len(form.inward))
 
-    def run(course: FloatArray, first: int) -> None:
-        advance_unforced(form.advance, course, state)
+    def run(rows: FloatArray, first: int) -> None:
+        advance_unforced(form.advance, rows, state)
 
     def begin(from_: FloatArray) -> None:
         state[:] = form.inward @ from_
@@ -72,27 +73,27 @@ def forced_stepping(linear: LinearSteps, forces: Forces, steps: int, stride: int
     """Stepping under motion-dependent forces. commanded: (n stride, m), for laws that see the commands."""
     form = step_form(linear.advance)
     where, r = np.array(forces.ports), linear.by_axis_force.shape[1]
-    look = linear.motion[np.concatenate([where, r + where, 2 * r + where])]
+    output = linear.motion[np.concatenate([where, r + where, 2 * r + where])]
     by_force = linear.by_axis_force[:, where]
-    per_newton = look @ by_force
+    per_newton = output @ by_force
     per_newton[2 * len(where) :] = linear.motion_by_axis_force[2 * r + where][:, where]
-    asked = look if forces.acceleration else look[: 2 * len(where)]
+    asked = output if forces.acceleration else output[: 2 * len(where)]
     outward, inward = asked @ form.outward, (form.inward @ by_force).T
     step = (form.advance, _contiguous(outward), _contiguous(inward), _contiguous(per_newton.T))
     into = np.hstack([(form.inward @ linear.by_command).T, linear.motion_by_command[2 * r + where].T])
     seen = np.ascontiguousarray(commanded, dtype=np.float64) if forces.sees else np.empty((0, 0))
     state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(where))), forces.memory.copy()
 
-    def run(course: FloatArray, first: int) -> None:
+    def run(rows: FloatArray, first: int) -> None:
         step_mechanism(
-            forces.laws, forces.places, forces.numbers, memory, step, course,
-            seen[first * stride : first * stride + len(course)], ports, state, (steps, stride, first),
+            forces.laws, forces.places, forces.numbers, memory, step, rows,
+            seen[first * stride : first * stride + len(rows)], ports, state, (steps, stride, first),
             linear.step_s,
         )  # fmt: skip
 
     def begin(from_: FloatArray) -> None:
         state[:] = form.inward @ from_
-        ports[:2] = (look[: 2 * len(where)] @ from_).reshape(2, -1)
+        ports[:2] = (output[: 2 * len(where)] @ from_).reshape(2, -1)
 
     return Stepping(stride, into, form.outward, BLOCK_UNDER_FORCES, run, begin)
 

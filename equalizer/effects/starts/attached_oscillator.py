@@ -12,11 +12,11 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import cross_density, spectral_density
 
 WINDOW_S, DRIVEN, CHANCE = 2.0, 1e-4, 0.02
-"""Window of a spectrum in seconds; least power of a line that counts, over the largest; share of the missing force that
-the best of all trials explains by chance."""
+"""Window of a spectrum in seconds; least power of a line, relative to the largest; share of the missing force that the
+best of all trials explains by chance."""
 
 SPANNED = 1e-9
-"""Relative singular value below which directions are linearly dependent but for rounding."""
+"""Relative singular value below which directions are linearly dependent (rounding)."""
 
 
 def with_oscillator(
@@ -45,9 +45,9 @@ class MissingMass:
 
     frequency_hz: FloatArray
     power: FloatArray
-    """Of the acceleration."""
+    """Power spectrum of the acceleration."""
     cross: ComplexArray
-    """(lines, m): of the acceleration with the missing force at each axis."""
+    """(lines, m): cross-spectra of the acceleration with the missing force at each axis."""
 
 
 def missing_mass(evidence: Evidence, axis: int) -> MissingMass:
@@ -78,7 +78,7 @@ class AttachedOscillator:
     mass: float
     explained: float
     by_axis: FloatArray
-    """(m,): its force on each axis over that on its own axis."""
+    """(m,): its force on each axis relative to that on its own axis."""
 
 
 def _orthonormal_basis(columns: FloatArray) -> FloatArray:
@@ -108,7 +108,8 @@ def likely_oscillators(
     for ratio in damping_ratios:
         shape = oscillator_reaction(seen.frequency_hz[:, None], natural, ratio) * root[:, None]
         shapes = np.vstack([shape.real, shape.imag])
-        # What the linear part cannot take: beside it, a shape's least squares are its alone.
+        # Orthogonal to what the linear parameters explain: the least-squares fit of a shape is then independent of
+        # them.
         own = shapes - beside @ (beside.T @ shapes)
         size = np.einsum("lt,lt->t", own, own)
         apart = size > SPANNED**2 * np.einsum("lt,lt->t", shapes, shapes)
@@ -121,6 +122,6 @@ def likely_oscillators(
 
 
 def subtract_oscillator(seen: MissingMass, each: AttachedOscillator) -> MissingMass:
-    """The missing force without an oscillator's."""
+    """The missing force less that of an oscillator."""
     pull = seen.power * each.mass * oscillator_reaction(seen.frequency_hz, each.natural_hz, each.damping_ratio)
     return MissingMass(seen.frequency_hz, seen.power, seen.cross - pull[:, None] * each.by_axis)

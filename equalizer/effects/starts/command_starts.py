@@ -9,9 +9,9 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST_SHARE = 1e-3
-"""Of the missing force, that a value must explain to be worth a try."""
+"""Least share of the missing force that a value must explain to be tried."""
 SHIFTS = (0, 1)
-"""Delays in samples that are tried."""
+"""Delays that are tried, in samples."""
 CLOSE = 3e-3
 """Relative tolerance of the golden-section search."""
 GOLDEN = (5**0.5 - 1) / 2
@@ -32,12 +32,12 @@ def likeliest_value(
     """
     axes = range(evidence.command.shape[1]) if site == ALL_SITES else (site,)
     step_s = 1 / evidence.sample_rate_hz
-    looks = [_force_and_basis(evidence, axis, nonlinear) for axis in axes]
+    forces = [_force_and_basis(evidence, axis, nonlinear) for axis in axes]
     used = np.flatnonzero(evidence.used > 0)
 
     def left(value: float) -> float:
         total = 0.0
-        for axis, (force, basis) in zip(axes, looks, strict=True):
+        for axis, (force, basis) in zip(axes, forces, strict=True):
             commanded = evidence.command[:, axis]
             added = change(commanded, step_s, value) - commanded
             total += min(_misfit(force - np.roll(added, shift)[used], basis) for shift in SHIFTS)
@@ -46,7 +46,7 @@ def likeliest_value(
     if not len(grid):
         return None
     best, misfit = best_on_grid(left, grid)
-    return best if misfit < (1 - LEAST_SHARE) * sum(_misfit(force, basis) for force, basis in looks) else None
+    return best if misfit < (1 - LEAST_SHARE) * sum(_misfit(force, basis) for force, basis in forces) else None
 
 
 def fit_square_law(evidence: Evidence, site: int) -> tuple[float, float] | None:
@@ -70,7 +70,7 @@ def fit_square_law(evidence: Evidence, site: int) -> tuple[float, float] | None:
     whole = first + second * peak
     if gained < LEAST_SHARE or whole <= 0:
         return None
-    # Where no command is obeyed as it is, a gain is wrong besides.
+    # Where force and command agree at no amplitude within the range, there is a gain error besides.
     agrees = (1 - first) / second if second else 0.0
     share, reference = (1 - first, agrees) if 0 < agrees < 10 * peak else (second * peak / whole, peak)
     return (share, reference) if share and -1 <= share <= 1 else None
@@ -86,7 +86,7 @@ def best_on_grid(misfit: Callable[[float], float], grid: Sequence[float]) -> tup
 
 
 def _golden_section(misfit: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
-    """The least between two logarithms, with its misfit (Kiefer 1953, Proc. AMS 4:502)."""
+    """Minimum between two logarithms by golden-section search, with its misfit (Kiefer 1953, Proc. AMS 4:502)."""
     places = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
     values = [misfit(float(np.exp(place))) for place in places]
     while high - low > 2 * CLOSE:
@@ -101,7 +101,7 @@ def _golden_section(misfit: Callable[[float], float], low: float, high: float) -
 
 
 def grid_of_peaks(evidence: Evidence, site: int, count: int = 12) -> list[float]:
-    """Forces from a small one to the strongest commanded."""
+    """Force levels to try, from a small one to the strongest command."""
     commanded = evidence.command if site == ALL_SITES else evidence.command[:, site]
     peak = float(np.abs(commanded).max())
     return list(np.geomspace(0.03 * peak, 0.995 * peak, count)) if peak > 0 else []

@@ -8,10 +8,10 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """Time first; all of one length (n), whole record. Axes are the command's."""
+    """Arrays of one recording, time first, all of length n, at all driven axes."""
 
     model: MechanicalModel
-    """Re-tuned; what the residuals are of."""
+    """The re-tuned model, to which the residuals belong."""
     sample_rate_hz: float
     command: FloatArray
     """(n, m)"""
@@ -26,7 +26,7 @@ class Evidence:
     predicted: FloatArray
     """(n, p)"""
     noise: FloatArray
-    """(p,): rms of what does not repeat."""
+    """(p,): rms of the noise, estimated from what does not repeat."""
     used: FloatArray
     """(n,): 1 where samples count, else 0."""
     position: FloatArray | None = None

@@ -5,14 +5,14 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 CLOSE = 0.02
-"""Shares of a step by which values may miss the lattice; single precision leaves less."""
+"""Shares of a step by which values may deviate from the lattice; single precision needs less."""
 NEARLY_ALL = 0.999
 LEAST_VALUES, MOST_VALUES = 3, 0.2
-"""Different values that make a lattice, at least; and at most, as a share of the samples."""
+"""Least number of different values that make a lattice; and most, as a share of the samples."""
 PEAK = 12.0
-"""Times its surroundings that the histogram's spectrum must rise for a staircase."""
+"""Least ratio of a peak in the histogram's spectrum to its surroundings."""
 BIN_SHARE = 0.2
-"""Of the noise, that a histogram's bin is wide."""
+"""Width of a histogram's bin, relative to the noise."""
 
 
 def lattice_offset(values: FloatArray, step: float) -> float | None:
@@ -26,11 +26,11 @@ def lattice_offset(values: FloatArray, step: float) -> float | None:
 
 
 def lattice_step(values: FloatArray) -> float | None:
-    """The widest step whose lattice holds nearly all values; None where they lie anywhere."""
+    """The widest step whose lattice holds nearly all values; None without a lattice."""
     different = np.unique(values)
     if len(different) < LEAST_VALUES:
         return None
-    # Single precision gives one lattice point several neighbours that are not meant.
+    # In single precision several neighbouring values stand for one lattice point.
     gaps = np.diff(different)
     gaps = gaps[gaps > 1e-5 * float(np.ptp(different)) / max(len(different), 1)]
     if not len(gaps):
@@ -39,7 +39,7 @@ def lattice_step(values: FloatArray) -> float | None:
     points = np.unique(np.round((different - different[0]) / step))
     if not LEAST_VALUES <= len(points) <= MOST_VALUES * len(values):
         return None
-    # Over the whole range an error of the step adds up: it is measured there.
+    # The error of the step accumulates over the range, so that it is refined over the whole range.
     numbers = np.round((different - different[0]) / step)
     for _ in range(2):
         step = float(np.polyfit(numbers, different, 1)[0])
@@ -65,7 +65,7 @@ def staircase_step(values: FloatArray, noise: float) -> float | None:
     padded = 8 * len(counts)
     spectrum = np.abs(np.fft.rfft(counts, padded)) / np.sqrt(len(values))
     per_unit = np.fft.rfftfreq(padded, width)
-    # Slow shapes are the response's own distribution.
+    # Slow components of the histogram are the response's own distribution.
     inside = (per_unit > 10 / span) & (per_unit < 0.3 / noise)
     if not inside.any():
         return None

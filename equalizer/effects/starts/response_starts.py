@@ -6,16 +6,16 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from equalizer.effects.effect import ALL_SITES
-from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.simulation.interpolated_response import read_other_times
 from equalizer.effects.starts.command_starts import best_on_grid
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST_SHARE = 1e-3
-"""Of the misfit, that a value must explain to be worth a try."""
+"""Least share of the misfit that a value must explain to be tried."""
 
 NEARER = 3
-"""Rounds in which a lateness is made more precise."""
+"""Rounds of refinement of a time shift."""
 
 
 def channels_of(evidence: Evidence, site: int) -> tuple[int, ...]:
@@ -42,8 +42,8 @@ def likeliest_reading(
 
 
 def axis_lateness(evidence: Evidence, axis: int, longest_s: float) -> float:
-    """Seconds by which the measured response to a driven axis comes after the predicted one. Of that axis' own
-    channel, where there is one for each."""
+    """Seconds by which the measured response to a driven axis lags the predicted one; in that axis's own channel, where
+    each axis has one."""
     rate, own = evidence.sample_rate_hz, evidence.response.shape[1] == evidence.command.shape[1]
     channels = list(channels_of(evidence, axis if own else ALL_SITES))
     weight = evidence.used[:, None] / evidence.noise[channels]
@@ -52,9 +52,9 @@ def axis_lateness(evidence: Evidence, axis: int, longest_s: float) -> float:
 
 
 def starts_for_lateness(evidence: Evidence, axis: int, fitting: float | None, longest_s: float) -> tuple[float, ...]:
-    """Delays or time constants in seconds to start from: the response's lateness, and the value that fits the missing
-    force. Re-tuned damping absorbs most of a small lag, so that a fifth of a sample is always tried where the response
-    is not early."""
+    """Delays or time constants in seconds to start from: the response's time shift, and the value that fits the missing
+    force. Re-tuned damping absorbs most of a small lag, so that a fifth of a sample is always tried unless the response
+    is early."""
     late, least = axis_lateness(evidence, axis, longest_s), 0.2 / evidence.sample_rate_hz
     if late < -least:
         return ()
@@ -66,7 +66,7 @@ def shares_of(residual: FloatArray, basis: FloatArray, used: FloatArray) -> Floa
     columns = basis[used > 0]
     size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
     columns = columns / size
-    # Few columns of one length: their products lose nothing that matters, and are a tenth of the work.
+    # A few columns of equal length: the normal equations lose no digits that matter, and cost a tenth of a QR.
     found = np.linalg.lstsq(columns.T @ columns, columns.T @ residual[used > 0], rcond=None)[0]
     return np.asarray(found / size, dtype=np.float64)
 
@@ -87,7 +87,7 @@ def lateness(measured: FloatArray, predicted: FloatArray, longest: int) -> float
 
 
 def _refine_lateness(measured: FloatArray, predicted: FloatArray, late: float) -> float:
-    """Refine a lateness by Gauss-Newton steps, because a correlation's peak is biased between samples."""
+    """Refine a time shift by Gauss-Newton steps, because the peak of a correlation is biased between samples."""
     for _ in range(NEARER):
         shifted = read_other_times(predicted, 1.0, -late)
         slope = np.gradient(shifted, axis=0)

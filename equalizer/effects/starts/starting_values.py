@@ -15,14 +15,14 @@ SLOW = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisMotion:
-    """Motion and missing force at one axis, where samples count; all (n,)."""
+    """Motion and missing force at one axis, only where samples count; all (n,)."""
 
     time_s: FloatArray
     position: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
     force: FloatArray
-    """That is missing."""
+    """The missing force."""
 
     def where(self, keep: npt.NDArray[np.bool_]) -> "AxisMotion":
         return AxisMotion(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
@@ -33,9 +33,9 @@ class LawFit:
     """Regression of the missing force on laws of the motion."""
 
     strengths: FloatArray
-    """(k,): how much of each law."""
+    """(k,): factor of each law."""
     explained: float
-    """Share of the missing force's power that they add to what a linear model explains."""
+    """Share of the missing force's power that the laws explain beyond the linear terms."""
 
 
 def axis_motion(evidence: Evidence, axis: int) -> AxisMotion:
@@ -49,7 +49,7 @@ def axis_motion(evidence: Evidence, axis: int) -> AxisMotion:
 
 
 def sliding_motion(evidence: Evidence, axis: int) -> AxisMotion:
-    """Motion of an axis, only where it surely slides."""
+    """Motion of an axis, only where its sliding direction is certain."""
     motion = axis_motion(evidence, axis)
     return motion.where(np.abs(motion.velocity) > SLOW * np.sqrt(np.mean(motion.velocity**2)))
 
@@ -69,14 +69,14 @@ class PartialRegression:
         left, sizes, _ = np.linalg.svd(nuisances / np.where(scale > 0, scale, 1.0), full_matrices=False)
         self._known = left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), np.finfo(float).tiny)]
         self.force = self._without(force)
-        """(n,): what the nuisances leave of it."""
+        """(n,): residual of the force after projection on the nuisance regressors."""
         self._power = max(float(self.force @ self.force), np.finfo(float).tiny)
 
     def _without(self, shapes: FloatArray) -> FloatArray:
         return np.asarray(shapes - self._known @ (self._known.T @ shapes))
 
     def fit(self, *laws: FloatArray) -> LawFit:
-        """laws: (n,) each, of strength 1."""
+        """laws: (n,) each, evaluated with the factor 1."""
         shapes = self._without(np.column_stack(laws))
         size = np.linalg.norm(shapes, axis=0)
         shapes = shapes / np.where(size > 0, size, 1.0)

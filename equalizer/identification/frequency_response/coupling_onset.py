@@ -2,8 +2,8 @@
 
 Rule: the lowest frequency at which the worst coupling of the smoothed response, averaged over a twelfth of an octave,
 passes a quarter (-12 dB). A single line above is noise; a resonance like the published one near 11 Hz, which couples
-over an eighth of an octave, is what the rule is to find. Averaged, and not "stays above for": a run of lines above is
-broken by noise, which put the onset 0.1 to 0.3 Hz too high in trials.
+over an eighth of an octave, is what the rule is to find. The average is used rather than "stays above for n lines":
+noise interrupts a run of lines, which put the onset 0.1 to 0.3 Hz too high in trials.
 """
 
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _HIGHEST_RESAMPLED = 1.5
-"""Times the onset: up to where the resampled curves are computed."""
+"""Frequency up to which the resampled curves are computed, as a multiple of the onset."""
 
 
 @dataclass(frozen=True, slots=True)
 class OnsetRule:
     threshold: float = 0.25
-    """Of the worst axis: across over along."""
+    """Threshold of the coupling: off-axis over on-axis response of the worst axis."""
     octaves: float = 1 / 12
-    """Over how much the coupling is averaged."""
+    """Width of the running average."""
     neighbours: int = 8
-    """Lines on either side that the smoothing takes."""
+    """Lines on either side that the smoothing uses."""
     draws: int = 200
     seed: int = 1
 
@@ -43,21 +43,21 @@ class OnsetRule:
 @dataclass(frozen=True, slots=True)
 class CouplingOnset:
     frequency_hz: float | None
-    """None: no coupling as far as the lines are reliable."""
+    """Onset; None: no coupling up to the last reliable line."""
     interval_hz: tuple[float, float] | None
-    """95 %, from resampled noise and half a line to either side, which no noise tells; None where the noise is not
-    known."""
+    """95 % interval, from resampled noise plus half a line on either side for the line spacing; None where the noise is
+    not known."""
     from_the_start: bool
-    """Coupled at the lowest reliable line already: the onset may lie below."""
+    """Whether the coupling exceeds the threshold at the lowest reliable line: the onset may lie below."""
     threshold: float
-    """Across over along."""
+    """Off-axis over on-axis response."""
     rule: str
     """The whole rule in words."""
 
 
 def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -> CouplingOnset:
     """response: as estimated, not smoothed yet, with inputs and outputs in one frame. Raises ValueError if it is not
-    square, or has too few lines that tell it from noise."""
+    square, or has too few lines above the noise."""
     rule = rule or OnsetRule()
     require_equal_axes(response.response)
     lines = response.of_lines(response.reliable)

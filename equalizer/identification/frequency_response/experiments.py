@@ -1,8 +1,7 @@
 """Experiments in a recording: spectra of whole periods, or of windows where nothing repeats.
 
-An experiment is one excitation with one or more looks, the periods over which it repeats. Spectra are rfft / length
-without the lines at zero and at half the rate, so that white noise of variance s² has s² / length per line, with any
-window.
+An experiment is one excitation, repeated over one or more periods. Spectra are rfft / length without the lines at zero
+and at half the rate, so that white noise of variance s² has s² / length per line, with any window.
 """
 
 from collections.abc import Sequence
@@ -23,33 +22,33 @@ _DRIVEN_KINDS = (*BROADBAND_KINDS, "sine", "slow", "step", "impact")
 @dataclass(frozen=True, slots=True, eq=False)
 class Experiment:
     length: int
-    """Samples of one look: line k (from 1 on) lies at k rate / length."""
+    """Samples of one period: line k (from 1 on) lies at k rate / length."""
     command: ComplexArray
-    """(looks, lines, inputs)"""
+    """(periods, lines, inputs)"""
     response: ComplexArray
-    """(looks, lines, outputs)"""
+    """(periods, lines, outputs)"""
     instrument: ComplexArray
-    """(looks, lines, inputs): the excitation, where it was recorded, else the command."""
+    """(periods, lines, inputs): the excitation, where it was recorded, else the command."""
     borrowed: float = 0.0
-    """Share of the last look's samples that are the mean of the others."""
+    """Share of the last period's samples that are the mean of the others."""
 
     @property
-    def looks(self) -> int:
+    def periods(self) -> int:
         return len(self.command)
 
     @property
-    def independent_looks(self) -> float:
-        """Number of independent looks whose mean would have the same variance."""
+    def effective_periods(self) -> float:
+        """Effective number of periods: independent periods whose mean would have the same variance."""
         if not self.borrowed:
-            return float(self.looks)
-        return 1 / ((1 - self.borrowed) / self.looks + self.borrowed / (self.looks - 1))
+            return float(self.periods)
+        return 1 / ((1 - self.borrowed) / self.periods + self.borrowed / (self.periods - 1))
 
     @property
-    def spread_seen(self) -> float:
-        """Share of the noise power that differs between looks."""
+    def observed_noise_share(self) -> float:
+        """Share of the noise power that differs between periods."""
         if not self.borrowed:
             return 1.0
-        return 1 - self.borrowed / (self.looks - 1)
+        return 1 - self.borrowed / (self.periods - 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,9 +124,9 @@ def _is_whole(recording: Recording, start: int, length: int) -> bool:
 
 def _make_experiment(recording: Recording, starts: Sequence[int], length: int, window: FloatArray) -> Experiment:
     def spectra(samples: FloatArray) -> ComplexArray:
-        looks = np.stack([samples[start : start + length] for start in starts])
-        looks = (looks - looks.mean(axis=1, keepdims=True)) * window[:, None]
-        return np.asarray(np.fft.rfft(looks, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
+        periods = np.stack([samples[start : start + length] for start in starts])
+        periods = (periods - periods.mean(axis=1, keepdims=True)) * window[:, None]
+        return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
 
     return Experiment(
         length,
@@ -140,13 +139,15 @@ def _make_experiment(recording: Recording, starts: Sequence[int], length: int, w
 def _add_first_period(
     recording: Recording, experiment: Experiment, counted: Sequence[int], first: int, over: int
 ) -> Experiment:
-    """Add the first period as one more look. During its transient it takes the mean of the others: for a linear plant,
-    command and response are then those of the steady state throughout."""
+    """Add the first period, whose transient is replaced by the mean of the other periods: for a linear plant, command
+    and response are then those of the steady state throughout."""
 
     def spectra(samples: FloatArray) -> ComplexArray:
-        look = samples[first : first + experiment.length].copy()
-        look[:over] = np.mean([samples[start : start + over] for start in counted], axis=0)
-        spectrum = np.fft.rfft(look - look.mean(axis=0), axis=0)[1 : (experiment.length + 1) // 2] / experiment.length
+        period = samples[first : first + experiment.length].copy()
+        period[:over] = np.mean([samples[start : start + over] for start in counted], axis=0)
+        spectrum = (
+            np.fft.rfft(period - period.mean(axis=0), axis=0)[1 : (experiment.length + 1) // 2] / experiment.length
+        )
         return np.asarray(spectrum[None], dtype=np.complex128)
 
     return Experiment(

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 PUBLISHED_DIRECTION_LIMIT_HZ = 35.0
-"""Up to where directions were told apart on an omega.3 (Wilson, Chan, Salisbury, Niemeyer)."""
+"""Highest frequency at which people told directions apart on an omega.3 (Wilson, Chan, Salisbury, Niemeyer)."""
 
 
 @dataclass(frozen=True, slots=True)

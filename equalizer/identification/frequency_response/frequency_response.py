@@ -20,7 +20,7 @@ class FrequencyResponse:
     response: ComplexArray
     """(lines, outputs, inputs)"""
     noise_variance: FloatArray
-    """(lines, outputs, inputs): expected |error|² of each entry of `response`; NaN where nothing tells it."""
+    """(lines, outputs, inputs): expected |error|² of each entry of `response`; NaN where not known."""
     coherence: FloatArray
     """(lines, outputs): share of the response's power that the commands explain, 0 to 1; NaN where not known."""
     reliable: BoolArray

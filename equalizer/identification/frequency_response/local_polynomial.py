@@ -1,7 +1,7 @@
 """Smoothing of a measured frequency response by local polynomials (after the local polynomial method of Pintelon and
-Schoukens, here on the response itself): round each line, a parabola through its neighbours.
+Schoukens, here on the response itself): a parabola is fitted to the neighbours of each line.
 
-Bias stays below the noise while the lines taken in span less than about a resonance's half width.
+Bias stays below the noise while the neighbourhood is narrower than about a resonance's half width.
 """
 
 from dataclasses import dataclass, replace
@@ -20,9 +20,9 @@ class LocalPolynomial:
     """Smoothing weights of each line's neighbours: fixed by the lines and their noise, linear in the values."""
 
     window: npt.NDArray[np.int64]
-    """(lines, taken)"""
+    """(lines, taken): indices of the neighbours of each line."""
     rows: FloatArray
-    """(lines, taken)"""
+    """(lines, taken): weights of the neighbours."""
     order: int
 
     @classmethod
@@ -55,11 +55,11 @@ def smooth_response(
 ) -> FrequencyResponse:
     """Smooth each line over itself and `neighbours` lines on either side; near the ends over as many, one-sided.
 
-    about: (lines, outputs, inputs), of a model that is nearly right: only the difference to it is averaged, so that a
-    resonance narrower than the neighbourhood is not blunted.
+    about: (lines, outputs, inputs), response of an approximate model: only the difference from it is smoothed, so that
+    a resonance narrower than the neighbourhood is not blunted.
 
     The new noise variance follows from the old one, or from the scatter about the polynomials where that is larger, so
-    that a parabola that does not fit shows. Errors of lines next to each other are no longer independent. Raises
+    that lack of fit of the parabolas is included. Errors of lines next to each other are no longer independent. Raises
     ValueError where there are fewer lines than a polynomial takes.
     """
     local = LocalPolynomial.over(response, neighbours, order)

@@ -10,25 +10,26 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 SETTLING_S = 0.5
-"""After the last excitation, before a rest counts as one."""
+"""Settling time after the last excitation, before samples count as rest."""
 _REST_WINDOW_S = 0.5
 _THIRD_DIFFERENCE_GAIN = 20.0
-"""1² + 3² + 3² + 1²: how much larger the variance of a third difference is than that of a line."""
+"""1² + 3² + 3² + 1²: ratio of the variance of a third difference to that of a line."""
 
 
 def period_variance(residuals: ComplexArray) -> FloatArray:
-    """Noise power of a single look (lines, outputs): sample variance over looks. residuals: (looks, lines, outputs),
-    looks >= 2."""
+    """Noise power of a single period (lines, outputs): sample variance over periods. residuals: (periods, lines,
+    outputs), periods >= 2."""
     around = residuals - residuals.mean(axis=0)
     power: FloatArray = np.sum(np.abs(around) ** 2, axis=0) / (len(residuals) - 1)
     return power
 
 
 def line_scatter(response: ComplexArray) -> FloatArray:
-    """Expected |error|² per entry, from third differences between neighbouring lines, which a smooth curve lacks.
+    """Expected |error|² per entry, from third differences between neighbouring lines, which are small for a smooth
+    curve.
 
-    Catches what repeats exactly, too (friction in a sweep). Where resonances are as narrow as the lines are apart it
-    is too large. response: (lines, ...). NaN everywhere for less than five lines.
+    Includes distortion that repeats exactly (friction in a sweep). Too large where resonances are as narrow as the line
+    spacing. response: (lines, ...). NaN everywhere for less than five lines.
     """
     if len(response) < 5:
         return np.full(response.shape, np.nan)
@@ -42,17 +43,17 @@ def smooth_over_lines(power: FloatArray, lines: int) -> FloatArray:
     """Running mean over an odd number of lines. power: (lines, ...)."""
     if not len(power):
         return power
-    # Takes longer to import than many an estimate.
+    # Imported here: it takes longer than many an estimate.
     from scipy.ndimage import uniform_filter1d
 
     smooth: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
-    # A running sum that strong lines have left keeps their rounding, which may be below zero.
+    # The running sum keeps rounding errors of strong lines that have left it, and may be negative.
     return np.asarray(np.maximum(smooth, 0.0))
 
 
 def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> FloatArray | None:
-    """Noise power density of the response at rest, as s(f) with s / length the power per line of a look of that
-    length. Returns (lines, outputs), or None where nothing rests long enough."""
+    """Noise power density of the response at rest, as s(f) with s / length the power per line of a period of that
+    length. Returns (lines, outputs), or None without a rest of sufficient length."""
     spectra, lines_hz = [], np.empty(0)
     for recording in recordings:
         length = round(_REST_WINDOW_S * recording.sample_rate_hz)
@@ -60,14 +61,14 @@ def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> Flo
         hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
         for start, stop in _rests(recording):
             for at in range(start, stop - length + 1, length // 2):
-                look = recording.response.samples[at : at + length]
-                if np.isfinite(look).all():
-                    spectrum = np.fft.rfft((look - look.mean(axis=0)) * hann[:, None], axis=0)[1 : length // 2]
+                period = recording.response.samples[at : at + length]
+                if np.isfinite(period).all():
+                    spectrum = np.fft.rfft((period - period.mean(axis=0)) * hann[:, None], axis=0)[1 : length // 2]
                     spectra.append(np.abs(spectrum) ** 2 / length)
     if not spectra:
         return None
     mean = np.mean(spectra, axis=0)
-    # Next to the mean, a window of half a second sees the drift that was taken out of it.
+    # The lowest lines are left out: subtracting the mean of a window of half a second removes part of their noise.
     mean[:2] = mean[2:3]
     smooth = smooth_over_lines(mean, 9)
     return np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)

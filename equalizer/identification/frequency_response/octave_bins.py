@@ -11,20 +11,20 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OctaveBins:
-    """(bins, ...). Where lines are further apart than a bin is wide, a bin is a line."""
+    """Mean response per bin, (bins, ...). Where lines are further apart than a bin is wide, a bin is a line."""
 
     frequency_hz: FloatArray
     response: ComplexArray
-    """Mean of complex values: noise falls, magnitudes of what turns within a bin a little, too."""
+    """Mean of complex values: noise averages out; so does part of a response whose phase changes within a bin."""
     lowest: FloatArray
     """Magnitude of the weakest line of each entry."""
     highest: FloatArray
     noise_variance: FloatArray
-    """Of single lines, averaged."""
+    """Noise variance of single lines, averaged."""
     lines: FloatArray
-    """(bins,): how many lie in each."""
+    """(bins,): number of lines in each."""
     reliable: BoolArray
-    """(bins,): where most lines are."""
+    """(bins,): whether most lines of the bin are reliable."""
 
 
 def octave_bins(response: FrequencyResponse, octaves: float) -> OctaveBins:

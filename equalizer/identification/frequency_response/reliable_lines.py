@@ -11,18 +11,19 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _LEAST_INDEPENDENCE = 0.1
-"""Least singular value of the directions that were excited, each of unit length."""
+"""Least singular value of the matrix of excited directions, each of unit length."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReliabilityRules:
     least_coherence: float = 0.5
-    """Of the worst output."""
+    """Least coherence, of the worst output."""
     spring_margin: float = 1.1
-    """Times the spring's natural frequency: below, the spring takes most of the excitation away."""
+    """Lowest frequency, as a multiple of the virtual spring's natural frequency: below, the spring compensates most of
+    the excitation."""
     least_energy_db: float = -12.0
-    """Of an experiment's strongest line, per line or per octave, whichever is kinder: sweeps are even per octave,
-    multisines per line, and either falls off steeply outside its band."""
+    """Least energy, relative to an experiment's strongest line, per line or per octave, whichever is more favourable:
+    sweeps have constant energy per octave, multisines per line, and both fall off steeply outside their band."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,11 +16,11 @@ GAIN, COUPLING = "gain", "coupling"
 @dataclass(frozen=True, slots=True)
 class ResonanceSearch:
     prominence_db: float = 3.0
-    """How far a peak rises above the higher of its two sides."""
+    """Prominence: ratio of a peak to the higher of the minima on its two sides."""
     bin_octaves: float = 1 / 48
-    """Lines are averaged over so much before peaks are looked for."""
+    """Width of the averaging before peaks are searched for."""
     reach_octaves: float = 1 / 8
-    """How far to either side of a peak its mode is fitted."""
+    """Half-width of the interval to which a mode is fitted."""
     draws: int = 200
     seed: int = 1
 
@@ -28,13 +28,13 @@ class ResonanceSearch:
 @dataclass(frozen=True, slots=True)
 class Resonance:
     frequency_hz: float
-    """Of the fitted mode."""
+    """Natural frequency of the fitted mode."""
     frequency_interval_hz: tuple[float, float]
-    """95 %, from resampled noise."""
+    """95 % interval, from resampled noise."""
     damping_ratio: float
     damping_interval: tuple[float, float]
     width_hz: float
-    """Between the points of half power: 2 damping_ratio frequency_hz."""
+    """Half-power bandwidth, 2 damping_ratio frequency_hz."""
     prominence_db: float
     seen_in: tuple[str, ...]
     """GAIN: a peak of the largest singular value; COUPLING: of all off-axis entries together."""
@@ -50,8 +50,8 @@ class _Peak:
 def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None = None) -> tuple[Resonance, ...]:
     """Resonances in rising order, between the first and the last reliable line. response: as estimated, not smoothed.
 
-    A peak that no single mode fits, or whose mode is the same as that of a more prominent peak, is not a resonance of
-    its own. Coupling is looked at where inputs and outputs are equally many.
+    Peaks that no single mode fits, and those with the same mode as a more prominent peak, are left out. Coupling is
+    included where there are as many outputs as inputs.
     """
     search = search or ResonanceSearch()
     if not response.reliable.any():
@@ -91,7 +91,7 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
     """Fit a mode to a peak; None where no single mode fits, or where it is not distinct from noise."""
     factor = 2**search.reach_octaves
     near = lines.within(peak.frequency_hz / factor, peak.frequency_hz * factor)
-    # A hundred points are plenty for one mode; averages of more lines say the same sooner.
+    # A hundred points suffice for one mode; more lines are averaged, which saves time and loses nothing.
     binned = octave_bins(near, 2 * search.reach_octaves / 100) if len(near) >= 6 else None
     if binned is None or len(binned.frequency_hz) < 6:
         return None
@@ -122,7 +122,8 @@ def _interval(drawn: FloatArray) -> tuple[float, float]:
 
 
 def _is_same_mode(first: Resonance, second: Resonance) -> bool:
-    """Closer than a third of the wider width: peaks of gain and of coupling lie a little to either side of a mode."""
+    """Modes closer than a third of the wider bandwidth are the same: peaks of gain and of coupling deviate slightly
+    from a mode's frequency."""
     return abs(first.frequency_hz - second.frequency_hz) < max(first.width_hz, second.width_hz) / 3
 
 

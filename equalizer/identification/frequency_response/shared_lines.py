@@ -1,7 +1,8 @@
 """Instrumental-variable estimate of the response at the lines that a set of experiments shares, with its errors.
 
 G = Y R^H (U R^H)^-1 at each line, with one column per experiment: U the total commands, Y the responses, R the
-excitations as instruments. A feedback that adds to the excitation moves U and Y together and drops out.
+excitations as instruments. A feedback that adds to the excitation is uncorrelated with the instruments, so that it
+causes no bias.
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _RANK_TOLERANCE = 1e-6
-"""Of the strongest line's amplitude: less is rounding, not excitation."""
+"""Rank tolerance, relative to the strongest line's amplitude: anything smaller is rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,19 +34,20 @@ class SharedLines:
     coherence: FloatArray
     """(lines, outputs)"""
     excitation: ComplexArray
-    """(lines, inputs, experiments), of unit noise density."""
+    """(lines, inputs, experiments), scaled to unit noise density."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Columns:
-    """A column per experiment, weighted by the root of its number of samples: noise then has its density as power."""
+    """One column per experiment, weighted by the root of its number of samples, so that the noise power equals its
+    density."""
 
     command: ComplexArray
     """(lines, inputs, experiments)"""
     response: ComplexArray
     instrument: ComplexArray
     power: FloatArray
-    """(lines, outputs): of single looks, summed over the experiments."""
+    """(lines, outputs): power of single periods, summed over the experiments."""
 
 
 def solve_shared_lines(
@@ -78,7 +80,7 @@ def solve_shared_lines(
             gain = np.sum(np.abs(solution) ** 2, axis=1)
             variance = np.fmax(variance, rest_density[kept][:, :, None] * gain[:, None, :])
         noise = np.einsum("lpm,lme->lp", variance, np.abs(columns.command) ** 2)
-    with np.errstate(invalid="ignore", divide="ignore"):  # of an output that is always zero nothing is known
+    with np.errstate(invalid="ignore", divide="ignore"):  # NaN for an output that is always zero
         coherence = np.clip(1 - noise / smooth_over_lines(columns.power, noise_lines), 0.0, 1.0)
     return SharedLines(frequency_hz[kept], response, variance, coherence, columns.instrument)
 
@@ -86,7 +88,7 @@ def solve_shared_lines(
 def _columns(experiments: Sequence[Experiment]) -> _Columns:
     def stacked(name: str) -> ComplexArray:
         weighted = [
-            getattr(experiment, name).mean(axis=0) * np.sqrt(experiment.length * experiment.independent_looks)
+            getattr(experiment, name).mean(axis=0) * np.sqrt(experiment.length * experiment.effective_periods)
             for experiment in experiments
         ]
         return np.stack(weighted, axis=2)
@@ -109,13 +111,15 @@ def _has_full_rank(columns: _Columns) -> BoolArray:
 def _density_from_periods(
     experiments: Sequence[Experiment], kept: BoolArray, response: ComplexArray
 ) -> FloatArray | None:
-    """Noise density (lines, outputs, experiments) from the residuals' variance between looks. Experiments with a single
-    look take the mean of the others; None where all have one."""
+    """Noise density (lines, outputs, experiments) from the residuals' variance between periods. Experiments with a
+    single period take the mean of the others; None where all have one."""
     found: list[FloatArray | None] = []
     for experiment in experiments:
         residuals = experiment.response[:, kept] - np.einsum("lpm,klm->klp", response, experiment.command[:, kept])
         found.append(
-            experiment.length * period_variance(residuals) / experiment.spread_seen if experiment.looks > 1 else None
+            experiment.length * period_variance(residuals) / experiment.observed_noise_share
+            if experiment.periods > 1
+            else None
         )
     known = [density for density in found if density is not None]
     if not known:

@@ -12,9 +12,9 @@ def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[Fl
     """Natural frequency (draws,) in Hz and damping ratio (draws,); NaN where no resonance fits.
 
     entries (draws, lines, entries): G = (a parabola in s per entry) / (s² + c1 s + c0) in least squares; the parabola
-    takes in all that lies further off. Started by re-weighted linear equations (Sanathanan and Koerner), which noise
-    biases towards more or less damping; finished by Gauss and Newton's steps on the fit itself, which it does not
-    (variable projection, after Kaufman). frequency_hz: (lines,), at least six.
+    represents modes that are further away. Started by re-weighted linear equations (Sanathanan and Koerner), whose
+    damping is biased by noise; refined by Gauss-Newton steps on the least-squares error, which is not (variable
+    projection, Kaufman 1975). frequency_hz: (lines,), at least six.
     """
     middle = float(np.sqrt(frequency_hz[0] * frequency_hz[-1]))
     s = np.asarray(1j * frequency_hz / middle, dtype=np.complex128)

@@ -1,7 +1,7 @@
 """Estimate of the transfer functions of all channels from all recordings (the published figure 4).
 
-Each line uses every experiment whose period holds it, weighted by the samples behind it. Experiments of different
-periods thus meet at the lines that they share; a line that only some have is made from those.
+Each line uses every experiment whose period contains it, weighted by its number of samples. Experiments of different
+periods are combined at the lines that they share.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,16 +29,16 @@ from equalizer.signals.signal import FloatArray, Signal
 
 
 class TransferEstimateError(ValueError):
-    """These recordings do not tell the transfer functions; the text says why, and what would do."""
+    """The transfer functions cannot be estimated from these recordings; the text says why, and which would do."""
 
 
 @dataclass(frozen=True, slots=True)
 class EstimateSettings:
     rules: ReliabilityRules = field(default_factory=ReliabilityRules)
     noise_lines: int = 17
-    """Lines over which the noise is averaged."""
+    """Lines over which the noise variance is averaged."""
     window_s: float = 4.0
-    """Of the windows where nothing is periodic: lines are 1 / window_s apart."""
+    """Length of the windows where nothing is periodic: lines are 1 / window_s apart."""
 
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
@@ -46,8 +46,8 @@ def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSetting
     hold fewer independent experiments than there are inputs."""
     settings = settings or EstimateSettings()
     _check_alike(recordings)
-    looks = _collect_experiments(recordings, settings)
-    if not looks.experiments:
+    found = _collect_experiments(recordings, settings)
+    if not found.experiments:
         raise TransferEstimateError(
             "no segment drives the device with more than single sinusoids for a whole period or window; "
             "record a sweep or a multisine along every axis"
@@ -55,18 +55,18 @@ def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSetting
     _refuse_still_outputs(recordings)
     rate_hz = recordings[0].sample_rate_hz
     parts = []
-    for frequency_hz, experiments in _group_by_lines(looks.experiments, rate_hz):
+    for frequency_hz, experiments in _group_by_lines(found.experiments, rate_hz):
         rest = rest_floor(recordings, frequency_hz)
         parts.append(solve_shared_lines(experiments, frequency_hz, rest, settings.noise_lines))
-    return _join_parts([part for part in parts if len(part.frequency_hz)], recordings, looks, settings)
+    return _join_parts([part for part in parts if len(part.frequency_hz)], recordings, found, settings)
 
 
 def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSettings) -> ExperimentSet:
-    looks = periodic_experiments(recordings)
-    if not looks.experiments:
-        looks = window_experiments(recordings, settings.window_s)
-    remarks = list(looks.remarks)
-    if looks.experiments and all(experiment.looks == 1 for experiment in looks.experiments) and looks.periodic:
+    found = periodic_experiments(recordings)
+    if not found.experiments:
+        found = window_experiments(recordings, settings.window_s)
+    remarks = list(found.remarks)
+    if found.experiments and all(experiment.periods == 1 for experiment in found.experiments) and found.periodic:
         remarks.append(
             "No experiment has two counted periods: errors were judged by the scatter from line to line, and by the "
             "noise at rest where that is larger."
@@ -76,13 +76,13 @@ def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSett
             "A feedback acted, but its share of the command was not recorded: noise that it fed back biases the "
             "estimate where the response is weak."
         )
-    return replace(looks, remarks=tuple(remarks))
+    return replace(found, remarks=tuple(remarks))
 
 
 def _group_by_lines(experiments: Sequence[Experiment], rate_hz: float) -> Iterator[tuple[FloatArray, list[Experiment]]]:
-    """Groups of lines that the same experiments hold, with those experiments reduced to them."""
+    """Groups of lines that are contained in the same experiments, with those experiments reduced to the lines."""
     lengths = sorted({experiment.length for experiment in experiments})
-    # Lines as whole numbers: k / length is the same line in every period that holds it.
+    # Lines as integers: k / length is the same line in every period that contains it.
     common = int(np.lcm.reduce(np.array(lengths, dtype=np.int64)))
     numbers = {length: np.arange(1, (length + 1) // 2, dtype=np.int64) * (common // length) for length in lengths}
     every = np.unique(np.concatenate(list(numbers.values())))
@@ -109,11 +109,11 @@ def _select_lines(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype
 
 
 def _join_parts(
-    parts: Sequence[SharedLines], recordings: Sequence[Recording], looks: ExperimentSet, settings: EstimateSettings
+    parts: Sequence[SharedLines], recordings: Sequence[Recording], found: ExperimentSet, settings: EstimateSettings
 ) -> FrequencyResponse:
     command, response = recordings[0].command, recordings[0].response
     if not parts:
-        raise TransferEstimateError(_too_few_experiments_text(len(command.channels), looks))
+        raise TransferEstimateError(_too_few_experiments_text(len(command.channels), found))
     order = np.argsort(np.concatenate([part.frequency_hz for part in parts]))
     frequency_hz = np.concatenate([part.frequency_hz for part in parts])[order]
     excited = np.concatenate(
@@ -133,7 +133,7 @@ def _join_parts(
         response.channels,
         _unit(command),
         _unit(response),
-        (*looks.remarks, *judged.remarks),
+        (*found.remarks, *judged.remarks),
     )
 
 
@@ -154,7 +154,7 @@ def _check_alike(recordings: Sequence[Recording]) -> None:
 
 
 def _refuse_still_outputs(recordings: Sequence[Recording]) -> None:
-    """Rounding would make a response of a sensor that hangs at a value."""
+    """Refused because a sensor that is stuck at a value would give a response made of rounding errors."""
     rows = [recording.response.samples for recording in recordings]
     still = np.all([(samples == samples[:1]).all(axis=0) for samples in rows], axis=0)
     names = ", ".join(name for name, is_still in zip(recordings[0].response.channels, still, strict=True) if is_still)
@@ -172,9 +172,9 @@ def _unit(signal: Signal) -> str:
     return signal.unit if isinstance(signal.unit, str) else ", ".join(signal.unit)
 
 
-def _too_few_experiments_text(inputs: int, looks: ExperimentSet) -> str:
+def _too_few_experiments_text(inputs: int, found: ExperimentSet) -> str:
     return (
-        f"{inputs} inputs need {inputs} independent experiments at each line, but the {len(looks.experiments)} that "
+        f"{inputs} inputs need {inputs} independent experiments at each line, but the {len(found.experiments)} that "
         "were found are not: at no line do they drive the inputs in so many directions. Record every axis by itself, "
         "or as many multisines with phases of their own as there are inputs"
     )

@@ -39,7 +39,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 ELSEWHERE = 1.1
-"""Left-out error, in units of what noise and floor expect, from which on sensors may sit elsewhere."""
+"""Cross-validated error, in units of noise and floor, from which sensors that are not collocated are considered."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,9 +89,11 @@ def _fit_sensors_elsewhere(
 
 
 LINES_TO_CHOOSE_BY, IN_ALL = 400, 1600
-"""Of each group at most, and of all; the chosen structure is then fitted to all."""
+"""Most lines of each group, and of all groups together, in the search; the chosen structure is then fitted to all
+lines."""
 _LOW_PARTS = (0.25, 0.5, 1.0)
-"""Of the band in octaves, from its beginning: modes above would bias the start of the rigid body."""
+"""Shares of the first stage's band (in octaves, from its lower end) to which the rigid body is fitted: modes above
+would bias it."""
 
 
 def fit_mechanical_model(

@@ -6,30 +6,30 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 
 
 class MechanicalFitRefused(ValueError):  # noqa: N818 - an answer that a user reads, as in the rest of the package
-    """The recordings do not carry a mechanical model; the text says why, and what would do."""
+    """No mechanical model can be fitted to the recordings; the text says why, and which would do."""
 
 
 @dataclass(frozen=True, slots=True)
 class MechanicalFitSettings:
     band_hz: tuple[float, float] | None = None
-    """None: what the commands drive, from the lowest line on."""
+    """Band of the fit; None: the band that the commands excite, from the lowest line on."""
     most_modes: int = 8
-    """Beside the driven axes."""
+    """Most modes beside the driven axes."""
     sensor: SensorLimits = field(default_factory=SensorLimits)
-    """As its data sheet has it: it is taken as known, not fitted."""
+    """Sensor of the data sheet: it is taken as known, not fitted."""
     actuator: ActuatorLimits = field(default_factory=ActuatorLimits)
-    """Known beforehand; the delay is where its fit starts, if it is fitted."""
+    """Actuator known beforehand; its delay is the starting value where a delay is fitted."""
     sensors_elsewhere: bool | None = None
-    """Whether response i may move otherwise than what command i pushes (a cable or a joint lies between). None: where
-    the left-out lines say so."""
+    """Whether response i may be another motion than that of the point at which command i acts (non-collocated: a cable
+    or joint lies between). None: decided by cross-validation."""
     joint: bool = False
-    """Whether what sensors and oscillators sit on hangs on the driven axes by an elastic joint, such as cables. Taken
-    where it is known of the device; `sensors_elsewhere` is not asked then."""
+    """Whether sensors and oscillators are connected to the driven axes by an elastic joint, such as cables. To be set
+    where that is known of the device; `sensors_elsewhere` is then ignored."""
     fit_delay: bool = True
-    """Whether a delay may be added where the left-out lines ask for it."""
+    """Whether a delay may be added where cross-validation calls for it."""
     floor: float = 0.02
-    """Of a line's size: what a linear model of a real device is not expected to explain. It keeps a few strong lines
-    from deciding everything."""
+    """Model error that is expected of a linear model of a real device, as a share of a line's magnitude. It keeps a few
+    strong lines from dominating the fit."""
 
     def __post_init__(self) -> None:
         if self.band_hz is not None and not 0 <= self.band_hz[0] < self.band_hz[1]:
@@ -43,39 +43,41 @@ class MechanicalFitSettings:
 @dataclass(frozen=True, slots=True)
 class OrderTried:
     what: str
-    """"driven axes alone", "with 2 modes", "with a delay"..."""
+    """Description of the structure: "driven axes alone", "with 2 modes", "with a delay"..."""
     coordinates: int
     parameters: int
     error: float
-    """Weighted root-mean-square on the lines that were left out of the fit: 1 is noise and `floor` together."""
+    """Weighted root-mean-square error on lines left out of the fit (cross-validation): 1 is noise and `floor`
+    together."""
     accepted: bool
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelError:
-    """Root-mean-squares over that of the response, within the fitted band."""
+    """Root-mean-square errors relative to the response, within the fitted band."""
 
     channel: str
     fit: float
     held_out: float | None
-    """Free simulation of what was kept for a test, started from the state that fits best; None without such."""
+    """Error of a free simulation of the held-out samples, started from the state that fits best; None without such
+    samples."""
     noise: float | None
-    """From period to period; None where nothing repeats."""
+    """Noise: rms of the differences between periods; None where nothing repeats."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MechanicalFit:
     model: MechanicalModel
-    """Its first coordinates are the motions of the driven axes, in the commands' order."""
+    """The fitted model. Its first coordinates are the motions of the driven axes, in the commands' order."""
     errors: tuple[ChannelError, ...]
     """One per response channel."""
     error: float
-    """Over all channels, on the fitted segments."""
+    """Error over all channels, on the fitted segments."""
     held_out: float | None
     noise: float | None
     band_hz: tuple[float, float]
     tried: tuple[OrderTried, ...]
     reason: str
-    """Why these coordinates and no more, in a sentence."""
+    """Reason for the number of coordinates, as a sentence."""
     remarks: tuple[str, ...]
-    """Sentences: what was assumed, what could not be told."""
+    """Sentences: assumptions, and what the recordings do not determine."""

@@ -15,13 +15,13 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _STATE_LINES = 3000
-"""Lines from which the initial state is fitted at most."""
+"""Most lines to which the initial state is fitted."""
 
 
 def simulation_errors(
     model: MechanicalModel, segments: Sequence[SegmentLines], band_hz: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """(p + 1,), (p + 1,): root-mean-square errors over those of the response and the noise's likewise, NaN where not
+    """Two arrays (p + 1,): root-mean-square errors relative to the response, and the noise likewise, NaN where not
     known; the last entry is over all channels, each in units of its response."""
     p = model.outputs
     error, power, noise = np.zeros(p), np.zeros(p), np.zeros(p)
@@ -49,7 +49,7 @@ def simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> Co
         straight = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
         free = np.concatenate([free, straight], axis=2)
     every = max(1, len(free) // _STATE_LINES)
-    # A state shows at low frequencies most; strided lines from the first on keep those that matter.
+    # The initial state contributes mostly at low frequencies, so the lines are thinned from the first one on.
     some = np.unique(np.concatenate([np.arange(min(200, len(free))), np.arange(0, len(free), every)]))
     size = np.linalg.norm(segment_lines.response, axis=0)[:, None] + 1e-300
     columns = (free[some] / size).reshape(-1, free.shape[2])

@@ -13,7 +13,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 RIGID_OCTAVES = 3.0
-"""Octaves of the band, from its beginning, in which the device moves as a rigid body and friction shows most."""
+"""Width in octaves of the lowest part of the band, in which the device moves as a rigid body and friction matters
+most."""
 LEAST_MASS, LEAST_DAMPING = 0.02, 0.05
 """Smallest relative tolerances: how well a laboratory knows mass and damping."""
 OF_FRICTION = 0.2
@@ -32,18 +33,18 @@ class RigidBody:
     mass: FloatArray
     """(m,), at each driven axis"""
     damping: FloatArray
-    """(m,), friction's equivalent in it"""
+    """(m,), the equivalent damping of friction contained in it."""
     of_friction: FloatArray
-    """(m,): that equivalent; what the damping would fall by at forces far above friction."""
+    """(m,), the equivalent damping of friction: at forces far above friction the damping is lower by it."""
     tolerance: Tolerance
-    """Of the whole model without it."""
+    """Tolerance of the whole model without the equivalent damping."""
 
 
 def fit_rigid_body(
     fit: MechanicalFit, strong: Recording, weaker: Recording, settings: MechanicalFitSettings
 ) -> RigidBody:
-    """Rigid fits at two levels. Friction's equivalent damping goes with 1 / amplitude: strong = true + c, weaker = true
-    + c ratio."""
+    """Rigid fits at two levels. The equivalent damping of friction is proportional to 1 / amplitude (describing
+    function): strong = true + c, weaker = true + c ratio."""
     low, high = fit.band_hz
     up_to_hz = min(high, low * 2**RIGID_OCTAVES)
     rigid = replace(

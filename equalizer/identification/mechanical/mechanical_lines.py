@@ -1,8 +1,8 @@
 """Spectra of commands and responses, segment by segment, with their noise: the data of a mechanical fit.
 
 Periodic segments give the mean of their periods: what does not repeat with the excitation (a feedback's share of the
-noise too) averages out, so that the excitation serves as the instrument. Others give the spectrum of the whole segment,
-and what the state at its ends adds to it is fitted with the model.
+noise too) averages out, so that the excitation serves as the instrument. Others give the spectrum of the whole segment;
+the transient from the states at its ends is fitted with the model.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,15 +18,15 @@ from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 _SPARE = 8
-"""Lines beyond the unknowns of a window."""
+"""Least number of lines beyond the unknowns of a window."""
 
 
 def local_noise(command: ComplexArray, response: ComplexArray) -> FloatArray:
     """(lines, p): expected |error|² of the response. command: (lines, m), response: (lines, p); NaN for too few.
 
-    Noise of a spectrum of which there is only one look: what a smooth response and a smooth transient leave unexplained
-    in a window of neighbouring lines (the local polynomial method of Schoukens, Vandersteen, Barbé and Pintelon, 2009).
-    Where a resonance is narrower than the window the figure is too large, never too small.
+    Noise of a spectrum of a single period: the residual of a smooth response and a smooth transient in a window of
+    neighbouring lines (the local polynomial method of Schoukens, Vandersteen, Barbé and Pintelon, 2009). Where a
+    resonance is narrower than the window, the noise is overestimated, never underestimated.
     """
     lines, m = command.shape
     unknowns = 2 * m + 3
@@ -49,9 +49,9 @@ def local_noise(command: ComplexArray, response: ComplexArray) -> FloatArray:
 
 
 EXCITED = 1e-2
-"""Of the strongest line's amplitude: below it nothing was played."""
+"""Least amplitude of a line, relative to the strongest: below it, the line was not excited."""
 MOST_LINES = 2000
-"""Of one segment that does not repeat: beyond, every second, third... is taken."""
+"""Most lines of one segment that does not repeat: of more, every second, third... is used."""
 _NOISE_LINES = 9
 
 
@@ -66,11 +66,11 @@ class SegmentLines:
     response: ComplexArray
     """(lines, p)"""
     noise: FloatArray
-    """(lines, p): expected |error|² of `response`; NaN where nothing tells it."""
+    """(lines, p): expected |error|² of `response`; NaN where not known."""
     excited: BoolArray
     """(lines,)"""
     transient: bool
-    """Whether the states at both ends show in it."""
+    """Whether its spectrum contains a transient from the states at both ends."""
     rate_hz: float
     hold: Hold
 
@@ -92,7 +92,7 @@ def segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None
         noise = smooth_over_lines(period_variance(spectra[1]), _NOISE_LINES) / len(starts)
     else:
         noise = local_noise(command, response)
-    if transient:  # what a segment holds between its own lines counts as driven too
+    if transient:  # content between the segment's own lines counts as excited too
         size = np.sqrt(smooth_over_lines(size**2, _NOISE_LINES))
     frequency = np.arange(1, len(command) + 1) * rate / length
     excited = size > EXCITED * size.max()
@@ -100,8 +100,8 @@ def segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None
 
 
 def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | None) -> tuple[SegmentLines, ...]:
-    """The excited lines of the band, its ends included: of segments that repeat alike, the same lines for all; of one
-    that does not repeat, no more than a model needs."""
+    """The excited lines of the band, its ends included. Periodic segments alike in period get the same lines; of one
+    that does not repeat, no more lines are kept than a model needs."""
     low, high = band_hz or (0.0, np.inf)
     found = []
     for segment in segments:
@@ -185,7 +185,7 @@ def _whole_periods(recording: Recording, segment: Segment) -> tuple[list[int], i
 
 
 def _spectra(samples: FloatArray, starts: Sequence[int], length: int) -> ComplexArray:
-    """Spectra (looks, lines, channels), one look per start."""
-    looks = np.stack([samples[start : start + length] for start in starts])
-    looks = looks - looks.mean(axis=1, keepdims=True)
-    return np.asarray(np.fft.rfft(looks, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
+    """Spectra (periods, lines, channels), one period per start."""
+    periods = np.stack([samples[start : start + length] for start in starts])
+    periods = periods - periods.mean(axis=1, keepdims=True)
+    return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)

@@ -15,8 +15,8 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 LARGEST = 0.25
-"""Largest scatter that is counted as noise, relative to a channel's largest response near a line. Segments contradict
-each other more where resonances shift with the level, and those lines carry most of the motion."""
+"""Largest scatter that is counted as noise, relative to a channel's largest response near a line. Segments differ more
+where resonances shift with the level, and those lines contain most of the motion."""
 _LINES = 9
 
 
@@ -24,8 +24,9 @@ def add_scatter_noise(segments: Sequence[SegmentLines]) -> tuple[SegmentLines, .
     """Raise the segments' noise to the scatter between them, where more segments than inputs have the same lines. All
     are of one band, by `select_band`.
 
-    Scatter is the residual of the best linear response: segments with the same lines contradict each other there, by
-    friction and other nonlinearity between realisations, directions and levels."""
+    Scatter is the residual of the best linear response: friction and other nonlinearities make segments with the same
+    lines differ between realisations, directions and levels.
+    """
     return tuple(
         _raise_noise(segment, [other for other in segments if have_same_lines(segment, other)]) for segment in segments
     )
@@ -47,7 +48,8 @@ def _command_size(segment_lines: SegmentLines) -> float:
 
 
 def _scatter(alike: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArray:
-    """(lines, p): power that the best response at each line leaves, per degree of freedom, for a command of size 1."""
+    """(lines, p): residual power of the best linear response at each line, per degree of freedom, for a command of size
+    1."""
     m = alike[0].command.shape[1]
     driven = np.array([other.excited / size for other, size in zip(alike, sizes, strict=True)]).T[:, :, None]
     command = np.stack([other.command for other in alike], axis=1) * driven
@@ -81,9 +83,9 @@ class LineGroup:
     weight: FloatArray
     """(lines, p)"""
     left_out: BoolArray
-    """(lines,): kept for judging structures."""
+    """(lines,): held out for cross-validation of structures."""
     count: FloatArray
-    """(lines,): misfits behind the rows."""
+    """(lines,): number of misfits that were compressed into the rows."""
     transient: bool
     rate_hz: float
     hold: Hold
@@ -140,7 +142,7 @@ def misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list[Complex
 def transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
     """Weighted spectra of the free response, (lines, p, columns). form: the model's."""
     free = free_response(model, group.frequency_hz, group.rate_hz, form)
-    if model.quantity == "acceleration":  # the last command of before goes straight through
+    if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
         straight = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
         free = np.concatenate([free, straight], axis=2)
     return np.asarray(group.weight[:, :, None] * free)
@@ -168,7 +170,7 @@ def numerical_jacobian(
 
 
 def _line_weights(segment: SegmentLines, floor: float) -> FloatArray:
-    """1 over the expected error: noise, and `floor` of the response's size round the line."""
+    """1 over the expected error: noise, and `floor` times the response's magnitude near the line."""
     power = np.abs(segment.response) ** 2
     size = smooth_over_lines(power, 5)
     noise = np.where(np.isfinite(segment.noise), segment.noise, 0.0)
@@ -192,7 +194,7 @@ def _can_be_folded(group: LineGroup, other: LineGroup) -> bool:
 def _fold_groups(group: LineGroup, other: LineGroup) -> LineGroup:
     root = np.concatenate([group.root, other.root], axis=2)
     target = np.concatenate([group.target, other.target], axis=2)
-    if root.shape[2] > root.shape[3] + 1:  # m + 1 rows hold all that the least squares needs to know
+    if root.shape[2] > root.shape[3] + 1:  # m + 1 rows contain all information for the least squares
         triangle = np.asarray(np.linalg.qr(np.concatenate([root, target[..., None]], axis=3), mode="r"))
         root, target = triangle[..., :-1], triangle[..., -1]
     return LineGroup(
@@ -203,7 +205,7 @@ def _fold_groups(group: LineGroup, other: LineGroup) -> LineGroup:
 
 def _subtract_transient(group: LineGroup, basis: ComplexArray, misfit: ComplexArray) -> ComplexArray:
     if not np.abs(basis).max(initial=0.0) < _RUN_AWAY:
-        return misfit  # A fit may try a model that is unstable.
+        return misfit  # A fit may try an unstable model.
     kept = ~group.left_out
     columns, wanted = basis[kept].reshape(-1, basis.shape[2]), misfit[kept].reshape(-1)
     real = np.concatenate([columns.real, columns.imag])

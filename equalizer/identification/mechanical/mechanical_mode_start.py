@@ -1,7 +1,7 @@
 """Starting values of a further mode: a grid search over frequency and damping.
 
-A small oscillator changes the response in proportion to its mass, so that linear least squares shows what it would
-explain once all other unknowns are adjusted to it.
+A small oscillator changes the response in proportion to its mass, so that linear least squares gives the share of the
+residual that it explains with all other unknowns re-adjusted.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ _GRID = 60
 _RATIOS = (0.01, 0.05, 0.25)
 _MOST_ROWS = 6000
 _SMALL_START = 0.02
-"""Root of the mode's mass over the whole, where the linear estimate gives none."""
+"""Root of the mode's mass over the whole mass, where the linear estimate gives none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +31,7 @@ class ModeStart:
     unknowns: FloatArray
     frequency_hz: float
     explained: float
-    """Of the fitted lines' squares, as far as a small mode can tell."""
+    """Part of the residual sum of squares that the mode explains, to first order in its mass."""
 
 
 def mode_starts(
@@ -60,7 +60,7 @@ def mode_starts(
 
 
 def _tangent_basis(groups: Sequence[LineGroup], now: RefinedFit[Structure], misfit: FloatArray) -> FloatArray:
-    """Orthonormal basis of the residual changes that the present unknowns can make."""
+    """Orthonormal basis of the residual changes that the present unknowns can produce."""
     high = np.full(now.structure.parameters, np.inf)
     slope = numerical_jacobian(
         lambda unknowns: stack_real(misfits(groups, now.structure.model(unknowns))), now.unknowns, misfit, high
@@ -136,7 +136,7 @@ def _make_start(
     own_entries = m * (m + 1) // 2
     own, others = symmetric_matrix(strengths[:own_entries], m), strengths[own_entries:].reshape(-1, m)
     root = np.sqrt(structure.mass_scale)
-    # A single direction serves both: the one that drives the mode. Other responses count by their shape at the mode.
+    # One direction is used for both: that in which the mode is driven. Other responses get the mode's shape there.
     along = (
         np.linalg.svd(np.concatenate([own / root**2, others]))[2][0] if len(others) else np.linalg.eigh(own)[1][:, -1]
     )

@@ -29,8 +29,9 @@ def readable_model(fit: AnyFit, name: str) -> MechanicalModel:
 
 
 def tolerance_of(fit: AnyFit) -> Tolerance:
-    """Standard deviations from the residuals' size, the largest over the driven axes. Of modes with free shapes only
-    the frequencies': the data do not tell how strongly each is driven where there is no sensor."""
+    """Standard deviations from the size of the residuals, the largest over the driven axes. For modes with free shapes
+    only those of the frequencies: without a sensor at a command, the data do not determine how strongly it drives
+    them."""
     if isinstance(fit.structure, ModalStructure):
         structure = fit.structure
         logs = np.sqrt(np.diag(_covariance(fit))).reshape(structure.modes, -1)[:, 0]
@@ -55,7 +56,7 @@ def _oscillator_tolerance(structure: Structure, fit: AnyFit) -> Tolerance:
 
 
 def _axis_values(structure: Structure, unknowns: FloatArray) -> FloatArray:
-    """(3 m,): masses, damping and stiffness to the ground at each."""
+    """(3 m,): masses, damping and stiffness to the ground at each driven axis."""
     return np.concatenate([np.diag(part) for part in structure.grounded_parts(unknowns)])
 
 
@@ -68,7 +69,7 @@ def _covariance(fit: AnyFit) -> FloatArray:
 
 
 def _to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
-    """e = |L| (z - hᵀ x): z is where an oscillator of mass |L|² is, along its direction h."""
+    """e = |L| (z - hᵀ x): z is the position of an oscillator of mass |L|² along its direction h."""
     n, carrier, rest = model.coordinates, slice(m, 2 * m) if joint else slice(0, m), slice(2 * m if joint else m, None)
     participation = model.mass[rest, carrier]
     roots = np.linalg.norm(participation, axis=1)
@@ -77,6 +78,6 @@ def _to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> Mec
     change = np.eye(n)
     change[rest, rest], change[rest, carrier] = np.diag(roots), -participation
     mass, damping, stiffness = (change.T @ part @ change for part in (model.mass, model.damping, model.stiffness))
-    # What the change makes zero is zero but for rounding.
+    # Entries that the transformation makes zero are set to zero exactly.
     mass[rest, carrier] = mass[carrier, rest] = 0.0
     return replace(model, mass=(mass + mass.T) / 2, damping=damping, stiffness=stiffness, output=model.output @ change)

@@ -12,18 +12,19 @@ from equalizer.identification.mechanical.mechanical_refinement import RefinedFit
 from equalizer.identification.mechanical.mechanical_structure import Structure, remove_mode, start_joint
 
 LEAST_GAIN = 0.08
-"""Smallest relative fall of the left-out squares that a mode must bring, on a device that no linear model fits."""
+"""Smallest relative fall of the cross-validated squared error that a mode must bring where no linear model fits the
+device."""
 PER_UNKNOWN = 4.0
-"""Smallest gain per unknown, in units of what noise alone gives in the mean squares."""
+"""Smallest gain per unknown, in units of that from noise alone."""
 REACHED = 1.1
-"""Left-out error in units of what noise and floor expect: nothing more to explain."""
+"""Cross-validated error, in units of noise and floor, at which nothing is left to explain."""
 FIRST_STAGE, LEAST_STAGE, STAGE = 6.0, 0.05, 1.5
 """Upper end of the first stage: times the band's lower end, but at least this share of its upper end; then the ratio
 from stage to stage."""
 CLEAR_DELAY = 4.0
-"""Ratio by which a delay must reduce the left-out squares to be taken before any mode."""
+"""Ratio by which a delay must reduce the cross-validated squared error to be added before any mode."""
 SIMPLER = 1.02
-"""Ratio by which the left-out squares may rise without springs to the ground."""
+"""Ratio by which the cross-validated squared error may rise without springs to the ground."""
 BELOW_JOINT = 0.5
 """Share of the band up to which a joint is not yet included."""
 ALLOWED = (
@@ -92,7 +93,7 @@ def _grow_structure(
     limits: "_Limits",
     tried: list[OrderTried],
 ) -> tuple[RefinedFit[Structure], str]:
-    """Add to a structure all that improves it enough in this band; returns the fit, and why it stopped there."""
+    """Add to a structure every part that improves it enough in this band; returns the fit, and why it ended there."""
     while best.error >= REACHED:
         for what, larger in _larger_structures(groups, best, band_hz, limits):
             better = improves_enough(best, larger)
@@ -176,7 +177,8 @@ def _larger_structures(
     for start in starts:
         what = f"with a mode begun at {start.frequency_hz:.3g} Hz ({start.structure.modes} in all)"
         yield what, refine_unknowns(groups, start.structure, start.unknowns, band_hz)
-    if structure.inputs > 1 and not limits.whole_band:  # what is between axes shows once all modes are there
+    # Couplings between axes are identifiable only once all modes are included.
+    if structure.inputs > 1 and not limits.whole_band:
         return
     small: list[tuple[str, Structure]] = []
     if structure.modes and not structure.shared:

@@ -20,16 +20,16 @@ class RefinedFit(Generic[S]):
     structure: S
     unknowns: FloatArray
     squares: float
-    """Of the fitted lines' misfits."""
+    """Sum of squares of the fitted lines' misfits."""
     left_out: float
-    """Sum of squares over the lines that were not fitted."""
+    """Sum of squares over the held-out lines."""
     left_out_count: int
     slope: FloatArray
     """(2 rows, parameters) at the solution."""
 
     @property
     def error(self) -> float:
-        """Root mean square on the lines that were left out."""
+        """Root mean square over the held-out lines."""
         return float(np.sqrt(self.left_out / max(self.left_out_count, 1)))
 
 
@@ -41,7 +41,7 @@ def refine_unknowns(
     most_steps: int = 40,
 ) -> RefinedFit[S]:
     """Refine unknowns from a start (parameters,). Raises ValueError where the start itself is not a valid model."""
-    # Here, for a diagnosis that fits no model need not wait for the import.
+    # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
     from scipy.optimize import least_squares
 
     fitted = [group.without_left_out() for group in groups]
@@ -73,7 +73,7 @@ def refine_unknowns(
 
 
 def _left_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
-    """Sum of squares, and how many."""
+    """Sum of squares, and number of terms."""
     pairs = list(zip(groups, misfits(groups, model), strict=True))
     squares = sum(np.sum(np.abs(misfit[group.left_out]) ** 2) for group, misfit in pairs)
     return float(squares), int(sum(group.count[group.left_out].sum() for group in groups))

@@ -62,7 +62,8 @@ def _refuse_samples(recordings: Sequence[Recording]) -> None:
 
 
 def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
-    """error: (p + 1,), simulation's over the response's. Raises MechanicalFitRefused where no channel is explained."""
+    """error: (p + 1,), of the simulation relative to the response. Raises MechanicalFitRefused where no channel is
+    explained."""
     if error[:-1].min() > ALL_NOISE:
         raise MechanicalFitRefused(
             f"the commands do not tell what {', '.join(channels)} will do: a fitted model leaves "

@@ -16,7 +16,7 @@ from equalizer.signals.signal import FloatArray
 _SMALL = 1e-9
 """Magnitude of a pole times the step below which it is taken as an integrator."""
 _FASTEST_GROWTH = 200.0
-"""Of a pole's real part times the step."""
+"""Largest growth: real part of a pole times the step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +75,7 @@ def free_response(
     """
     form = form or pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
-    # A fit may try a model that is unstable: beyond this growth per sample, it has run away all the same.
+    # A fit may try an unstable model: the growth per sample is limited, so that its response stays finite.
     growth = np.minimum(form.poles.real / rate_hz, _FASTEST_GROWTH) + 1j * form.poles.imag / rate_hz
     decays = z[:, None] / (z[:, None] - np.exp(growth))
     spectra = _sum_poles(decays, form.outputs, form.states)
@@ -109,9 +109,9 @@ def _append_input_lag(
 def pole_responses(
     poles: ComplexArray, z: ComplexArray, rate_hz: float, hold: Hold, delay_s: float
 ) -> tuple[ComplexArray, ComplexArray]:
-    """(lines, poles), (lines,): what a pole, and what goes straight through, makes of a command."""
+    """(lines, poles), (lines,): response of each pole, and of the direct feedthrough, to a held command."""
     step, column = 1 / rate_hz, z[:, None]
-    # A fit may try a model that is unstable: beyond this growth per sample, its answer is huge all the same.
+    # A fit may try an unstable model: the growth per sample is limited, so that its response stays finite.
     poles = np.minimum(poles.real, _FASTEST_GROWTH * rate_hz) + 1j * poles.imag
     if hold is Hold.ZERO_ORDER:
         whole = np.floor(delay_s * rate_hz + 1e-9)
@@ -130,14 +130,14 @@ def pole_responses(
 
 
 def _integrate_exponential(poles: ComplexArray, seconds: float) -> ComplexArray:
-    """Of e^(p t) from 0 on; (poles,)."""
+    """Integral of e^(p t) over one step; (poles,)."""
     small = np.abs(poles) * seconds < _SMALL
     safe = np.where(small, 1.0, poles)
     return np.asarray(np.where(small, seconds, np.expm1(safe * seconds) / safe))
 
 
 def _integrate_ramp(poles: ComplexArray, step: float) -> ComplexArray:
-    """What a command that rises by one over the step adds by its end; (poles,)."""
+    """State at the end of a step for a command that rises linearly by one over it; (poles,)."""
     small = np.abs(poles) * step < 1e-4
     safe = np.where(small, 1.0, poles)
     exact = (np.expm1(safe * step) - safe * step) / (safe**2 * step)

@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 _LEAST_EIGENVALUE = 0.05
 _DELAYS = 33
 _MOST_DELAY_CYCLES = 8.0
-"""Of the highest line."""
+"""Longest delay that is tried, in periods of the highest line."""
 
 
 def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: float) -> tuple[Structure, FloatArray]:
@@ -50,7 +50,7 @@ def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: f
 def _solve_matrices(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, float]:
-    """Entries of the three matrices, and the residual sum of squares."""
+    """Estimated entries of the three matrices, and the residual sum of squares."""
     rows, right = _stiffness_rows(segments, structure, floor, delay_s)
     found = solve_scaled(rows, right)
     m = structure.inputs

@@ -1,9 +1,9 @@
 """Parametrisation of a mechanical model: masses, dampers and springs at the driven axes, and oscillators on them.
 
 M a + D v + K x = u at the m driven axes. An oscillator with frequency w, damping ratio d and participation vector L
-(root of its mass times its direction) has the relative coordinate e: e'' + 2 d w e' + w² e = -Lᵀ a. Responses see the
-driven axes through `output` rows, the oscillators through rows of their own. An elastic joint may lie between the
-driven axes and what sensors and oscillators sit on; see `insert_joint`.
+(root of its mass times its direction) has the relative coordinate e: e'' + 2 d w e' + w² e = -Lᵀ a. Responses measure
+the driven axes through `output` rows, the oscillators through separate rows. An elastic joint may connect the driven
+axes to the body that holds sensors and oscillators; see `insert_joint`.
 """
 
 from dataclasses import dataclass, field, replace
@@ -16,7 +16,7 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.signal import FloatArray
 
 DRIVEN_SHARE = 0.5
-"""Of the mass that is no oscillator's."""
+"""Share of the mass without oscillators that is on the driven side of an elastic joint."""
 
 
 def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: float) -> MechanicalModel:
@@ -24,8 +24,10 @@ def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: 
     oscillators relative to them. stiffness: (m, m), positive definite. loss_s: the joint's damping over its stiffness.
 
     Dampers and springs to the ground stay on the driven axes, where the drives are. Such a joint is a cable, a belt, a
-    flexible link. From force to response only the whole mass and the joint's resonance are seen, not how the mass is
-    shared between its sides: half each is taken, which leaves the resonance and everything below it as it is."""
+    flexible link. From force to response only the total mass and the joint's resonance are identifiable, not how the
+    mass is distributed over its two sides: half each is assumed, which does not change the resonance and everything
+    below it.
+    """
     participation = model.mass[m:, :m]
     rest = model.mass[:m, :m] - participation.T @ participation
     n = model.coordinates + m
@@ -50,7 +52,7 @@ def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: 
 
 _WIDEST_LOG = 12.0
 _FARTHEST_MODE = 4.0
-"""Times the band's end, or a part of its beginning."""
+"""Largest ratio of a mode's frequency to the nearer end of the band, outside it."""
 _LARGEST_TURN = 0.3
 _MOST_DELAY_SAMPLES = 200.0
 _WIDEST_JOINT_LOG = 2.5
@@ -59,7 +61,7 @@ _JOINT_LOSS = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Which parts a model has; its unknowns are a vector, scaled to about one."""
+    """The parts of a model; its unknowns are a vector, scaled to about one."""
 
     inputs: int
     outputs: int
@@ -69,16 +71,16 @@ class Structure:
     speed_scale: float
     """rad/s"""
     signs: tuple[float, ...]
-    """Of the driven axes' own responses: -1 for a sensor that counts the other way."""
+    """Sign of each driven axis's own sensor: -1 where it counts the other way."""
     modes: int = 0
     grounded: bool = True
-    """Whether springs to the ground may be there."""
+    """Whether there may be springs to the ground."""
     turned: bool = False
-    """Whether the sensor's axes may be turned against the commands' by a small angle."""
+    """Whether the sensor's axes may be rotated against the commands' by a small angle."""
     shared: bool = False
-    """Whether the driven axes' own sensors see a part of the oscillators' motion beside them."""
+    """Whether the sensors of the driven axes measure a share of the oscillators' motion besides."""
     joint: bool = False
-    """Whether an elastic joint, such as cables, lies between the driven axes and all else."""
+    """Whether an elastic joint, such as cables, connects the driven axes to all other bodies."""
     delayed: bool = False
     step_s: float = 1e-3
     sensor: SensorLimits = field(default_factory=SensorLimits)
@@ -109,7 +111,7 @@ class Structure:
 
     @property
     def units(self) -> tuple[float, float, float]:
-        """Of mass, damping and stiffness."""
+        """Units (scales) of mass, damping and stiffness."""
         return (
             self.mass_scale,
             self.mass_scale * self.speed_scale,
@@ -117,7 +119,7 @@ class Structure:
         )
 
     def transfer_unknowns(self, unknowns: FloatArray, other: "Structure") -> FloatArray:
-        """The unknowns in a structure with more of them, which begin at zero, or with fewer."""
+        """The unknowns converted to a larger structure, whose additional ones start at zero, or to a smaller one."""
         grown = np.zeros(other.parameters)
         for name, part in self.slices.items():
             there = other.slices[name]
@@ -159,7 +161,7 @@ class Structure:
         return insert_joint(whole, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
 
     def grounded_parts(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Mass without that of oscillators, damping and stiffness at the driven axes, (m, m) each."""
+        """Mass (without the oscillators'), damping and stiffness at the driven axes, (m, m) each."""
         m, part, units = self.inputs, self.slices, self.units
         lower = _unpack_triangle(unknowns[part["mass"]], m)
         stiffness = units[2] * _unpack_square(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
@@ -194,7 +196,8 @@ class Structure:
         return max(float(unknowns[self.slices["delay"]][0]) * self.step_s, 0.0)
 
     def oscillators(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """rad/s (modes,), damping ratios (modes,), participations (modes, m), what each response sees (modes, p)."""
+        """Frequencies in rad/s (modes,), damping ratios (modes,), participations (modes, m), sensor shapes (modes,
+        p)."""
         m, p = self.inputs, self.outputs
         each = unknowns[self.slices["modes"]].reshape(self.modes, -1) if self.modes else np.zeros((0, 2 + m))
         root = np.sqrt(self.mass_scale)
@@ -236,14 +239,14 @@ def remove_mode(structure: Structure, unknowns: FloatArray, number: int) -> tupl
 
 
 def diagonal_places(m: int) -> npt.NDArray[np.intp]:
-    """Which of the unknowns of a symmetric matrix stand on its diagonal."""
+    """Which of the unknowns of a symmetric matrix are on its diagonal."""
     rows, columns = _triangle_indices(m)
     return np.flatnonzero(rows == columns)
 
 
 @cache
 def _triangle_indices(m: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    return np.tril_indices(m)  # kept, for a fit asks some ten thousand times
+    return np.tril_indices(m)  # cached: a fit calls this some ten thousand times
 
 
 def _unpack_triangle(unknowns: FloatArray, m: int) -> FloatArray:

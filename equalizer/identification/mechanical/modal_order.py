@@ -15,13 +15,14 @@ from equalizer.identification.mechanical.modal_structure import ModalStructure, 
 from equalizer.signals.signal import FloatArray
 
 LEAST_GAIN = 0.08
-"""Smallest relative fall of the left-out squares that one more frequency, with all its shapes, must bring."""
+"""Smallest relative fall of the cross-validated squared error that one more frequency, with all its shapes, must
+bring."""
 REACHED = 1.02
-"""Left-out error in units of what noise and floor expect."""
+"""Cross-validated error, in units of noise and floor, above which a delay is tried."""
 ALIKE = 1.1
-"""Ratio by which the left-out squares may rise with fewer modes and a delay."""
+"""Ratio by which the cross-validated squared error may rise with fewer modes and a delay."""
 LEAST_SHAPE = 0.15
-"""Relative to a frequency's strongest shape: weaker ones are left out."""
+"""Least strength of a shape, relative to the frequency's strongest: weaker ones are left out."""
 
 
 def choose_modes(
@@ -31,8 +32,8 @@ def choose_modes(
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
 ) -> tuple[RefinedFit[ModalStructure], tuple[OrderTried, ...], str]:
-    """Choose the number of modes. No group may hold a transient. A delay is tried where modes alone leave residuals:
-    included from the first mode on, it would substitute modes that are still missing."""
+    """Choose the number of modes. Groups must not contain transients. A delay is tried where modes alone leave
+    residuals: included from the first mode on, it would substitute modes that are still missing."""
     most = settings.most_modes + structure.inputs
     best, tried, reason = _add_modes(
         ModalSearch(groups, structure, band_hz, fit_delay=False), structure, most, lambda s: on_progress(0.4 * s)

@@ -40,7 +40,7 @@ class _Solution:
 
 
 class ModalSearch:
-    """Search on groups of lines, none of which holds the transient of a segment that does not repeat."""
+    """Search on groups of lines without transients of segments that do not repeat."""
 
     def __init__(
         self, groups: Sequence[LineGroup], structure: Structure, band_hz: tuple[float, float], fit_delay: bool
@@ -54,7 +54,7 @@ class ModalSearch:
         self._kept = [~group.left_out for group in groups]
 
     def add_mode(self, now: FoundModes | None) -> FoundModes:
-        """Add a mode where it explains most, then refine all together."""
+        """Add a mode where it explains most, then refine all modes together."""
         logs = np.empty(0) if now is None else now.logs
         delay = self._known_delay if now is None else now.delay_s / self._structure.step_s
         solved = self._solve(np.append(logs, delay))
@@ -67,7 +67,7 @@ class ModalSearch:
         return self._refine(np.concatenate([logs[:half], [best[1]], logs[half:], [best[2]], [delay]]))
 
     def _refine(self, start: FloatArray) -> FoundModes:
-        # Here, for a diagnosis that fits no model need not wait for the import.
+        # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
         from scipy.optimize import least_squares
 
         half, delay = len(start) // 2, start[-1]
@@ -124,7 +124,7 @@ class ModalSearch:
         half = len(unknowns) // 2
         columns = []
         for k in range(len(unknowns)):
-            # A mode's own numbers move its answer alone, the delay all of them.
+            # A mode's own parameters change its response alone, the delay changes all of them.
             modes = np.arange(half) if k == 2 * half else np.array([k % half])
             chosen = np.concatenate([modes, half + modes, [2 * half]])
             moved = unknowns.copy()

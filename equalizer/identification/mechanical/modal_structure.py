@@ -19,8 +19,8 @@ _ALIKE = 1.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalStructure:
-    """Per mode: log of its frequency over `speed_scale`, log of its damping ratio, m numbers where the commands push,
-    p numbers where the sensors sit; modal masses are one in `mass_scale`."""
+    """Per mode: log of its frequency over `speed_scale`, log of its damping ratio, m entries of the shape at the
+    commands, p entries at the sensors; modal masses are one in `mass_scale`."""
 
     inputs: int
     outputs: int
@@ -68,8 +68,8 @@ class ModalStructure:
 
 def balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:
     """(parameters,): factors that leave every response unchanged, and limit the input shape of each mode to half of the
-    slowest mode's. Sensors elsewhere do not measure the motion at the commands, which leaves this scale free; the limit
-    keeps the mass there realistic."""
+    slowest mode's. Sensors that are not collocated do not measure the motion at the commands, which leaves this scale
+    free; the limit keeps the mass there realistic."""
     each = unknowns.reshape(structure.modes, -1)
     pushed = slice(2, 2 + structure.inputs)
     size = np.maximum(np.linalg.norm(each[:, pushed], axis=1), 1e-300)
@@ -83,9 +83,8 @@ def balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> FloatA
 
 
 def to_driven_axes(model: MechanicalModel) -> MechanicalModel:
-    """The model in other coordinates: first the driven axes, then the remaining modes with those axes held.
-
-    Raises numpy.linalg.LinAlgError where the modes do not move every command's axis by itself."""
+    """The model in other coordinates: first the driven axes, then the remaining modes with those axes held (Craig and
+    Bampton). Raises numpy.linalg.LinAlgError where the modes do not move each command's axis independently."""
     B = model.input
     m, n = B.shape[1], model.coordinates
     left, strengths, right = np.linalg.svd(B)
@@ -93,7 +92,7 @@ def to_driven_axes(model: MechanicalModel) -> MechanicalModel:
         raise np.linalg.LinAlgError("an axis that no mode moves")
     pushed = left[:, :m] / strengths @ right
     rest = left[:, m:]
-    if n > m:  # what hangs on it: its own modes with the driven axes held
+    if n > m:  # fixed-interface modes: those with the driven axes held
         rest = rest @ np.linalg.eigh(rest.T @ model.stiffness @ rest)[1]
     change = np.concatenate([pushed, rest], axis=1)
     mass, damping, stiffness = (change.T @ part @ change for part in (model.mass, model.damping, model.stiffness))

@@ -8,13 +8,13 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 
 MASS, DAMPING, STIFFNESS, MODES = 0.1, 0.5, 0.2, 0.03
-"""Relative to the largest at any driven axis; of a mode's frequency and mass. A linear fit absorbs friction mainly as
-damping, a hardening spring as stiffness, a lag as mass."""
+"""Relative tolerances of mass, damping and stiffness (of the largest at any driven axis), and of a mode's frequency and
+mass. A linear fit absorbs friction mainly as damping, a hardening spring as stiffness, a lag as mass."""
 
 
 def widen_tolerance(model: MechanicalModel) -> MechanicalModel:
-    """The model with a wider tolerance than the fit's own, which reflects its residuals alone and not that a linear
-    model absorbs missing physics."""
+    """The model with a wider tolerance than that of the fit, which follows from its residuals alone and ignores that a
+    linear model absorbs missing physics."""
     along = driven_axes(model)
     mass, damping, stiffness = (
         float(np.einsum("ni,nk,ki->i", along, part, along).max())

@@ -25,7 +25,7 @@ LINES_PER_BIN = 5
 OCTAVE_SHARE = 1 / 40
 """Width of a bin of a wide band."""
 LARGEST_GAIN = 100.0
-"""Outside the band, over the largest inside: beyond it a model is a fit by cancellation."""
+"""Largest gain outside the band over that inside: above it, the model fits by cancellation of large modes."""
 MOST_STEPS, LAST_STEPS = (60, 20, 20), 4
 
 
@@ -48,7 +48,7 @@ class Candidate:
     outside_gain: float
     """Largest gain outside the band over the largest inside."""
     radius: Radius
-    """Within which its poles were kept."""
+    """Largest magnitude of a pole during the search."""
 
     @property
     def sane(self) -> bool:
@@ -69,7 +69,7 @@ def subspace_start(lines: WeightedLines, settings: IdentificationSettings, longe
 def record_starts(
     recordings: Sequence[Recording], lines: WeightedLines, settings: IdentificationSettings
 ) -> tuple[Start, ...]:
-    """Starts by canonical variate analysis of time records; none where the band leaves no room for decimation."""
+    """Starts by canonical variate analysis of time records; none where the band is too wide for decimation."""
     factor = decimation_factor(lines.sample_rate_hz, settings.band_hz[1])
     if factor < 2:
         return ()
@@ -103,7 +103,7 @@ def refine_candidate(
 
 
 def bins_about(found: FittedForm, lines: WeightedLines, settings: IdentificationSettings) -> WeightedLines:
-    """The lines in bins, their means taken about a model that is nearly right."""
+    """The lines averaged in bins, about the response of an approximate model."""
     bins = group_lines(lines, 1, OCTAVE_SHARE) if settings.wide else group_lines(lines, LINES_PER_BIN, 0.0)
     centres = np.exp(2j * np.pi * bin_centres_hz(lines, bins) / lines.sample_rate_hz)
     return average_bins(lines, bins, found.response(lines.z), found.response(centres))
@@ -116,7 +116,8 @@ def outside_gain(found: FittedForm, lines: WeightedLines) -> float:
 
 
 def choose_best(found: Sequence[Candidate]) -> Candidate:
-    """The candidate of lowest cost among the sane; where none is sane, that of the smallest gain outside the band."""
+    """The candidate of lowest cost among those with acceptable gain outside the band; where there is none, that of the
+    smallest such gain."""
     sane = [each for each in found if each.sane]
     return min(sane, key=lambda each: each.cost) if sane else min(found, key=lambda each: each.outside_gain)
 

@@ -1,7 +1,7 @@
 """Poles and output shapes from time records: canonical variate analysis (Larimore 1990) of several records at once.
 
-Each record is reduced to the triangle of its own orthogonal factorisation, and the triangles are stacked: no record
-meets the samples of another, and a second record costs what the first did.
+Each record is reduced to the triangular factor of its own QR decomposition, and the factors are stacked: no row mixes
+samples of two records, and the cost is proportional to the number of records.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from equalizer.signals.signal import FloatArray
 RATE_OVER_BAND = 3.5
 """Records are decimated to about this many samples per period of the band's upper end."""
 LEAST_SAMPLES = 4
-"""Per row of the stacked past and future, for a record to count."""
+"""Least number of samples per row of the stacked past and future, for a record to be used."""
 _SILENT_KINDS = ("rest", "free")
 
 
@@ -42,7 +42,7 @@ def driven_records(recordings: Sequence[Recording], factor: int) -> list[FloatAr
 
 
 def canonical_variate(records: Sequence[FloatArray], inputs: int, horizon: int) -> FloatArray | None:
-    """Extended observability matrix (horizon p, horizon p), strongest direction first; None if too little is there.
+    """Extended observability matrix (horizon p, horizon p), strongest direction first; None with too few samples.
 
     records: (n, m + p) each, commands first; horizon: past and future samples.
     """
@@ -86,6 +86,6 @@ def poles_and_shapes(observed: FloatArray, outputs: int, order: int, factor: int
     seen = observed[:, :order]
     values, vectors = np.linalg.eig(np.linalg.lstsq(seen[:-outputs], seen[outputs:], rcond=None)[0])
     slow: ComplexArray = stabilise_poles(values, radius**factor)
-    # A negative real pole has no real root: taken for the equally fast positive one.
+    # A negative real pole has no real root; the positive pole with the same decay is used.
     turned = np.where((slow.imag == 0) & (slow.real < 0), -slow, slow)
     return from_poles(stabilise_poles(turned ** (1 / factor), radius), seen[:outputs] @ vectors)

@@ -12,9 +12,9 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 LEAD_S = 2.0
-"""Simulated before a segment, as far as the recording has it: the state has then settled..."""
+"""Seconds simulated before a segment, where the recording has them, for the state to settle..."""
 DECAYS = 5.0
-"""...or for so many time constants of the model's slowest pole, where those are longer."""
+"""...or this many time constants of the model's slowest pole, where those are longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +22,10 @@ class HeldOut:
     error: float
     """Root-mean-square of prediction - response over that of the response, all channels, within the model's band."""
     noise: float | None
-    """Of the response alone, by the same measure, from period to period; None with fewer than three. An error
-    cannot fall below it, a perfect model's lies just there."""
+    """Noise of the response in the same measure, from the differences between periods; None with fewer than three. The
+    error of a perfect model equals it."""
     seconds: float
-    """Compared."""
+    """Seconds compared."""
 
 
 def validate_on_test(model: IdentifiedModel, recordings: Sequence[Recording]) -> HeldOut | None:
@@ -77,22 +77,22 @@ def _compare_segment(model: IdentifiedModel, recording: Recording, segment: Segm
     measured = _band_spectrum(response[last:], rate_hz, model.band_hz)
     error = measured - _band_spectrum(predicted[last:], rate_hz, model.band_hz)
     noise = None
-    if segment.period and last - 2 * length >= segment.start - start:  # the first one holds the transient
-        # Of the residuals, so that free decay from period to period does not count as noise.
+    if segment.period and last - 2 * length >= segment.start - start:  # the first period contains the transient
+        # Computed from the residuals, so that free decay from period to period does not count as noise.
         before = _band_spectrum((response - predicted)[last - length : last], rate_hz, model.band_hz)
         noise = _power(error - before) / 2
     return _Part(_power(error), noise, _power(measured), length / rate_hz)
 
 
 def _lead_samples(model: IdentifiedModel) -> int:
-    """Samples."""
+    """Length of the run-in in samples."""
     radius = model.spectral_radius
     slowest = -1 / np.log(radius) if 0 < radius < 1 else 0.0
     return round(max(LEAD_S * model.sample_rate_hz, DECAYS * slowest))
 
 
 def _first_compared_sample(segment: Segment) -> int:
-    """First sample of what is compared: the last period, the transient being over by then, or the whole segment."""
+    """First compared sample: that of the last period, when the transient is over, or that of the segment."""
     periods = (segment.stop - segment.start) // segment.period if segment.period else 0
     return segment.stop - segment.period if periods >= 1 else segment.start
 

@@ -36,15 +36,15 @@ STEPS = 3
 def parameter_draws(
     fitted: FittedForm, lines: WeightedLines, radius: Radius, noise_factor: float, draws: int, seed: int
 ) -> FloatArray:
-    """Parametric bootstrap (draws, k), in the order of `IdentifiedModel.parameters`: each a fit to another noise draw.
+    """Parametric bootstrap (draws, k), in the order of `IdentifiedModel.parameters`: each a fit to another draw of the
+    noise.
 
-    A covariance from the Jacobian would not do: an order above what the band shows leaves directions in which the
-    response hardly changes at first and then at once, so draws from it are unstable models. Refitting keeps every draw
-    within the decay bound, and is right to second order for the cost of a few steps each (parametric bootstrap, Efron
-    and Tibshirani 1993).
+    A covariance from the Jacobian is not used: with an order above what the band shows, the response depends on some
+    directions of the parameters only beyond first order, so that draws from a normal distribution are unstable models.
+    Refitting keeps every draw within the decay bound, at the cost of a few steps each (Efron and Tibshirani 1993).
 
-    lines: those that the fit was made to, binned or not; noise_factor: what the noise is taken to be over what the
-    weights say, above 1 where the fit leaves more than noise.
+    lines: the fitted lines, binned or not; noise_factor: assumed noise over that of the weights, above 1 where
+    residuals exceed the noise.
     """
     random = np.random.default_rng(seed)
     modelled = fitted.response(lines.z)
@@ -72,9 +72,9 @@ FIRST_SEARCH = 0.8
 """Share of the progress that is reported for the first search; poles are relaxed in the rest."""
 BAND_POINTS = 200
 WIDTHS = np.sinh(np.linspace(-4, 4, 41))
-"""Places about a slow pole, in half-widths of its peak: dense at the peak, up to 27 away."""
+"""Frequencies about a slow pole, in half-widths of its peak: dense at the peak, up to 27 away."""
 SAMPLED_BEFORE_WRITTEN = 1.0
-"""A response is read just before its row's command is written, so a device answers one sample later at the earliest."""
+"""Delay of one sample: a response is read just before its row's command is written."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
@@ -83,31 +83,31 @@ class Identified(Summarised):
 
     model: IdentifiedModel
     cost: float
-    """Squared residual over noise variance, per unknown left free: about 1 when only noise is left."""
+    """Reduced chi-squared: squared residual over noise variance, per degree of freedom."""
     rms_relative_error: float
-    """Model against estimate over the lines of the band; the estimate's own noise is in it."""
+    """Rms error of the model against the estimate over the band, the estimate's noise included."""
     worst_relative_error: float
-    """The worst line's, relative to the root mean square of the response."""
+    """Error of the worst line, relative to the root mean square of the response."""
     scatter: float | None
-    """Of the model against the device, as the noise makes it: root mean square over the lines, relative to the
-    response's; from the draws, None without them. What no linear model of this order can follow is not in it."""
+    """Error of the model that the noise causes, from the bootstrap draws: root mean square over the lines, relative to
+    the response; None without draws. Lack of fit is not included."""
     misfit: Misfit
-    """What is: the lines' own difference to the model beyond their noise."""
+    """Lack of fit: difference of the lines from the model beyond their noise."""
     expected_error: float | None
-    """Likewise relative: scatter, and the most misfit that the lines may hide; in 95 % of cases not exceeded."""
+    """95 % bound of the total error, likewise relative: noise, and the most misfit that the noise may hide."""
     lines: int
     candidates: tuple[Candidate, ...]
     chosen: Candidate
     relaxed: tuple[SlowPole, ...]
-    """Poles that the data need slower than the ordinary bound, slowest first."""
+    """Poles with a longer decay than the ordinary bound, which the data require; slowest first."""
     bound_costs: bool
-    """The bound that was asked for keeps the fit from what the data show."""
+    """Whether the decay bound that was asked for prevents a fit of the data."""
     remarks: tuple[str, ...]
-    """What the user should know about this model, in sentences; `misfit_causes` says what a misfit may come from."""
+    """Remarks for the user, as sentences; `misfit_causes` has likely causes of a misfit."""
 
     @property
     def slowest_decay_s(self) -> float:
-        """Time constant."""
+        """Time constant in seconds."""
         radius = self.model.spectral_radius
         return float(-1 / (np.log(radius) * self.model.sample_rate_hz)) if radius > 0 else 0.0
 
@@ -131,11 +131,11 @@ def identify(
     on_progress: Callable[[float], None] | None = None,
     near: Candidate | None = None,
 ) -> Identified:
-    """One model of all estimates together, each line counting by its noise. Always stable.
+    """Fit one model to all estimates together, each line weighted by its noise. The model is always stable.
 
-    `records` give further starts in the time domain. `on_progress` is told the share done, 0 to 1. `near`: refined on
-    these lines instead of a search; poles that were relaxed for it are bounded again where that costs nothing.
-    Raises IdentificationRefused when the data do not carry a model.
+    `records` give further starts in the time domain. `on_progress` takes the share done, 0 to 1. `near`: a model to
+    refine on these lines instead of a search; poles that were relaxed for it are bounded again where that costs
+    nothing. Raises IdentificationRefused where no model can be fitted to the data.
     """
     settings = settings or IdentificationSettings()
     tell = on_progress or (lambda _: None)
@@ -254,7 +254,7 @@ def _refuse_foreign(records: tuple[Recording, ...], like: FrequencyResponse) -> 
 
 
 def outside_remark(chosen: Candidate) -> list[str]:
-    """Empty where the model stays small outside its band."""
+    """Remark on a large gain outside the band; empty where the gain is acceptable."""
     if chosen.sane:
         return []
     return [

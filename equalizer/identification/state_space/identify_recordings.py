@@ -18,10 +18,10 @@ from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
 
 HEARD_S = 1.0
-"""Time constant from which the transient of a start disturbs the estimate, which leaves out its first 5 s."""
+"""Time constant above which the transient of a start disturbs the estimate, which leaves out its first 5 s."""
 MOST_ROUNDS = 8
 SETTLED = 1e-4
-"""Relative change of the slowest decay from round to round that is not worth another one."""
+"""Relative change of the slowest decay between rounds below which no further round is made."""
 SMOOTHED = (
     "The lines differ from the model by more than their noise: the fit was made to a local average over neighbouring "
     "lines (--no-smooth fits the lines themselves)."
@@ -32,7 +32,7 @@ SMOOTHED = (
 class IdentifiedRecordings:
     estimate: FrequencyResponse
     fitted: FrequencyResponse
-    """What the model was fitted to: the estimate, or its local averages."""
+    """The frequency response that the model was fitted to: the estimate, or its local averages."""
     identified: Identified
 
 
@@ -42,11 +42,11 @@ def identify_recordings(
     smooth: bool | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> IdentifiedRecordings:
-    """The state-space model of the device that the recordings are of, and how well it fits what was measured.
+    """Identify a state-space model of the recorded device, and state how well it fits.
 
-    smooth: local averages over neighbouring lines, taken about the model where a pole was relaxed, for they would
-    blunt what it stands for; None: where the lines scatter more than their noise. `on_progress` is told the share
-    done. Raises TransferEstimateError, IdentificationRefused.
+    smooth: local averages over neighbouring lines, taken about the model where a pole was relaxed, because they would
+    blunt its resonance; None: where the lines scatter more than their noise. `on_progress` takes the share done, 0 to
+    1. Raises TransferEstimateError, IdentificationRefused.
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or IdentificationSettings()
@@ -95,10 +95,11 @@ def _has_repeats(recordings: Sequence[Recording]) -> bool:
     """Whether every experiment has two counted periods.
 
     In a single period, or in windows, transient and leakage look like lightly damped resonances, so that poles are not
-    relaxed on their evidence. Noise estimated from the scatter of the lines does not tell the cause of a misfit either.
+    relaxed on their evidence. Noise estimated from the scatter of the lines does not reveal the cause of a misfit
+    either.
     """
-    looks = periodic_experiments(recordings)
-    return bool(looks.experiments) and all(experiment.looks > 1 for experiment in looks.experiments)
+    found = periodic_experiments(recordings)
+    return bool(found.experiments) and all(experiment.periods > 1 for experiment in found.experiments)
 
 
 def _remove_transients(
@@ -132,10 +133,10 @@ def _fit_smoothed(
         identified = identify(fitted, settings, near=known.chosen)
     else:
         fitted = smooth_response(estimate)
-        # Averaged lines are not independent, so they cannot tell whether a pole needs more than the bound.
+        # Averaged lines are correlated, so the likelihood-ratio test for a longer decay does not hold on them.
         held = replace(settings, longest_decay_s=settings.decay_s)
         identified = identify(fitted, held, recordings, tell)
     tell(1.0)
-    # Averaged lines do not tell what the bound costs, either.
+    # For the same reason the cost of the bound cannot be tested on averaged lines.
     bound_costs = known is not None and known.bound_costs
     return IdentifiedRecordings(estimate, fitted, replace(identified, bound_costs=bound_costs))

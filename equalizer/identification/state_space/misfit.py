@@ -20,14 +20,14 @@ class Misfit:
     error: float
     """Root mean square of model - estimate beyond the noise, relative to the response's; 0 where only noise is left."""
     most: float
-    """Likewise, the most that the lines would still take for noise in 95 % of cases: the chance scatter of noise and of
-    its estimate, and what the fit took up of it, hide that much. Not below `error`."""
+    """Upper 95 % bound of the misfit that the noise may hide, likewise relative: from the scatter of noise and of its
+    estimate, and the degrees of freedom that the fit used. Not below `error`."""
     cost: float
-    """Squared difference over noise variance, mean over all entries of the lines: about 1 at the noise."""
+    """Squared difference over noise variance, mean over all entries of the lines: about 1 where only noise is left."""
     smooth: float | None
-    """Correlation of what is left beyond the noise between neighbouring lines: near 1 for a linear answer that the
-    model lacks, near 0 for lines that scatter; None where only noise is left, or where the noise itself was judged
-    by the scatter of the lines."""
+    """Correlation between neighbouring lines of the residual beyond the noise: near 1 for a linear response that the
+    model lacks, near 0 for lines that scatter; None where only noise is left, or where the noise itself was estimated
+    from the scatter of the lines."""
 
 
 ONE_SIDED_95 = 1.645
@@ -54,7 +54,7 @@ def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, u
 def _lower_noise_bound(variance: FloatArray, unknowns: int) -> float:
     """One-sided lower 95 % bound of the noise power that a fit leaves."""
     total = float(variance.sum())
-    entries = total**2 / max(float((variance**2).sum()), 1e-300)  # those that carry it
+    entries = total**2 / max(float((variance**2).sum()), 1e-300)  # effective number of entries
     return total * (1 - unknowns / (2 * max(variance.size, 1)) - ONE_SIDED_95 * float(np.sqrt(2 / max(entries, 1.0))))
 
 

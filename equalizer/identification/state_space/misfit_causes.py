@@ -1,4 +1,4 @@
-"""Likely causes of a model's misfit, as sentences; where the evidence does not tell, they say so."""
+"""Likely causes of a model's misfit, as sentences; where the evidence is insufficient, they say so."""
 
 from collections.abc import Sequence
 
@@ -11,21 +11,22 @@ from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.recording import Recording
 
 UNEXPLAINED = 1.5
-"""Cost above which a model is said to leave more than noise."""
+"""Cost above which residuals exceed the noise."""
 SMOOTH = 0.5
 """Correlation of neighbouring lines from which residuals count as a linear response that the model lacks."""
 HELD_OUT_BEYOND = 2.0
-"""Times its noise and the misfit of the fit: a held-out error above needs a cause of its own."""
+"""Held-out error, relative to its noise and the misfit of the fit, above which it needs a cause of its own."""
 LEVEL_RATIO = 1.25
-"""Of the amplitudes of test and fit, from which they are two levels."""
+"""Ratio of the amplitudes of test and fit above which they are two levels."""
 LIMIT_SAMPLES = 10
-"""Neighbouring pairs at one and the same extreme value, from which a sensor is said to be at its limit."""
+"""Number of neighbouring pairs at the same extreme value above which a sensor counts as saturated."""
 
 
 def fit_remarks(
     cost: float, misfit: Misfit, relaxed: Sequence[SlowPole], bound_costs: bool, settings: IdentificationSettings
 ) -> list[str]:
-    """Remarks on the fit alone, sentences without their full stop; the bound first, because it imitates all others."""
+    """Remarks on the fit alone, sentences without their full stop. The bound comes first, because its effect resembles
+    all others."""
     bound_s, order = settings.decay_s, settings.order
     found = [
         f"the resonance at {pole.frequency_hz:.2f} Hz (damping ratio {100 * pole.damping_ratio:.2g} %) rings longer "
@@ -97,7 +98,7 @@ def _largest_amplitude(recordings: Sequence[Recording], *, test: bool) -> float:
 
 
 def _clipped_channels(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Channels that stay at one and the same largest or smallest value, again and again."""
+    """Channels that repeatedly stay at the same largest or smallest value."""
     found: dict[str, None] = {}
     for recording in recordings:
         samples = recording.response.samples

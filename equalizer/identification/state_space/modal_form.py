@@ -1,7 +1,7 @@
 """Modal form of a state-space model: blocks of two poles, [[a, 1], [b, a]] with poles a ± sqrt(b).
 
-In this form two poles pass smoothly from a complex pair to two real ones, which a fit needs. An odd order is made even
-by the caller's choice of it: a block always holds two poles.
+In this form a complex pair becomes two real poles continuously, which a fit needs. The order is even, because a block
+has two poles.
 """
 
 from dataclasses import dataclass

@@ -14,18 +14,18 @@ from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import FloatArray
 
 VISIBLE = 2.0
-"""A singular value this far above the noise's is a state that the data show."""
+"""Ratio to the noise above which a singular value counts as a state."""
 
 
 @dataclass(frozen=True, slots=True)
 class OrderRow:
     order: int
     held_out_cost: float
-    """Squared error over noise variance on lines that the fit did not see: 1 plus what the model adds."""
+    """Squared error over noise variance on held-out lines: 1 plus the contribution of the model error."""
     held_out_error: float
-    """Root mean square relative to the response's; noise included."""
+    """Root-mean-square error relative to the response; noise included."""
     multiply_adds_per_tick: int
-    """One step of the state and one output, poles in blocks of two."""
+    """Multiplications for one step of the state and one output, with poles in blocks of two."""
     dense_multiply_adds_per_tick: int
     """The same with a full state matrix."""
 
@@ -33,13 +33,13 @@ class OrderRow:
 @dataclass(frozen=True, slots=True, eq=False)
 class OrderReport:
     singular_values: FloatArray
-    """Whitened, strongest first: about 1 where there is only noise."""
+    """Singular values of the whitened data, largest first: about 1 where there is only noise."""
     visible_order: int
-    """Singular values that stand clear of the noise."""
+    """Number of singular values well above the noise."""
     rows: tuple[OrderRow, ...]
-    """By rising order."""
+    """Orders tried, rising."""
     held_out_noise: float
-    """What `held_out_error` cannot fall below."""
+    """Noise of the lines, the lower limit of `held_out_error`."""
     suggested_order: int
     """The lowest whose error on held-out lines is not worse than the best one's by more than its standard error."""
 
@@ -83,7 +83,7 @@ def compare_orders(
 
 
 def multiply_adds(order: int, outputs: int, inputs: int) -> int:
-    """Per tick, poles in blocks of two: three for a block's own poles, and B, C and D."""
+    """Multiplications per tick with poles in blocks of two: three for a block's own poles, and B, C and D."""
     return 3 * order // 2 + order * (outputs + inputs) + outputs * inputs
 
 
@@ -101,7 +101,7 @@ def _relative_noise(lines: WeightedLines) -> float:
 
 
 def _suggest_order(per_line: Sequence[FloatArray]) -> int:
-    """Number of the lowest order that is not worse by its standard error; compared line by line, so that common noise
+    """Index of the lowest order that is not worse by its standard error; compared line by line, so that common noise
     cancels."""
     lowest = int(np.argmin([cost.mean() for cost in per_line]))
     for number, cost in enumerate(per_line):

@@ -52,10 +52,10 @@ def _least_squares(phi: FloatArray, y: FloatArray) -> FloatArray:
 
 
 LEAST_GAIN = 1e-7
-"""Relative fall of the cost over a step that is not worth another step."""
+"""Relative fall of the cost in a step below which the search ends."""
 
 UNSEEN = 1e-13
-"""Share of a state's column that is its own, below which it counts as not there."""
+"""Share of a state's column that is independent of the others, below which the state counts as unobservable."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +79,7 @@ class _Point:
 
     form: ModalForm
     basis: FloatArray
-    """(m, rows, n + p): orthonormal; what B and D can explain."""
+    """(m, rows, n + p): orthonormal basis of what B and D can explain."""
     solved: FloatArray
     """(m, n + p): B and D of each input."""
     residual: FloatArray
@@ -142,7 +142,7 @@ def _evaluate_form(form: ModalForm, lines: WeightedLines) -> _Point:
     measured = stack_by_input(lines.weight * lines.response)
     along = np.einsum("jrs,jr->js", basis, measured)
     residual = np.einsum("jrs,js->jr", basis, along) - measured
-    # A state that nothing shows (its column is zero, or another's) would stop the fit here.
+    # A state that is not observable (its column is zero, or a combination of others) would end the fit here.
     unseen = np.abs(np.diagonal(triangle, axis1=1, axis2=2)) < UNSEEN
     triangle = triangle + np.eye(triangle.shape[1]) * np.where(unseen, 1.0, 0.0)[:, None]
     solved = np.linalg.solve(triangle, along[:, :, None])[:, :, 0] / size[:, 0]

@@ -10,15 +10,15 @@ from equalizer.identification.state_space.warped_subspace import default_horizon
 from equalizer.identification.state_space.weighted_lines import WeightedLines, weight_lines
 
 LEAST_SIGNAL_TO_NOISE = 2.0
-"""Of amplitudes, the typical line's strongest entry."""
+"""Least ratio of amplitude to noise of the strongest entry at a typical line."""
 LARGEST_GAP = 0.1
-"""Of the band, in octaves, without a line..."""
+"""Largest gap without a line, in octaves..."""
 SPACINGS = 3.0
-"""...if it is also this many times the usual step from line to line."""
+"""...if it is also this many times the usual line spacing."""
 
 
 class IdentificationRefused(ValueError):  # noqa: N818 - an answer that a user reads, as in the rest of the package
-    """The data do not carry a model; the text says what would do."""
+    """No model can be fitted to the data; the text says why, and which would do."""
 
 
 def require_lines(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> WeightedLines:

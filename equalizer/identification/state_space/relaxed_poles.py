@@ -1,8 +1,8 @@
 """Relaxation of the decay bound for poles whose data demand it, by a likelihood-ratio test.
 
-A pole at the bound is either superfluous, because the order exceeds what the band shows, and then costs nothing there,
-or it represents a resonance with a longer decay. The likelihood ratio decides: the fall of the cost when the bound is
-lifted, against what noise alone gives at the best of all lines (chi-squared, Bonferroni over the lines).
+A pole at the bound is either superfluous, because the order is higher than needed, and then costs nothing there, or it
+represents a resonance with a longer decay. The likelihood ratio decides: the fall of the cost when the bound is lifted,
+compared with that from noise alone at the best of all lines (chi-squared, Bonferroni over the lines).
 """
 
 from collections.abc import Callable, Sequence
@@ -25,32 +25,32 @@ from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import FloatArray
 
 PERIODS_TOLD = 4.0
-"""Longest decay over the period (the inverse of the step from line to line): a resonance narrower than the step still
-shows in the flanks on both sides of it, until they, too, are those of an undamped mode."""
+"""Longest decay over the period (the inverse of the step from line to line): a resonance narrower than the line spacing
+is still determined by the flanks on both sides of it, until they, too, equal those of an undamped mode."""
 FALSE_ALARM = 1e-3
-"""Probability that noise alone relaxes a pole."""
+"""Probability that noise alone relaxes a pole (significance level)."""
 RELAXED = ", poles relaxed"
 
 Search = Callable[[IdentificationSettings], Sequence[Candidate]]
-"""From fresh starts, under other settings."""
+"""Search for candidates from new starting models, under the given settings."""
 
 
 @dataclass(frozen=True, slots=True)
 class SlowPole:
-    """A pole that rings longer than the ordinary bound allows."""
+    """A pole with a longer decay than the ordinary bound allows."""
 
     frequency_hz: float
     decay_s: float
-    """Time constant."""
+    """Time constant in seconds."""
     damping_ratio: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelaxedFit:
     candidate: Candidate
-    """The one given where no pole needs more than the bound."""
+    """The candidate with its poles relaxed; the given one where no pole needs a longer decay."""
     bound_costs: bool
-    """A pole sits at the bound all the same, and the fit would improve beyond noise without it."""
+    """Whether a pole is at the bound although the fit would improve beyond noise without it."""
 
 
 def relax_poles(
@@ -93,7 +93,7 @@ def slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) -> tupl
 
 
 def longest_resolved_decay_s(lines: WeightedLines) -> float:
-    """Time constant in seconds beyond which these lines do not distinguish a decay from an undamped mode."""
+    """Time constant in seconds above which these lines do not distinguish a decay from an undamped mode."""
     steps = np.diff(np.unique(lines.frequency_hz))
     return PERIODS_TOLD / float(np.median(steps)) if len(steps) else 0.0
 
@@ -119,13 +119,13 @@ def _bound_costs(chosen: Candidate, limit: float, lines: WeightedLines, settings
     after = bins.cost(refine(chosen.fitted.form, bins, loose, MOST_STEPS[-1]).response(bins.z))
     if not _exceeds_noise(bins.cost(chosen.fitted.response(bins.z)) - after, after, bins, len(lines)):
         return False
-    # What more steps alone give is no reason.
+    # The gain of further steps with the bound is not counted.
     held = bins.cost(refine(chosen.fitted.form, bins, chosen.radius, MOST_STEPS[-1]).response(bins.z))
     return _exceeds_noise(held - after, after, bins, len(lines))
 
 
 def _has_outlying_line(chosen: Candidate, lines: WeightedLines) -> bool:
-    """Whether the residual of some line stands out: a resonance so narrow that no pole moved there."""
+    """Whether the residual of a line is an outlier: a resonance so narrow that no pole moved there."""
     left = (np.abs(lines.weight * (chosen.fitted.response(lines.z) - lines.response)) ** 2).sum(axis=(1, 2))
     entries = lines.response[0].size
     return bool(2 * left.max() / max(chosen.cost, 1.0) > chi2.isf(FALSE_ALARM / len(lines), 2 * entries))
@@ -158,8 +158,8 @@ def _is_better(again: Candidate, chosen: Candidate, lines: WeightedLines) -> boo
 
 
 def _exceeds_noise(gained: float, left: float, lines: WeightedLines, tried: int) -> bool:
-    """Whether a fall of the cost to `left` exceeds what a resonance fitted to noise at the best of `tried` lines gives.
-    Where more than noise is left, that counts as the noise."""
+    """Whether the fall of the cost to `left` exceeds that of a resonance fitted to noise at the best of `tried` lines.
+    Where residuals exceed the noise, they count as the noise."""
     p, m = lines.response.shape[1:]
     scale = max(left / lines.response.size, 1.0)
     return bool(2 * gained / scale > chi2.isf(FALSE_ALARM / tried, 2 * (p + m + 1)))

@@ -3,35 +3,35 @@
 from dataclasses import dataclass
 
 WIDE_OCTAVES = 4.5
-"""A band wider than this is fitted on logarithmic bins: on a linear axis its top would outnumber its bottom."""
+"""Width of a band above which it is fitted on logarithmic bins: on a linear axis most lines are at its top."""
 ORDINARY_DECAY_S = 0.5
-"""Time constant that a pole has at most unless the data ask for more. Poles that an order has to spare go to the bound
-and cost nothing there; without it they settle anywhere up to the unit circle, and ruin a simulation."""
+"""Longest time constant of a pole unless the data require more. Superfluous poles of an order go to the bound and cost
+nothing there; without it they may end anywhere inside the unit circle, with a slow decay that ruins a simulation."""
 
 
 @dataclass(frozen=True, slots=True)
 class IdentificationSettings:
-    """Band and order of a model, and how it is searched for."""
+    """Band and order of a model, and settings of the search."""
 
     band_hz: tuple[float, float] = (5.0, 35.0)
     order: int = 26
     """Number of states; even, because poles are fitted in pairs."""
     longest_decay_s: float | None = None
-    """Time constant that no pole may exceed. None: ORDINARY_DECAY_S, and more for poles that need it (see
+    """Longest time constant of a pole. None: ORDINARY_DECAY_S, and more for poles that need it (see
     `relaxed_poles`)."""
     longer_horizons: tuple[int, ...] = (0, 2)
-    """Block rows beyond the shortest useful horizon; each is a start of its own."""
+    """Block rows beyond the shortest useful horizon; each number gives a starting model."""
     spare_horizons: tuple[int, ...] = (1, 3, 4, 6)
-    """Likewise for a wide band: one after the other, while the best fit leaves more than noise, because a fit may end
-    in a local optimum there."""
+    """Likewise for a wide band: tried one after the other while the best fit leaves more than noise, because a fit may
+    end in a local optimum."""
     record_horizons: tuple[int, ...] = (16,)
-    """Past and future samples of the starts from time records, where there are any."""
+    """Past and future samples of the starts from time records."""
     margin: float = 0.1
-    """Lines this far beyond the band, relative, help to hold its edges if they were measured."""
+    """Relative width of the margins beyond the band whose lines are fitted too, where they were measured."""
     draws: int = 30
-    """Of the parameters from their uncertainty; 0 = none."""
+    """Number of bootstrap draws of the parameters; 0 = none."""
     seed: int = 1
-    """Of the draws."""
+    """Random seed of the draws."""
 
     def __post_init__(self) -> None:
         low, high = self.band_hz
@@ -54,7 +54,7 @@ class IdentificationSettings:
 
     @property
     def decay_s(self) -> float:
-        """The bound that a search begins with."""
+        """Decay bound at the beginning of a search."""
         return ORDINARY_DECAY_S if self.longest_decay_s is None else self.longest_decay_s
 
     @property

@@ -1,7 +1,7 @@
 """Subtraction of the free decay of slow poles from recordings, so that they are in the steady state.
 
-A period that begins in another state than it ends in holds, beside the periodic answer, the free decay from the
-difference: C A^t (I - A^N)^-1 (x_0 - x_N). A period that is shorter than some ten time constants is full of it.
+A period that begins and ends in different states contains, beside the periodic response, the free decay of the
+difference: C A^t (I - A^N)^-1 (x_0 - x_N). In periods shorter than about ten time constants it does not die out.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ class SlowPart:
 
 
 def slow_part(identified: Identified, radius: float) -> SlowPart | None:
-    """The relaxed poles beyond the radius; None where there are none. A pole at the limit of what the lines resolve is
+    """The relaxed poles outside the radius; None where there are none. A pole at the limit of the lines' resolution is
     left out, because its decay is not known."""
     fitted = identified.chosen.fitted
     sizes = np.abs(fitted.form.poles).reshape(2, -1).max(axis=0)

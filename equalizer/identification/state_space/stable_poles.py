@@ -1,6 +1,6 @@
 """Stabilisation of poles: inside the unit circle, and with a decay within a given time.
 
-A pole at 0.99999 leaves a fit over 5 to 35 Hz untouched and ruins the simulation in which the model is used.
+A pole at 0.99999 does not change a fit over 5 to 35 Hz, but makes simulations drift.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 Radius = float | FloatArray
-"""Of all pairs of poles, or one per pair."""
+"""Largest radius of all pairs of poles, or one per pair."""
 
 
 def largest_radius(longest_decay_s: float, sample_rate_hz: float) -> float:
@@ -18,7 +18,8 @@ def largest_radius(longest_decay_s: float, sample_rate_hz: float) -> float:
 
 
 def stabilise_poles(poles: ComplexArray | FloatArray, radius: Radius) -> ComplexArray:
-    """Unstable poles mirrored at the unit circle, then all within the radius; frequencies stay. poles: any shape."""
+    """Unstable poles are reflected at the unit circle, then all are moved inside the radius; frequencies stay. poles:
+    any shape."""
     size = np.abs(poles)
     wanted = np.minimum(np.where(size > 1, 1 / np.maximum(size, 1e-300), size), radius)
     return np.asarray(poles * wanted / np.maximum(size, 1e-300), dtype=np.complex128)

@@ -1,8 +1,8 @@
 """Poles and output shapes from a frequency response, by subspace identification in the frequency domain.
 
-After McKelvey, Akçay and Ljung (1996), with two changes that noisy data need: the unit circle is turned by an
-all-pass map until the band fills it, and block rows are made white before their singular values are compared. The
-horizon is short on purpose: the noise of a long one swamps the order that is looked for.
+After McKelvey, Akçay and Ljung (1996), with two changes that noisy data need: an all-pass map warps the frequency axis
+until the band fills the unit circle, and block rows are whitened before their singular values are compared. The horizon
+is short, because the noise of a long one hides the order.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Subspace:
 
 
 def default_horizon(order: int, outputs: int) -> int:
-    """Block rows: just enough to see the order, and a few to average over."""
+    """Block rows: just enough for the order, and a few more to average over."""
     return -(-order // outputs) + 3
 
 
@@ -45,7 +45,8 @@ def estimate_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> S
     zeta = (lines.z - c) / (1 - c * lines.z)
     powers = zeta[:, None] ** np.arange(horizon)
     p, m = lines.response.shape[1:]
-    # Noise is taken as a size per output times one per line and input: then columns can be scaled to equal noise.
+    # The noise is modelled as a factor per output times one per line and input: then columns can be scaled to equal
+    # noise.
     deviation = 1 / lines.weight
     of_output = np.exp(np.log(deviation).mean(axis=(0, 2)))
     of_column = np.exp(np.log(deviation / of_output[:, None]).mean(axis=1))
@@ -75,5 +76,5 @@ def poles_and_shapes(subspace: Subspace, order: int, radius: float) -> ModalForm
     evened = observed / np.tile(size, len(observed) // p)[:, None]
     shifted = np.linalg.lstsq(evened[:-p], evened[p:], rcond=None)[0]
     values, vectors = np.linalg.eig(shifted)
-    # B is fitted afterwards, so what the map does to C may be left to it.
+    # The map also changes B and D, which are fitted afterwards; C is kept.
     return from_poles(stabilise_poles((values + c) / (1 + c * values), radius), observed[:p] @ vectors)

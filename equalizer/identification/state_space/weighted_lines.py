@@ -19,7 +19,7 @@ class WeightedLines:
     """Measured responses, each with the inverse of its standard error as weight."""
 
     frequency_hz: FloatArray
-    """(lines,), rising; a frequency measured twice stands twice."""
+    """(lines,), rising; a frequency that was measured twice occurs twice."""
     response: ComplexArray
     """(lines, outputs, inputs)"""
     weight: FloatArray
@@ -76,7 +76,7 @@ def scatter_variance(response: ComplexArray) -> FloatArray:
     if len(response) < 3:
         return np.abs(response) ** 2
     second = np.diff(response, n=2, axis=0)
-    # A middle value rather than a mean: a sharp resonance is no noise. ln 2 is the median of a unit exponential.
+    # The median, which a sharp resonance does not change; ln 2 is the median of a unit exponential.
     typical = np.median(np.abs(second) ** 2, axis=0) / (6 * np.log(2))
     return np.asarray(np.broadcast_to(typical, response.shape), dtype=np.float64)
 
@@ -84,8 +84,9 @@ def scatter_variance(response: ComplexArray) -> FloatArray:
 def average_bins(
     lines: WeightedLines, bins: Sequence[slice], about: ComplexArray, centres: ComplexArray
 ) -> WeightedLines:
-    """Average the lines of each bin to one at its middle. The difference to a nearly right model is averaged (`about`:
-    its responses on `lines`, `centres`: at the bins' middles), so that resonances within a bin are not blunted."""
+    """Average the lines of each bin to one line at its centre. The difference from an approximate model is averaged
+    (`about`: its responses on `lines`, `centres`: at the bins' centres), so that resonances within a bin are not
+    blunted."""
     power = lines.weight**2
     difference = power * (lines.response - about)
     weight = np.array([power[part].sum(axis=0) for part in bins])
@@ -98,7 +99,7 @@ def bin_centres_hz(lines: WeightedLines, bins: Sequence[slice]) -> FloatArray:
 
 
 def group_lines(lines: WeightedLines, smallest: int, octave_share: float) -> tuple[slice, ...]:
-    """Slices of neighbouring lines: `smallest` at least, and as many as lie in that share of an octave."""
+    """Slices of neighbouring lines: at least `smallest` lines each, and all lines within that share of an octave."""
     edges, frequency = [0], lines.frequency_hz
     while edges[-1] < len(lines):
         start = edges[-1]

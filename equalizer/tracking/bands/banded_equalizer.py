@@ -1,6 +1,7 @@
 """Equalizer for arbitrary accelerations in three bands: rigid model, identified model, one degree of freedom above.
 
-Where one model covers all that is wanted, both edges can be left out: the same equalizer is then wide-band.
+Where one model covers the whole band of the wanted acceleration, both edges can be left out: the equalizer is then
+wide-band.
 """
 
 from dataclasses import dataclass, field, replace
@@ -31,12 +32,12 @@ from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 PADDING_S = 0.3
-"""Rest added before and after: a constant force gives no acceleration, so that the inverse begins early and ends
-late."""
+"""Zeros added before and after: the device does not answer a constant force with acceleration, so that its inverse
+starts early and ends late (non-causal)."""
 LOW_BAND_DECAYS = 6.0
-"""Time constants of the low band's slow return to rest that are played too: cut off sooner, it ends in a jolt."""
+"""Time constants of the low band's slow return to rest that are played too: cut off sooner, it ends with a jolt."""
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
-"""Below, forces drift where no model was identified; above, the level falls short."""
+"""Range of the force weight. Below, forces drift where no model was identified; above, the level falls short."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +49,7 @@ class LowBand:
 @dataclass(frozen=True, slots=True, eq=False)
 class HighBand:
     source: ResponseSource
-    """Of the device, over all of the high band"""
+    """Response of the device over the whole high band."""
     settings: HighBandSettings = field(default_factory=HighBandSettings)
     stylus: StylusActuator | None = None
 
@@ -57,12 +58,13 @@ class HighBand:
 class CapPolicy:
     cap_n: float
     constrain: bool = False
-    """False: forces above the cap are refused. True: the middle band is solved anew under what the others leave."""
+    """False: forces above the cap are refused. True: the middle band is solved again under the cap left by the other
+    bands."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedEqualizer:
-    """Raises ValueError where an edge has no model beyond it, or the weight is outside 1e-3 to 1e-2."""
+    """The equalizer. Raises ValueError where an edge has no model beyond it, or the weight is outside 1e-3 to 1e-2."""
 
     middle: IdentifiedModel
     split: LinearPhaseSplit | CausalSplit

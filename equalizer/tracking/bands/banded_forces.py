@@ -13,25 +13,26 @@ from equalizer.tracking.lqr.limits import Peaks
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedForces:
-    """Rows: the wanted ones, and the run-in and run-out around them; see `rows_of_wanted`."""
+    """Forces per row: the rows of the wanted acceleration, and the run-in and run-out around them; see
+    `rows_of_wanted`."""
 
     commands: FloatArray
-    """(N, m), N: what is sent, beside the rendered spring"""
+    """(N, m), N: commands, to which the rendered spring adds its force."""
     entering: FloatArray
-    """(N, m), N: what enters the device, with the spring's force"""
+    """(N, m), N: force that enters the device, the spring's included."""
     by_band: tuple[FloatArray, FloatArray, FloatArray]
     """(N, m) each: low, middle, high part of `entering`"""
     predicted: tuple[FloatArray, FloatArray, FloatArray]
-    """m/s², what each of them delivers: (N, p), by the high band's response where there is one, which also knows of
-    what the low and middle forces do outside their bands; else by its own model."""
+    """m/s², predicted acceleration of each band, (N, p): by the high band's response where there is one, which also
+    covers what the low and middle forces do outside their bands; else by each band's own model."""
     bands: Bands
-    """What was wanted of each"""
+    """The wanted acceleration of each band."""
     latency_samples: int
-    """By how much a row of `commands` is behind the wanted row it plays, when wanted rows come in one by one"""
+    """Samples by which `commands` lags the wanted rows when these arrive one by one."""
     peaks: Peaks | None
-    """Of `entering`; None without a cap"""
+    """Force peaks of `entering`; None without a cap."""
     loss: TrackingLoss | None
-    """What the cap cost in the middle band; None where nothing was constrained"""
+    """Loss of tracking in the middle band due to the cap; None where the cap did not act."""
     motion: SlowMotion | None
     high: HighBandForces | None
     stylus: StylusShare | None
@@ -42,5 +43,5 @@ class BandedForces:
         return self.predicted[0] + self.predicted[1] + self.predicted[2]
 
     def rows_of_wanted(self, samples: int) -> slice:
-        """The rows that go with the wanted ones, one to one, where all is known beforehand."""
+        """Slice of the rows that correspond to the wanted rows, where all are known beforehand."""
         return slice(self.latency_samples, self.latency_samples + samples)

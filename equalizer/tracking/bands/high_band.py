@@ -1,8 +1,9 @@
 """The high band: acceleration matching with one degree of freedom, along the direction that costs the least force.
 
-Above the limit of direction perception a person feels how strong a vibration is and hardly where it points. So what is
-wanted becomes one signal of the same spectral energy, and one direction of force plays it: each line is divided by the
-length of what the device answers there. Which direction is free, and is chosen so that the largest force is least.
+Above the limit of direction perception a person feels the strength of a vibration but hardly its direction. The wanted
+acceleration is therefore reduced to one signal of the same spectral energy and played along one direction of force:
+each line is divided by the norm of the device's response there. The direction is free, and that of the smallest peak
+force is chosen.
 """
 
 from dataclasses import dataclass
@@ -16,10 +17,11 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
-"""Of the force, against |G|²: below, noise at an antiresonance is inverted; above, weak lines fall short."""
+"""Weight of |force|² beside |G|²: a smaller one amplifies noise at antiresonances, with a larger one weak lines fall
+short."""
 WEIGHT = 1e-3
 DIRECTIONS = 64
-"""Of force, tried over the half sphere besides the axes."""
+"""Number of force directions tried over the half sphere besides the axes."""
 
 
 class ResponseSource(Protocol):
@@ -57,13 +59,13 @@ class MeasuredResponse:
 
 @dataclass(frozen=True, slots=True)
 class HighBandSettings:
-    """Raises ValueError for a weight outside 1e-3 to 1e-2."""
+    """Settings of the high band. Raises ValueError for a weight outside 1e-3 to 1e-2."""
 
     weight: float = WEIGHT
     shared: bool = True
     """Whether directions between the axes may be taken; False = a single axis."""
     causal: bool = False
-    """From the first row on and not before: the length is matched, the phase is the least there can be."""
+    """Causal: forces start with the first row. The magnitude is matched, with minimum phase."""
 
     def __post_init__(self) -> None:
         if not SMALLEST_WEIGHT <= self.weight <= LARGEST_WEIGHT:
@@ -77,9 +79,9 @@ class HighBandForces:
     direction: FloatArray
     """(m,), unit length, of the force"""
     peak_n: float
-    """Of these and the other forces together"""
+    """Peak of the sum of these and the other forces."""
     peak_by_axis_n: FloatArray
-    """(m,): what it would have been along each axis alone"""
+    """(m,): peak along each single axis, for comparison."""
 
 
 def reduce_to_one_dof(wanted: FloatArray) -> FloatArray:
@@ -87,7 +89,7 @@ def reduce_to_one_dof(wanted: FloatArray) -> FloatArray:
     et al., Dimensional reduction of high-frequency accelerations for haptic rendering, 2010)."""
     spectrum = np.fft.rfft(wanted, axis=0)
     length = np.linalg.norm(spectrum, axis=1)
-    # A sum over axes can vanish where two of them oppose; the stronger axis then says the phase.
+    # The sum over axes vanishes where two of them oppose; the phase is then that of the stronger axis.
     total = spectrum.sum(axis=1)
     strongest = np.take_along_axis(spectrum, np.abs(spectrum).argmax(axis=1)[:, None], axis=1)[:, 0]
     phase = np.angle(np.where(np.abs(total) > 1e-9 * length, total, strongest))
@@ -120,7 +122,7 @@ def high_band_forces(
     spectrum = np.fft.rfft(wanted, n)
     candidates = _candidate_directions(response.shape[2], settings.shared)
     played = [_invert_along(spectrum, n, response @ direction, settings) for direction in candidates]
-    # Which way round is not felt, but it matters beside the other forces.
+    # The sign of the direction is not felt, but it matters beside the other forces.
     ways = [sign * scalar[:, None] * d for scalar, d in zip(played, candidates, strict=True) for sign in (1.0, -1.0)]
     peaks = np.array([np.linalg.norm(forces + there, axis=1).max(initial=0.0) for forces in ways])
     best = int(peaks.argmin())
@@ -145,10 +147,10 @@ def _invert_along(spectrum: ComplexArray, n: int, answer: ComplexArray, settings
     length = np.linalg.norm(answer, axis=1)
     inverse = (length / (length**2 + settings.weight)).astype(np.complex128)
     if settings.causal:
-        # From twice the length, so that what the filter plays on does not wrap around to the start.
+        # At twice the length, so that the filter's decay does not wrap around to the start.
         return np.asarray(np.fft.irfft(spectrum * minimum_phase(inverse.real), n)[: n // 2])
     strongest = np.take_along_axis(answer, np.abs(answer).argmax(axis=1)[:, None], axis=1)[:, 0]
-    # The strongest axis comes in phase with what is wanted.
+    # The strongest axis is in phase with the wanted signal.
     return np.asarray(np.fft.irfft(spectrum * inverse * np.exp(-1j * np.angle(strongest)), n))
 
 

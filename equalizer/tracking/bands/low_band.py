@@ -1,8 +1,8 @@
 """The low band: a slow motion is planned, and its forces follow from the inverse dynamics of a rigid model.
 
-The handle is rendered in a closed loop there: springs, walls and their forces answer to where it is. Playback is
-superposed on that, so what is added is the model's force along the planned motion less what the rendered spring will
-do along it by itself.
+In this band the environment is rendered in a closed loop: the forces of springs and walls depend on the handle's
+position. Playback is superposed, so the added force is the model's force along the planned motion less that of the
+rendered spring.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from equalizer.tracking.bands.rigid_model import RigidModel
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
 CORNER_HZ = 0.5
-"""High-pass corner: a lasting acceleration would move the handle out of its workspace."""
+"""High-pass corner: a constant acceleration would move the handle out of its workspace."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,20 +25,20 @@ class SlowMotion:
     position_m: FloatArray
     velocity_m_s: FloatArray
     acceleration: FloatArray
-    """m/s²: what is really played of the wanted one."""
+    """m/s²: the high-passed acceleration that is played."""
 
     @property
     def travel_m(self) -> float:
-        """Farthest from the place it starts at."""
+        """Largest distance from the starting position."""
         return float(np.linalg.norm(self.position_m, axis=1).max(initial=0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LowBandForces:
     total: FloatArray
-    """(N, m), N: what must enter the device along the motion"""
+    """(N, m), N: force that must enter the device along the motion."""
     superposed: FloatArray
-    """(N, m), N: what is added to the rendered spring's force to give `total`"""
+    """(N, m), N: command; with the rendered spring's force it gives `total`."""
     motion: SlowMotion
 
 

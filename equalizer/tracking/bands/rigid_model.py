@@ -12,13 +12,13 @@ WORST_CONDITION = 1e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidModel:
-    """Each matrix is (m, m). Raises ValueError where they do not fit each other."""
+    """Matrices (m, m). Raises ValueError for inconsistent shapes."""
 
     mass_kg: FloatArray
     damping_n_s_per_m: FloatArray
     stiffness_n_per_m: FloatArray
     delay_s: float = 0.0
-    """From a command to the acceleration it gives, beyond the hold's half sample."""
+    """Delay from a command to its acceleration, beyond the half sample of the hold."""
 
     def __post_init__(self) -> None:
         shapes = {np.shape(part) for part in (self.mass_kg, self.damping_n_s_per_m, self.stiffness_n_per_m)}
@@ -38,8 +38,8 @@ def fit_rigid_model(
     """Fit a rigid model by least squares on the relative error of the force, line by line.
 
     frequency_hz: (lines,), above zero, below the first resonance; response: (lines, m, m), m/s² per N, sampled as
-    recordings are. delay_s is not fitted: so low it cannot be told from damping and mass. Raises ValueError with fewer
-    than two lines or an input that moves nothing.
+    recordings are. delay_s is not fitted: at low frequencies it cannot be distinguished from damping and mass. Raises
+    ValueError with fewer than two lines or an input that moves nothing.
     """
     frequency_hz = np.asarray(frequency_hz, dtype=np.float64)
     if len(frequency_hz) < 2 or not (frequency_hz > 0).all():

@@ -1,4 +1,4 @@
-"""A separate actuator at the stylus, which takes the highest frequencies off the motors."""
+"""A separate actuator at the stylus, which plays the highest frequencies in place of the motors."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,14 @@ from equalizer.tracking.bands.high_band import WEIGHT
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StylusActuator:
-    """Raises ValueError where its numbers cannot be."""
+    """Response and limits of the actuator. Raises ValueError for impossible numbers."""
 
     frequency_hz: FloatArray
     """(lines,), rising: where its response was measured. Nothing is sent to it outside."""
     response: ComplexArray
     """(lines,): acceleration of the stylus (m/s²) per unit of its command"""
     from_hz: float
-    """It takes over here, at half amplitude; the motors play what is below."""
+    """Crossover frequency, at half amplitude; the motors play what is below."""
     limit: float
     """Largest command, in its unit."""
     transition_hz: float = 20.0
@@ -38,11 +38,11 @@ class StylusShare:
     command: FloatArray
     """(N,), in the actuator's unit"""
     played: FloatArray
-    """(N,), m/s²: what the command gives, by the response"""
+    """(N,), m/s²: predicted acceleration of the command."""
     motors: FloatArray
-    """(N,), m/s²: what is left to the motors. With `taken` it adds up to what is wanted."""
+    """(N,), m/s²: the motors' share; the sum with `taken` is the wanted acceleration."""
     taken: FloatArray
-    """(N,), m/s²"""
+    """(N,), m/s²: the actuator's share."""
 
 
 def share_with_stylus(wanted: FloatArray, sample_rate_hz: float, stylus: StylusActuator) -> StylusShare:

@@ -1,10 +1,9 @@
 """Compensation of known nonlinear effects: their forces along the planned motion are added to the feedforward.
 
 A linear model that was identified on a device with friction has an equivalent of that friction in it, and friction
-added on top would be counted twice: worse than none. Best is to identify on recordings freed of the effects
+added on top would be counted twice: worse than none. It is best to identify on recordings without the effects
 (`subtract_effects`). Where only a model is at hand, the equivalent for a sinusoid of the identification's amplitude is
-subtracted. That is an approximation: an axis that hardly moved while another was swept was stuck, which this equivalent
-does not describe.
+subtracted. This is an approximation: it does not describe an axis that stuck while another was swept.
 """
 
 from collections.abc import Iterator
@@ -32,22 +31,22 @@ from equalizer.tracking.feedforward.planned_motion import PlannedMotion, planned
 from equalizer.tracking.learning.iteration import largest_share
 
 SLIP_SHARE = 0.05
-"""Velocity below which a friction force changes sign smoothly, over the axis' rms velocity. A smaller share would
-chatter with the plan's own error about zero velocity; a larger one would miss the force that is there."""
+"""Velocity below which a friction force changes sign smoothly, relative to the axis's rms velocity. A smaller one would
+make the force chatter with errors of the planned velocity about zero; a larger one would compensate too little."""
 
 LEAST_SPEED = 1e-9
-"""Velocity of an axis that stood still in an identification, m/s, which keeps divisions finite."""
+"""Velocity (m/s) assumed for an axis that did not move in the identification, which keeps divisions finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compensation:
     forces: FloatArray
-    """(N, m): to be played instead of those given"""
+    """(N, m): forces to play instead of the given ones."""
     used: tuple[ModelEffect, ...]
     not_used: tuple[tuple[ModelEffect, str], ...]
-    """With the reason."""
+    """Effects that are not compensated, with the reason."""
     share: float
-    """Of the compensation that fitted under the cap; 1 = all."""
+    """Share of the compensation that fits under the cap; 1 = all."""
 
 
 def compensate(
@@ -90,8 +89,8 @@ def compensate(
 
 
 def along_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion:
-    """motion: as the responses count it. As the driven axes do, along which the effects act: they point where their
-    commands push, which is the other way where a model's input or output says so."""
+    """Motion along the driven axes, on which the effects act, from that counted by the responses: the signs differ
+    where a model's input or output matrix says so."""
     seen = physics.output @ driven_axes(physics)
     columns = motion.position.shape[1]
     if min(seen.shape) < columns:
@@ -174,7 +173,7 @@ def _is_force(effect: ModelEffect) -> bool:
 def _compensate_command_map(
     law: FoundLaw, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
 ) -> None:
-    """Add in place what makes the force behind a command map the intended one."""
+    """Change the forces in place so that the force behind a command map is the intended one."""
     if identified_with_n is not None:
         played[:, axis] *= linear_share(law, identified_with_n)
     meant = played[:, axis] + added[:, axis]
@@ -184,7 +183,7 @@ def _compensate_command_map(
 def _compensate_deadband(
     width: float, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
 ) -> None:
-    """Add in place what makes the force behind the dead band the intended one."""
+    """Change the forces in place so that the force behind the dead band is the intended one."""
     if identified_with_n is not None:
         played[:, axis] *= deadband_share(width, identified_with_n)
     meant = played[:, axis] + added[:, axis]

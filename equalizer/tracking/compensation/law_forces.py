@@ -17,7 +17,7 @@ MOTION = ("", "v", "a")
 TABLE, REACH = 2001, 2.0
 """Samples of a command map's table, and its range over the largest intended force."""
 PLAYED = 1000.0
-"""Sample rate at which a law without memory is evaluated; of no consequence, Hz."""
+"""Sample rate (Hz) at which a law without memory is evaluated; any value gives the same result."""
 COMMANDS = "it hangs on the command, which a compensation would change"
 REMEMBERS = "it remembers what was commanded, so no command by itself undoes it"
 SEVERAL = "it hangs on several commands or on the time"
@@ -62,7 +62,7 @@ def single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceAgain
         still = np.zeros((len(x), len(letters)))
         motion = PlannedMotion(still, still.copy(), still.copy())
         motion.position[:, axis], motion.velocity[:, axis], motion.acceleration[:, axis] = x, v, -(wave**2) * x
-        # Two cycles are given.
+        # The samples are two cycles, so that memory has settled in the second.
         return compensating_force(law, letters, motion, len(x) / 2 * wave / (2 * np.pi), slip)
 
     return against

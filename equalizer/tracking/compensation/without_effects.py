@@ -1,8 +1,8 @@
-"""Subtraction of known effects from a recording: their forces along the measured motion are taken off the commands. A
-model identified from it describes the linear rest, and `compensate` then adds the effects as a whole.
+"""Subtraction of known effects from a recording: their forces along the measured motion are subtracted from the
+commands. A model identified from the result describes the linear part, and `compensate` then adds the complete effects.
 
-An axis that sticks shows no motion to compute a force from: this works on recordings in which all axes move all the
-time (multisines on all of them, well above friction), and not where one axis is swept after the other.
+The force of an axis that sticks cannot be computed from its motion: all axes must move all the time (multisines on all
+axes, well above friction), which excludes sweeps of one axis after the other.
 """
 
 from dataclasses import replace
@@ -23,13 +23,14 @@ from equalizer.tracking.compensation.known_physics import (
 from equalizer.tracking.feedforward.planned_motion import planned_motion
 
 HIGHEST_SHARE = 3.0
-"""Upper end of the motion's band over that of the excitation, because friction has harmonics; and likewise below."""
+"""Upper end of the motion's band over that of the excitation, because friction has harmonics; and its lower end
+likewise."""
 LOWEST_SHARE = 0.75
 
 
 def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz: tuple[float, float]) -> Recording:
-    """The response must be the acceleration, axis by axis with the commands. excited_hz: where the commands have their
-    power. The excitation is left as it was. Raises ValueError for another response, missing samples, unknown axes."""
+    """The response must be the acceleration, axis by axis with the commands. excited_hz: band of the commands' power.
+    The excitation is not changed. Raises ValueError for another response, missing samples, unknown axes."""
     inputs, outputs = recording.command.channels, recording.response.channels
     if recording.response.quantity != "acceleration" or len(inputs) != len(outputs):
         raise ValueError(

@@ -5,13 +5,13 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 LOW_EDGE, HIGH_EDGE = 0.9, 1.06
-"""Raised-cosine edges from these shares of the band's ends to its ends: a sharp edge would ring for seconds."""
+"""Raised-cosine edges: relative frequencies at which they begin; a sharp edge would ring for seconds."""
 QUIET_S = 1.0
 """Zeros appended to the record, so that its end does not wrap around to its beginning."""
 
 
 def band_part(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
-    """Part of samples (N, channels) within the band. They begin and end at rest, or are noise."""
+    """Part of samples (N, channels) within the band. The samples must begin and end at rest, or be noise."""
     length = padded_length(len(samples), sample_rate_hz)
     lines = np.fft.rfft(samples, length, axis=0)
     share = band_share(np.asarray(np.fft.rfftfreq(length, 1 / sample_rate_hz), dtype=np.float64), band_hz)

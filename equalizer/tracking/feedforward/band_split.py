@@ -1,8 +1,8 @@
 """Complementary filters: a signal split into a low, a middle and a high band that add up to it again.
 
-The split comes before anything is solved: a model says nothing outside its band, and where the device is loud there,
-a little content outside is much error. Two forms: symmetric filters, steep and without phase error but late, for what
-is known beforehand; causal ones, without latency but shallow, for what begins at a contact.
+The split comes before the forces are solved for: a model is not valid outside its band, and where the device's gain is
+high there, a little content outside causes a large error. Two forms: symmetric filters, steep and without phase error
+but late, for what is known beforehand; causal ones, without latency but shallow, for what begins at a contact.
 """
 
 from dataclasses import dataclass
@@ -22,10 +22,11 @@ CAUSAL_ORDER = 3
 
 @dataclass(frozen=True, slots=True)
 class BandEdges:
-    """Where the bands meet, equally loud there. None = no such band; its neighbour reaches to the end."""
+    """Crossover frequencies, at which both bands have equal gain. None = no such band; its neighbour extends to the
+    end."""
 
     low_hz: float | None = 4.0
-    """One hertz under the middle band, so that all of the band is the model's."""
+    """By default one hertz below the model's band (5 Hz), so that the model plays the whole band."""
     high_hz: float | None = 36.0
 
     def __post_init__(self) -> None:
@@ -39,7 +40,7 @@ class BandEdges:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bands:
-    """All of one shape. low + middle + high is the input, `latency_samples` later."""
+    """Three arrays of one shape; low + middle + high is the input, delayed by `latency_samples`."""
 
     low: FloatArray
     middle: FloatArray
@@ -53,12 +54,13 @@ class Bands:
 
 @dataclass(frozen=True, eq=False)
 class LinearPhaseSplit:
-    """Symmetric filters: no phase error, each sample `latency_ms` late, and content spreads that far either way."""
+    """Symmetric (linear-phase) filters: no phase error, but a latency of `latency_ms`, and content spreads by it both
+    ways."""
 
     edges: BandEdges
     sample_rate_hz: float
     transition_hz: float = 2.0
-    """Width of each crossover; it sets the latency."""
+    """Width of each crossover; it determines the latency."""
 
     def __post_init__(self) -> None:
         _check_rate(self.edges, self.sample_rate_hz)
@@ -99,7 +101,7 @@ class LinearPhaseSplit:
         return Bands(low, late - low - high, high, self.latency_samples)
 
     def response(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, 3): of low, middle and high, without the latency; real."""
+        """(lines, 3): real gains of low, middle and high, without the latency."""
         turned = np.exp(2j * np.pi * np.asarray(frequency_hz) * self.latency_samples / self.sample_rate_hz)
         parts = [freqz(taps, worN=frequency_hz, fs=self.sample_rate_hz)[1] for taps in self.filters]
         return np.asarray(np.stack(parts, axis=1) * turned[:, None])
@@ -112,12 +114,12 @@ class LinearPhaseSplit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CausalSplit:
-    """Complementary filters that add up to the input at once. Each band has a phase, see `phase_deg`.
+    """Complementary causal filters that add up to the input without delay. Each band has a phase, see `phase_deg`.
 
-    With q a lowpass of one pole, (q + (1 - q))^order is 1: the half of its terms with the higher powers of 1 - q is
-    the band above the crossover, the rest what is below. Steep bands that add up to the input overlap and partly
-    cancel near a crossover, where each exceeds the input: see `largest_gain`. That price is high: the bands' own errors
-    no longer cancel. Where a wide-band model is known, playing it without a split is better from a contact on.
+    With q a low pass of one pole, (q + (1 - q))^order is 1: the terms with the higher powers of 1 - q are the band
+    above the crossover, the others the band below. Steep bands that add up to the input overlap and partly cancel near
+    a crossover, where each exceeds the input (`largest_gain`), so that errors of single bands no longer cancel. With a
+    wide-band model, playing without a split is better from a contact on.
     """
 
     edges: BandEdges
@@ -146,19 +148,19 @@ class CausalSplit:
         return Bands(low, rest - low, high, 0)
 
     def response(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, 3): of low, middle and high; they add up to 1."""
+        """(lines, 3): complex gains of low, middle and high; their sum is 1."""
         nothing = np.zeros(len(frequency_hz), complex)
         high = self._gain_above(self.edges.high_hz, frequency_hz) if self.edges.high_hz else nothing
         low = (1 - high) * (1 - self._gain_above(self.edges.low_hz, frequency_hz)) if self.edges.low_hz else nothing
         return np.asarray(np.stack([low, 1 - low - high, high], axis=1))
 
     def phase_deg(self, frequency_hz: FloatArray) -> FloatArray:
-        """(lines, 3): by how much each band leads (+) or lags (-) the input there."""
+        """(lines, 3): phase lead (+) or lag (-) of each band against the input."""
         return np.asarray(np.degrees(np.angle(self.response(frequency_hz))))
 
     @property
     def largest_gain(self) -> float:
-        """Of any band at any frequency."""
+        """Largest gain of any band at any frequency."""
         lines = np.geomspace(0.05, 0.499 * self.sample_rate_hz, 2000)
         return float(np.abs(self.response(lines)).max())
 

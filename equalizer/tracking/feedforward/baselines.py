@@ -18,13 +18,13 @@ from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, inverse_resp
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inverse:
-    """Forces per wanted acceleration."""
+    """Matrix from wanted accelerations to forces, line by line."""
 
     name: str
     response: ComplexArray
     """(lines, m, p)"""
     multiply_adds: int
-    """Per sample of all channels."""
+    """Multiply-adds per sample for all channels."""
 
 
 def no_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
@@ -33,7 +33,7 @@ def no_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
 
 
 def static_gain(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """A common gain for all axes, which makes their geometric mean over the lines right."""
+    """A common gain for all axes, for which the geometric mean of the delivered level over the lines is right."""
     along = np.abs(np.einsum("lii->li", model_response(model, frequency_hz)))
     gain = float(np.exp(-np.log(along).mean()))
     return Inverse(
@@ -51,7 +51,7 @@ def acceleration_matching(model: IdentifiedModel, frequency_hz: FloatArray) -> I
 
 
 def rigid_body(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """Mass, damping and stiffness matrices, fitted so that the forces they ask for give what is wanted over the given
+    """Mass, damping and stiffness matrices, fitted so that their forces give the wanted acceleration over the given
     lines: force = M a + B v + K x."""
     G = model_response(model, frequency_hz)
     lines, p, m = G.shape
@@ -69,8 +69,8 @@ def rigid_body(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
 
 
 def raw_estimate(measured: FrequencyResponse, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
-    """The measured response itself, between its lines linear in the complex plane. Cost: a filter as long as one
-    period of the finest line. Raises ValueError for frequencies outside the lines."""
+    """The measured response itself, interpolated linearly between its lines. Cost: a filter as long as one period of
+    the finest line. Raises ValueError for frequencies outside the lines."""
     lines = measured.of_lines(measured.reliable)
     low, high = (lines.frequency_hz[0], lines.frequency_hz[-1]) if len(lines) else (np.inf, -np.inf)
     if not len(lines) or frequency_hz.min() < low or frequency_hz.max() > high:

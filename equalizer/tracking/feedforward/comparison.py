@@ -27,7 +27,7 @@ class ComparisonRow:
     where: str
     quality: Quality
     multiply_adds: int
-    """Per sample."""
+    """Multiply-adds per sample."""
 
 
 def baseline_inverses(

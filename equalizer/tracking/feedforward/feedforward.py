@@ -1,7 +1,7 @@
 """Feedforward forces for a wanted acceleration: band-limited, tracked by a model from the first row on, under a cap.
 
-What lies outside the band is not played: a model says nothing there, and where the device is loud a little of it would
-be much error. How much that is, is stated. Forces go one to one with the rows of what is wanted, from rest.
+The part of the wanted acceleration outside the band is not played, because the model is not valid there; its share is
+stated. There is one row of forces per row of the wanted acceleration, from rest.
 """
 
 from dataclasses import dataclass
@@ -24,11 +24,11 @@ from equalizer.tracking.lqr.tracking_problem import (
 )
 
 EDGE_ROOM_HZ = 1.0
-"""Beyond the model's band, so that all of it is played."""
+"""Margin beyond the model's band, so that the whole band is played."""
 LEAKED = 3e-3
 """Share of a signal that filters leak from outside the band: less than that inside the band counts as nothing."""
 NO_CAP_N = 1e9
-"""A cap that never acts, for forces that are checked later as a sum."""
+"""A cap that never acts, for forces whose sum is checked later."""
 PROVED = 1e-3
 """Relative duality gap to which forces under the cap are solved."""
 
@@ -38,7 +38,7 @@ class FeedforwardSettings:
     weight: float = 1e-3
     cap_n: float = 3.0
     constrain: bool = False
-    """Above the cap: False refuses, True solves anew under it and states the loss."""
+    """Above the cap: False refuses; True solves again under the cap and states the loss."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
@@ -46,13 +46,13 @@ class Feedforward(Summarised):
     forces: Signal
     """(N, m)"""
     wanted: FloatArray
-    """(N, p): what is played of what was wanted, its part within the band"""
+    """(N, p): the part of the wanted acceleration within the band, which is played."""
     predicted: FloatArray
-    """(N, p): what the model answers"""
+    """(N, p): the model's response."""
     error: float
-    """Of predicted against wanted, relative, in the band"""
+    """Relative rms error of predicted against wanted acceleration, in the band."""
     left_out: float
-    """Share of what was wanted that lies outside the band, 0 to 1, of its root mean square"""
+    """Rms share of the wanted acceleration that is outside the band, 0 to 1."""
     peaks: Peaks
     loss: TrackingLoss | None = None
 
@@ -70,7 +70,7 @@ class Feedforward(Summarised):
 
 
 def feedforward(model: IdentifiedModel, wanted: Signal, settings: FeedforwardSettings | None = None) -> Feedforward:
-    """The forces that make the model accelerate as wanted, within the band that it was identified in.
+    """Solve for the forces for which the model accelerates as wanted, within its band.
 
     Finite-horizon LQR tracking from rest, which equals the least squares of the block-Toeplitz response with a weight
     on the forces. wanted: (N, p), with the model's rate and output channels. Raises ForceLimitError above the cap,
@@ -105,7 +105,7 @@ def extract_band(model: IdentifiedModel, wanted: FloatArray) -> FloatArray:
 
 
 def band_edges(model: IdentifiedModel) -> BandEdges:
-    """Edges of a model's band with room beside it; None where the band reaches to the end."""
+    """Edges of a model's band with a margin; None where the band reaches zero or half the sample rate."""
     low, high = model.band_hz
     nyquist = model.sample_rate_hz / 2
     return BandEdges(

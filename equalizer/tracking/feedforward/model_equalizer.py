@@ -1,4 +1,4 @@
-"""Equalizer by an identified model: stimuli are wanted accelerations, and so is their onset."""
+"""Equalizer by an identified model: stimuli and their onsets are wanted accelerations."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,7 +15,7 @@ from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracki
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelEqualizer:
-    """Raises ValueError for an unstable model."""
+    """An equalizer of one model. Raises ValueError for an unstable model."""
 
     model: IdentifiedModel
     spring: VirtualSpring = NO_SPRING
@@ -38,8 +38,8 @@ class ModelEqualizer:
         return periodic_command(self.model, wanted, self.weight, self.spring)
 
     def onset(self, wanted: Signal, envelope: FloatArray) -> Signal:
-        """From rest into the loop without a transient after it: the final state's deviation from the loop's is weighted
-        by the observability Gramian."""
+        """Command from rest into the loop, without a transient afterwards: the deviation of the final state from the
+        loop's is weighted by the observability Gramian."""
         T, n = len(envelope), len(wanted)
         gains = _onset_gains(self.model, self.weight, T)
         loop = periodic_command(self.model, wanted, self.weight)
@@ -50,7 +50,7 @@ class ModelEqualizer:
         return Signal(forces - self._spring_during_onset(wanted, loop, envelope), *_force_properties(loop))
 
     def _spring_during_onset(self, wanted: Signal, loop: Signal, envelope: FloatArray) -> FloatArray:
-        """The spring's own force, which rises with the same envelope as the motion."""
+        """Force of the spring, which rises with the same envelope as the motion."""
         alone = loop.samples - self.periodic(wanted).samples
         ticks = np.arange(len(envelope)) % len(wanted)
         spring: FloatArray = envelope[:, None] * alone[ticks]

@@ -9,15 +9,15 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
 WEIGHT = 1e-4
-"""Weight of |force|² against |acceleration error|²: costs a thousandth of a decibel where the device answers 1 m/s² per
-N, and keeps the force finite where it hardly answers."""
+"""Weight of |force|² against |acceleration error|²: costs a thousandth of a decibel where the device's gain is 1 m/s²
+per N, and keeps the force finite at antiresonances."""
 
 EMPTY = 1e-9
-"""Lines below this share of the largest one are rounding."""
+"""Lines below this share of the largest one count as rounding."""
 
 
 class OutsideBandError(ValueError):
-    """Something is wanted at a frequency outside the model's band."""
+    """The wanted signal has content outside the model's band."""
 
 
 def inverse_response(

@@ -1,4 +1,4 @@
-"""Motion of the handle for a delivered acceleration: its integrals within a band, about the resting place."""
+"""Motion of the handle for a delivered acceleration: its integrals within a band, about the equilibrium."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ class PlannedMotion:
     """(N, p) each: m, m/s, m/s²; or rad and its rates."""
 
     position: FloatArray
-    """From the resting place; what moves slower than the band is not in it."""
+    """Position relative to the equilibrium; components below the band are not included."""
     velocity: FloatArray
     acceleration: FloatArray
 
@@ -21,17 +21,15 @@ class PlannedMotion:
 def planned_motion(
     wanted: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float], lead_s: float = 0.0
 ) -> PlannedMotion:
-    """Motion for wanted accelerations (N, p) that begin and end at rest. lead_s: how far ahead of the rows it is taken.
-
-    Raises ValueError for a band from zero on: a constant acceleration has no motion about a resting place.
-    """
+    """Motion for wanted accelerations (N, p) that begin and end at rest. lead_s: time by which the motion is advanced.
+    Raises ValueError for a band that begins at zero: a constant acceleration has no bounded motion."""
     if band_hz[0] <= 0:
         raise ValueError(f"the band begins at {band_hz[0]:g} Hz; a motion about a resting place needs more than 0 Hz")
     length = padded_length(len(wanted), sample_rate_hz)
     lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate_hz), dtype=np.float64)
     s = 2j * np.pi * lines_hz
     share = band_share(lines_hz, band_hz) * np.exp(s * lead_s)
-    s[0] = 1.0  # of no consequence: nothing of it lies in the band
+    s[0] = 1.0  # any finite value: the band has no gain there
     spectrum = np.fft.rfft(wanted, length, axis=0) * share[:, np.newaxis]
 
     def integrate(times: int) -> FloatArray:

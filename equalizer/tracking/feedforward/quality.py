@@ -9,14 +9,14 @@ from equalizer.signals.lockin import ComplexArray
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """Worst over all lines. What is perfect is 0 dB, -infinity dB, 0 degrees."""
+    """Worst values over all lines; perfect are 0 dB, -infinity dB, 0 degrees."""
 
     flatness_db: float
-    """Largest deviation of a wanted axis from the wanted level, either way."""
+    """Largest deviation of the delivered level along a wanted axis, in either direction."""
     coupling_db: float
     """Largest off-axis response over the response along the wanted axis."""
     axis_error_deg: float
-    """Largest angle between the wanted axis and the long axis of what is played."""
+    """Largest angle between the wanted axis and the major axis of the delivered ellipse."""
 
 
 def quality(delivered: ComplexArray) -> Quality:
@@ -30,7 +30,7 @@ def quality(delivered: ComplexArray) -> Quality:
 
 
 def _axis_error_deg(played: ComplexArray, axis: int) -> float:
-    """played: (lines, p): the ellipse that a wanted sinusoid along `axis` becomes."""
+    """played: (lines, p): the ellipse delivered for a wanted sinusoid along `axis`."""
     worst = 0.0
     for phasor in played:
         ellipse = np.column_stack([phasor.real, phasor.imag])

@@ -33,18 +33,18 @@ class TableKind:
 TRAJECTORY = TableKind("trajectory", ("time_s", "ax", "ay", "az"), "acceleration", "m/s^2")
 FORCES = TableKind("forces", ("time_s", "fx", "fy", "fz"), "force", "N")
 TRANSIENT = TableKind("transient", ("time_s", "a"), "acceleration", "m/s^2")
-"""Acceleration along one direction, which is decided when it is played."""
+"""Acceleration along one direction, which is chosen when it is played."""
 TABLE_KINDS = (TRAJECTORY, FORCES, TRANSIENT)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """Samples at a constant rate. What happens before the first and after the last is not part of it."""
+    """Samples at a constant rate, undefined before the first and after the last."""
 
     signal: Signal
     """(n, 3): acceleration (m/s²) wanted, or force (N) commanded; (n, 1) for a transient."""
     start_s: float = 0.0
-    """Time of the first row, so that forces can keep the times of what they play."""
+    """Time of the first row, so that forces can have the same times as the accelerations."""
 
     @property
     def kind(self) -> TableKind:

@@ -1,7 +1,7 @@
 """The virtual spring that holds the handle at its place, and its share in the forces that are played.
 
-A model goes from the force that enters the plant to what comes out. Where a spring adds to the commands, they must
-leave to it what it will do along the planned motion: u = f - s, with the spring's force s = -(k x + b v).
+A model's input is the total force that enters the plant. Where a spring adds to the commands, its force along the
+planned motion is subtracted from them: u = f - s, with s = -(k x + b v).
 """
 
 import math
@@ -25,7 +25,8 @@ class VirtualSpring:
                 raise ValueError(f"{name} is {value}; it must be a number that is not negative")
 
     def force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines,), N per m/s², of a handle that swings at these frequencies, all above zero."""
+        """(lines,), N per m/s²: force of the spring on a handle that oscillates at these frequencies, all above
+        zero."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)
         return np.asarray(-(self.stiffness_n_per_m + self.damping_n_s_per_m * s) / s**2)
 

@@ -1,7 +1,7 @@
 """Convergence test of iterative learning control, before anything is played.
 
-Forces that are corrected by u <- u + beta Gm⁻¹ e leave the error (I - beta G Gm⁻¹) e on a linear device: at every
-line its largest singular value says how much of an error survives, at worst, in any direction.
+Forces that are corrected by u <- u + beta Gm⁻¹ e leave the error (I - beta G Gm⁻¹) e on a linear device: its largest
+singular value at a line is the worst-case share of the error that remains.
 """
 
 from dataclasses import dataclass
@@ -15,12 +15,13 @@ from equalizer.signals.signal import FloatArray
 @dataclass(frozen=True, slots=True, eq=False)
 class Convergence:
     frequency_hz: FloatArray
-    """(lines,): of the band alone."""
+    """(lines,): frequencies within the band."""
     surviving: FloatArray
     """(lines,): largest singular value of I - beta G Gm⁻¹; of the worst response where several were given."""
     beta: float
     safe_beta: float
-    """Below it every error shrinks at every line, in any direction; 0 where no gain does that. At most 2."""
+    """Largest gain with which every error decreases at every line, in any direction; 0 where there is none. At most
+    2."""
 
     @property
     def converges(self) -> bool:

@@ -1,13 +1,13 @@
 """Iterative learning control: play, measure, correct the forces, until only noise is left.
 
-    u <- u + beta L(band(r - y)),  L the model's inverse
+    u <- u + beta L(band(r - y)),  L: inverse of the model
 
-The correction is the error's share that is not noise, 1 - (noise / residual)²: all of a large error, less and less near
-the noise floor, so that noise is not learned (with a fixed gain it is, and good first forces get worse). The gain falls
-as 1, 1/2, 1/3 ... with every repeat that increased the error; the best forces are kept.
+The correction is the error's share that is not noise, 1 - (noise / residual)²: nearly all of a large error, less near
+the noise floor, so that noise is not learned (with a fixed gain it is, and good initial forces get worse). The gain
+falls as 1, 1/2, 1/3 ... with every repeat that increased the error; the best forces are kept.
 
-At the ends of the record nothing is corrected: an inverse that cannot act before the first row answers an error there
-with an impulse; a handle at rest sticks and is not moved by it, so that it would grow with every repeat.
+At the ends of the record nothing is corrected. An inverse that cannot act before the first row would respond to an
+error there with an impulse; a handle that sticks would not move, and the impulse would grow with every repeat.
 """
 
 from collections.abc import Callable
@@ -23,14 +23,14 @@ Invert = Callable[[FloatArray], FloatArray]
 """From wanted accelerations (N, p) to forces (N, m); linear, one row to one."""
 
 SURE = 3.0
-"""Standard deviations by which a residual must stand above the noise floor to be more than noise."""
+"""Standard deviations above the noise floor from which a residual is more than noise."""
 WORSE, DIVERGED = 1.1, 2.0
-"""Residual over the best one: beyond the first the next correction starts from the best forces again, beyond the
-second it is called diverging."""
+"""Ratio of a residual to the best one: above the first, the next correction starts from the best forces again; above
+the second, the iteration counts as diverging."""
 LOWEST_GAIN = 0.03
-"""Gains below it change nothing that could be measured."""
+"""Gains below it make no measurable change."""
 EDGE_S = 0.03
-"""Over which corrections are faded at either end of the record."""
+"""Time over which corrections are faded at either end of the record."""
 
 
 class Verdict(Enum):
@@ -45,21 +45,22 @@ class Repetition:
     """Settings of an iteration, the same for all repeats."""
 
     wanted: FloatArray
-    """(N, p): begins and ends at rest, with time for the forces to act before and after."""
+    """(N, p): begins and ends at rest, with time for non-causal forces before and after."""
     invert: Invert
     sample_rate_hz: float
     band_hz: tuple[float, float]
     first_gain: float = 1.0
-    """Below the `safe_beta` of `convergence`."""
+    """Gain of the first correction; below the `safe_beta` of `convergence`."""
     noise_floor: float | None = None
-    """Of one play, rms in the band, in the unit of `wanted`; None = the first two plays are alike and tell it."""
+    """Noise of one play, rms in the band, in the unit of `wanted`; None = estimated from the first two plays, which use
+    the same forces."""
     cap: float | None = None
     """Largest length of a force, N."""
     slew: float | None = None
-    """Largest change of a force, N/s. The first forces are not held to it: it bounds what corrections add."""
+    """Largest change of a force, N/s, by the corrections; the first forces are not limited by it."""
     judged: tuple[int, int] | None = None
-    """First row and the one behind the last that residuals are taken over; None = all. What lies outside is corrected
-    too, but where a handle sticks after the motion no force within reason is the right one."""
+    """First row and the one behind the last over which residuals are computed; None = all. Other rows are corrected
+    too, but no reasonable force is right where a handle sticks after the motion."""
 
     def residual(self, missing: FloatArray) -> float:
         """rms over the judged rows."""
@@ -68,7 +69,7 @@ class Repetition:
 
     @property
     def level(self) -> float:
-        """Root mean square of the wanted part in the band, over the judged rows."""
+        """Root mean square of the wanted signal in the band, over the judged rows."""
         return self.residual(self.part(self.wanted))
 
     def part(self, samples: FloatArray) -> FloatArray:
@@ -76,7 +77,7 @@ class Repetition:
 
     @property
     def degrees_of_freedom(self) -> float:
-        """Independent numbers in the judged rows' part in the band."""
+        """Degrees of freedom of the judged rows in the band."""
         low, high = self.band_hz
         start, stop = self.judged or (0, len(self.wanted))
         return float(2 * (high - low) * (stop - start) * self.wanted.shape[1] / self.sample_rate_hz)
@@ -99,31 +100,32 @@ class Repetition:
 class IterationState:
     repetition: Repetition
     forces: FloatArray
-    """(N, m): to be played next; with a verdict other than CONTINUE the best ones."""
+    """(N, m): forces to play next; with a verdict other than CONTINUE the best ones."""
     verdict: Verdict
     best: FloatArray
     """(N, m)"""
     best_residual: float
     best_missing: FloatArray
-    """(N, p): what was left to correct after the best forces, with its noise."""
+    """(N, p): residual after the best forces, noise included."""
     noise_floor: float | None
     residuals: tuple[float, ...] = ()
-    """Of each play, rms of wanted minus measured in the band, noise included. One for two plays that are averaged."""
+    """Residual of each play, rms of wanted minus measured in the band, noise included. Two plays that are averaged
+    count as one."""
     gains: tuple[float, ...] = ()
     fitted: tuple[float, ...] = ()
     """Share of each correction that fitted under cap and slew limit; 1 = all."""
     setbacks: int = 0
     first_measured: FloatArray | None = None
-    """(N, p): of the first play, until the second has told the noise."""
+    """(N, p): measurement of the first play, until the second gives the noise."""
 
     @property
     def errors(self) -> tuple[float, ...]:
-        """Residuals over the wanted."""
+        """Residuals relative to the wanted signal."""
         return tuple(residual / self.repetition.level for residual in self.residuals)
 
     @property
     def remark(self) -> str:
-        """What cap and slew limit did, or nothing."""
+        """Effect of cap and slew limit in words, or empty."""
         lowest = min(self.fitted, default=1.0)
         if lowest >= 1:
             return ""
@@ -168,15 +170,15 @@ def next_forces(state: IterationState, measured: FloatArray) -> IterationState:
 
 
 def noise_of_repeats(measured: FloatArray, repetition: Repetition) -> float:
-    """Noise of a single play: rms in the band of differences between plays of the same forces. measured:
-    (plays, N, p)."""
+    """Noise of a single play: rms in the band of the differences between plays of the same forces. measured: (plays, N,
+    p)."""
     off = measured - measured.mean(axis=0)
     squares = sum(float(np.sum(repetition.part(each) ** 2)) for each in off)
     return float(np.sqrt(squares / ((len(measured) - 1) * measured[0].size)))
 
 
 def noise_of_rest(rest: FloatArray, repetition: Repetition) -> float:
-    """rms in the band of a record (n, p) in which nothing was commanded."""
+    """Rms in the band of a record (n, p) during which nothing was commanded."""
     return rms(repetition.part(rest - rest.mean(axis=0)))
 
 
@@ -196,7 +198,7 @@ def _judge_measurement(state: IterationState, measured: FloatArray, floor: float
         state = replace(state, best=state.forces, best_residual=residual, best_missing=missing)
     elif residual > WORSE * state.best_residual:
         base, left = state.best, state.best_missing
-    # Two measured powers are compared, each with its own scatter.
+    # Two measured powers are compared, each with its own random error.
     limit = noise * np.sqrt(1 + SURE * np.sqrt(4 / repetition.degrees_of_freedom))
     if residual <= limit:
         return _finish(state, Verdict.AT_FLOOR)
@@ -237,5 +239,5 @@ def largest_share(forces: FloatArray, correction: FloatArray, cap: float) -> flo
     moving = a > 0
     # The positive root of a s² + 2 b s = room.
     roots = (np.sqrt(b[moving] ** 2 + a[moving] * room[moving]) - b[moving]) / a[moving]
-    # A little less than all: rounding would else put the longest force above the cap.
+    # Slightly less than the exact share, so that rounding does not put the longest force above the cap.
     return float(min(1.0, (1 - 1e-9) * roots.min(initial=2.0)))

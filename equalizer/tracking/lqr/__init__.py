@@ -2,5 +2,5 @@
 
 `tracking_problem` (the cost) -> `riccati` (the recursion; `riccati_kernel` compiled) -> `lqr` (forces); `toeplitz` is
 the oracle. `constrained` and `limits` keep forces below a cap, `padding` makes room before and after. `rotation`,
-`turning`, `preview` and `contact` reuse the stored gains. Begin at `lqr.py`.
+`changing_direction`, `preview` and `contact` reuse the stored gains. Begin at `lqr.py`.
 """

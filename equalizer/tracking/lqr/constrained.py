@@ -3,8 +3,8 @@
     least  sum (y - r)' Q (y - r) + u' R u    with    |u_k + already_k| <= cap  at every tick
 
 Alternating directions (Boyd et al., Distributed Optimization and Statistical Learning via ADMM, 2011): tracking with
-the gains of one Riccati recursion, then the nearest forces that are allowed, in turn. The multipliers bound from
-below what any allowed forces must cost, so that how far the answer is from the best is known and not guessed.
+the gains of one Riccati recursion, then the nearest forces that are allowed, in turn. The multipliers give a lower
+bound of the cost (duality), so that the distance from the optimum is known.
 """
 
 from dataclasses import dataclass, replace
@@ -27,15 +27,15 @@ class TrackingLoss:
     """Tracking errors are rms of (predicted - wanted) over rms of wanted."""
 
     error_free: float
-    """Of the best forces without a cap."""
+    """Error of the best forces without a cap."""
     error_capped: float
-    """Of the forces that are returned."""
+    """Error of the returned forces."""
     error_clipped: float
-    """What clipping the free forces would have given, for comparison; it is never played."""
+    """Error of the unconstrained forces with clipping, for comparison; they are never played."""
     cost_free: float
     cost_capped: float
     gap: float
-    """How much lower the cost could be at most, relative to it; 0 = proved best."""
+    """Relative duality gap: by how much the cost could be lower at most; 0 = proved optimal."""
     rounds: int
 
     @property
@@ -47,16 +47,16 @@ class TrackingLoss:
 @dataclass(frozen=True, slots=True, eq=False)
 class CappedForces:
     forces: FloatArray
-    """(N, m); with what was already there, every row is within the cap."""
+    """(N, m); together with the forces `already` there, every row is within the cap."""
     predicted: FloatArray
-    """(N, p): what the model answers to them"""
+    """(N, p): the model's response."""
     loss: TrackingLoss
 
 
 @dataclass(frozen=True, slots=True)
 class CapSettings:
     gap: float = 1e-5
-    """Stop when the cost is proved to be so close to the best, relative to it."""
+    """Relative duality gap at which the iteration ends."""
     rounds: int = 5000
 
 
@@ -77,7 +77,8 @@ class _CappedTask:
         return float(weighed)
 
     def lower_bound(self, forces: FloatArray, multipliers: FloatArray) -> float:
-        """forces: the least of cost + multipliers · forces, without a cap."""
+        """Lower bound of the optimal cost (dual function). forces: minimum of cost + multipliers · forces, without a
+        cap."""
         reach = self.cap_n * np.linalg.norm(multipliers, axis=1).sum() - (multipliers * self.already).sum()
         return self.cost(forces) + float((multipliers * forces).sum() - reach)
 
@@ -91,7 +92,8 @@ def track_under_cap(
 ) -> CappedForces:
     """Track wanted (N, p), from rest. already: (N, m), further forces, which count against the cap.
 
-    Raises TrackingError where `already` alone is above the cap, or where the best is not found in so many rounds.
+    Raises TrackingError where `already` alone is above the cap, or where the duality gap is not reached in the allowed
+    rounds.
     """
     r = require_trajectory(problem, wanted)
     there = np.zeros((len(r), problem.inputs)) if already is None else np.asarray(already, dtype=np.float64)

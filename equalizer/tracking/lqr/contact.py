@@ -1,15 +1,15 @@
-"""A recorded transient that starts at a contact: forces are causal, and the error that this costs is stated."""
+"""A recorded transient that starts at a contact: forces are causal, and the resulting loss of accuracy is stated."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from equalizer.tracking.lqr.changing_direction import TurningTransient, normal_transient
 from equalizer.tracking.lqr.lqr import stored_gains
 from equalizer.tracking.lqr.padding import CAUSAL, Padding, band_spectrum
 from equalizer.tracking.lqr.rotation import RotationBasis, every_normal, normal_basis
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem
-from equalizer.tracking.lqr.turning import TurningTransient, normal_transient
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -17,25 +17,25 @@ class CausalStart:
     """Stored solutions of a transient for every contact normal. Made by `causal_start`."""
 
     basis: RotationBasis
-    """The whole transient at once, for a normal (p,)."""
+    """Forces of the whole transient at once, for a normal (p,)."""
     live: TurningTransient
-    """The same tick by tick, for a normal that still changes."""
+    """The same tick by tick, for a normal that changes while it is played."""
     deviation: FloatArray
     """(p, p): n' deviation n is the squared relative error for the normal n."""
     early_deviation: FloatArray
-    """Likewise, had the forces been allowed to begin early."""
+    """Likewise for forces that may begin before the contact."""
 
     def error(self, normal: FloatArray) -> float:
-        """Of the acceleration in the model's band, relative to what is wanted; by the model's own prediction."""
+        """Relative error of the predicted acceleration in the model's band."""
         return _relative_error(self.deviation, normal)
 
     def early_error(self, normal: FloatArray) -> float:
-        """What it would be, had the forces been allowed to begin before the contact."""
+        """The error if the forces were allowed to begin before the contact."""
         return _relative_error(self.early_deviation, normal)
 
     @property
     def worst_error(self) -> float:
-        """Over all normals."""
+        """Largest error over all normals."""
         return float(np.sqrt(max(0.0, float(np.linalg.eigvalsh(self.deviation)[-1]))))
 
 

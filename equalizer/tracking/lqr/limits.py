@@ -8,7 +8,7 @@ from equalizer.signals.signal import FloatArray
 
 
 class ForceLimitError(ValueError):
-    """Forces above the cap. `peaks`: their size."""
+    """Forces exceed the cap. `peaks`: by how much."""
 
     def __init__(self, message: str, peaks: "Peaks") -> None:
         super().__init__(message)
@@ -17,14 +17,14 @@ class ForceLimitError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Peaks:
-    """Of the length of the force vector, not of a single axis: the cap holds in every direction."""
+    """Peaks of the norm of the force vector, not of single axes: the cap holds in every direction."""
 
     cap_n: float
     peak_n: float
     at_sample: int
     """Row of the first largest force."""
     share_over: float
-    """Of all rows, 0 to 1."""
+    """Share of all rows above the cap, 0 to 1."""
 
     @property
     def fits(self) -> bool:
@@ -32,7 +32,7 @@ class Peaks:
 
     @property
     def largest_scale(self) -> float:
-        """The factor on what is wanted that just fits; forces are proportional to it. Infinite where none is needed."""
+        """Largest factor on the wanted acceleration with which the forces fit; infinite without forces."""
         return self.cap_n / self.peak_n if self.peak_n > 0 else float("inf")
 
 
@@ -52,7 +52,7 @@ def require_under_cap(forces: FloatArray, cap_n: float, sample_rate_hz: float) -
     """Raises ForceLimitError where a row of forces, (N, m), is longer than the cap."""
     peaks = force_peaks(forces, cap_n)
     if not peaks.fits:
-        # Rounded down, so that the factor that is read still fits.
+        # Rounded down, so that the printed factor still fits.
         scale = np.floor(peaks.largest_scale * 1e4) / 1e4
         raise ForceLimitError(
             f"the forces reach {peaks.peak_n:.3g} N at {peaks.at_sample / sample_rate_hz:.3f} s, above the cap of "
@@ -72,6 +72,6 @@ def require_cap(cap_n: float) -> float:
 def project_to_cap(forces: FloatArray, cap_n: float) -> FloatArray:
     """Projection of forces (N, m) on the cap: each row that is longer is shortened to it."""
     lengths = np.linalg.norm(forces, axis=1, keepdims=True)
-    # A hair below the cap, so that rounding leaves no row above it.
+    # Slightly below the cap, so that rounding leaves no row above it.
     shorter = cap_n * (1 - 8 * np.finfo(np.float64).eps) / np.maximum(lengths, cap_n)
     return np.asarray(np.where(lengths > cap_n, forces * shorter, forces))

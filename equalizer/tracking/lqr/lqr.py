@@ -1,7 +1,7 @@
 """Finite-horizon linear-quadratic tracking: feedforward forces from gains that are computed once.
 
-No measured signal is fed back. The gains do act on a state, but on that of the simulated model: leaving K x out
-altogether, as "feedback set to zero" could be read, misses the trajectory by most of its own size.
+No measured signal is fed back. The gains act on the state of the simulated model: leaving out K x, as "feedback set to
+zero" could be read, gives an error of about the size of the trajectory.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class StoredGains:
     problem: TrackingProblem
     gains: Gains
     terminal_weight: FloatArray
-    """P_N, (n, n); zeros = the end is free."""
+    """P_N, (n, n): weight of the final state; zeros = the end is free."""
 
     def __len__(self) -> int:
         return len(self.gains)
@@ -31,17 +31,17 @@ class StoredGains:
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackResult:
     forces: FloatArray
-    """(N, m), rows one to one with those of the trajectory"""
+    """(N, m), one row per row of the trajectory."""
     predicted: FloatArray
-    """(N, p): what the model answers to them"""
+    """(N, p): the model's response."""
     final_state: FloatArray
-    """(n,): after the last row, to go on from"""
+    """(n,): state after the last row, to continue from."""
 
 
 def stored_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatArray | None = None) -> StoredGains:
-    """Gains by the Riccati recursion, `samples` steps; compiled where its rounding is harmless. terminal_weight: P_N,
-    (n, n), of the distance from the `final_state` given to `track`. Raises TrackingError where a force has no effect on
-    the cost."""
+    """Gains by the Riccati recursion, `samples` steps; by the compiled kernel where rounding permits. terminal_weight:
+    P_N, (n, n), of the distance from the `final_state` given to `track`. Raises TrackingError where a force has no
+    effect on the cost."""
     if samples < 1:
         raise TrackingError(f"a horizon has {samples} samples; it needs one or more")
     n, m = problem.order, problem.inputs
@@ -77,8 +77,8 @@ def costate_feedforward(gains: StoredGains, wanted: FloatArray, final_state: Flo
 
 
 def periodic_state(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(n,): the state at the first row of forces (T, m) in their periodic steady state. A fade-in that ends there
-    passes into the loop without a transient. Raises TrackingError on an unstable model."""
+    """(n,): the state at the first row of forces (T, m) in their periodic steady state. A fade-in that ends in it
+    continues into the loop without a transient. Raises TrackingError on an unstable model."""
     _require_stable(problem, "repeated forces lead to no periodic state")
     x = np.zeros(problem.order)
     for force in np.asarray(forces, dtype=np.float64):

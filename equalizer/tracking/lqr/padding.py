@@ -1,8 +1,9 @@
 """Zero padding before and after a finite trajectory, and the error of playing only its own rows.
 
-An inverse acts before what is wanted and after it. Zeros wanted on both sides give it room. Where only the trajectory's
-own rows are played, from rest, what lies in the room before is lost, and the forces were made for a motion that is not
-there: then no room before is best (`CAUSAL`), for the forces are then the best of all that begin with the first row.
+The inverse of a device is non-causal: its forces start before the trajectory and end after it. Zeros on both sides make
+room for them. Where only the trajectory's own rows are played, from rest, the forces before the first row are lost, and
+the others were computed for a motion that does not exist: then no padding before is best (`CAUSAL`), which gives the
+optimal forces among those that start with the first row.
 """
 
 from dataclasses import dataclass
@@ -36,13 +37,13 @@ CAUSAL = Padding(before_s=0.0)
 @dataclass(frozen=True, slots=True, eq=False)
 class PaddedTrack:
     whole: TrackResult
-    """With its room, as it should be played where there is time for it."""
+    """The trajectory with padding, to be played where there is time for it."""
     rows: slice
     """The trajectory's own rows in `whole`."""
     whole_error: float
-    """Relative, in the model's band, over the trajectory's rows: the whole is played."""
+    """Relative error in the model's band over the trajectory's rows, if the whole is played."""
     cut_error: float
-    """Likewise: only the trajectory's rows are played, from rest."""
+    """The same error if only the trajectory's rows are played, from rest."""
 
     @property
     def forces(self) -> FloatArray:

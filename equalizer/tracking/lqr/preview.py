@@ -1,9 +1,9 @@
 """Linear-quadratic preview control: a trajectory that arrives while it is played, and the loss of a limited preview.
 
-The gains are the stationary ones. What is not yet known is taken as zero, the best guess about a signal of which
-nothing else is known. The inverse of a device that answers a constant
-force with no acceleration looks far ahead; a low-frequency weight shortens that (`TrackingWeights`), to some 0.2 s, at
-the price of a larger loss with less preview than that, and a small one with all: `preview_loss` weighs them.
+The gains are the stationary ones. Samples that are not known yet are taken as zero, the expected value of a zero-mean
+signal. A device that does not answer a constant force with acceleration needs a long preview; a low-frequency weight
+(`TrackingWeights`) shortens it to about 0.2 s, with a larger loss at shorter previews and a small one at full preview:
+`preview_loss` computes both.
 """
 
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ class PreviewLoss:
 
     error: float
     full_error: float
-    """Had the whole trajectory been known."""
+    """Loss if the whole trajectory were known."""
 
 
 def preview_tracker(problem: TrackingProblem, preview_samples: int) -> PreviewTracker:
@@ -67,7 +67,7 @@ def preview_tracker(problem: TrackingProblem, preview_samples: int) -> PreviewTr
 
 
 def stream(tracker: PreviewTracker, wanted: FloatArray, x0: FloatArray | None = None) -> TrackResult:
-    """Track a trajectory (N, p) as a stream; after its end zero is wanted. Equals `step` row by row."""
+    """Track a trajectory (N, p) as a stream, followed by zeros. Equals `step` row by row."""
     problem, M = tracker.problem, len(tracker)
     r = require_trajectory(problem, wanted)
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(r, ((0, M - 1), (0, 0))), M, axis=0)

@@ -1,14 +1,14 @@
 """Riccati recursion of the linear-quadratic tracker, with a factor S of P = S'S. `riccati_kernel` is the compiled one.
 
-It does not depend on the trajectory: gains of a model, weights and length serve every trajectory of that length.
-Bryson and Ho, Applied Optimal Control, chapter 5, with feedthrough; as an array algorithm (Kailath, Sayed and Hassibi,
-Linear Estimation, chapter 12): one QR decomposition a step,
+It does not depend on the trajectory: gains of a model, weights and length serve every trajectory of that length. Bryson
+and Ho, Applied Optimal Control, chapter 5, with feedthrough; as an array algorithm (Kailath, Sayed and Hassibi, Linear
+Estimation, chapter 12): one QR decomposition a step,
 
     [ R½    0   ]       [ T   W  ]
     [ Q½ D  Q½ C]  =  U [ 0   S- ]      H = T'T,   K = T⁻¹ W,   P- = S-' S-
     [ S B   S A ]
 
-so P never gets a negative eigenvalue, not even where the forces can cancel all of the cost.
+so that P has no negative eigenvalue, even where the forces can cancel the whole cost.
 """
 
 from dataclasses import dataclass
@@ -29,23 +29,23 @@ NOT_STATIONARY = (
     "feedthrough the force weight must be above zero"
 )
 NEGLIGIBLE = 1e-14
-"""Of the norm of a force's effects: what rounding leaves of an effect that other forces have as well."""
+"""Rank tolerance, relative to the norm of a force's effects: the rest after projection on other forces is rounding."""
 ROUNDED = 1e-9
-"""Of a weight's largest entry: a negative eigenvalue below this is rounding, as of a solved Riccati equation."""
+"""Tolerance for negative eigenvalues, relative to a weight's largest entry (rounding of a solved Riccati equation)."""
 STATIONARY = 1e-6
-"""Largest change of stationary P over a further step, relative to its largest entry."""
+"""Convergence of the stationary P: largest change in a further step, relative to its largest entry."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gains:
-    """u_k = H_k⁻¹ t_k - K_k x_k, with t_k from the trajectory ahead. Read-only arrays."""
+    """u_k = H_k⁻¹ t_k - K_k x_k, with t_k computed from the rest of the trajectory. Read-only arrays."""
 
     K: FloatArray
     """(N, m, n)"""
     H_inverse: FloatArray
     """(N, m, m)"""
     P: FloatArray
-    """(n, n): x' P x is what the best forces cost from the state x at the start, where nothing is wanted."""
+    """(n, n): x' P x is the optimal cost from the initial state x with zero reference."""
 
     def __post_init__(self) -> None:
         for name in ("K", "H_inverse", "P"):
@@ -69,7 +69,8 @@ def backward_gains(problem: TrackingProblem, samples: int, terminal_weight: Floa
         stacked = np.vstack((stage, S @ joined))
         triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
         T, S = triangle[:m, :m], triangle[m:, m:]
-        # What is left of a column after the others, against all of it: zero but for rounding = no effect of its own.
+        # Norm of a column after projection on the others, relative to its norm: zero up to rounding means no effect of
+        # its own.
         if not np.all(np.abs(np.diag(T)) > NEGLIGIBLE * np.linalg.norm(stacked[:, :m], axis=0)):
             raise TrackingError(NO_CURVATURE.format(step=samples - k))
         K[k] = solve_triangular(T, triangle[:m, m:])
@@ -113,7 +114,8 @@ def require_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArra
 
 def _factor(weight: FloatArray) -> FloatArray:
     """F with F'F = a symmetric weight; eigenvalues below zero, which are rounding, count as zero. Scaled to a unit
-    diagonal first: states of a model have units of their own, and a small weight must not drown beside a large one."""
+    diagonal first: states of a model have units of their own, and the rounding errors of a large weight must not hide a
+    small one."""
     diagonal = np.sqrt(np.maximum(np.diag(weight), 0.0))
     scale = np.where(diagonal > 0, diagonal, 1.0)
     values, vectors = np.linalg.eigh(weight / np.outer(scale, scale))

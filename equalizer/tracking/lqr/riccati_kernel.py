@@ -1,9 +1,9 @@
-"""The Riccati recursion with P itself, compiled: quick, and given up where rounding would decide.
+"""The Riccati recursion with P itself, compiled: fast, and abandoned where rounding errors would matter.
 
 P = M[:n, :n] - W'W is a difference of equal numbers where the forces can cancel nearly all of the cost (no force weight
 and feedthrough): rounding may leave a negative eigenvalue, and each further step multiplies that by the square of every
-unstable zero of the model. `riccati.backward_gains`, which carries a factor of P, takes over then.
-One file holds all it calls: numba's kept code follows a single file.
+unstable zero of the model. `riccati.backward_gains`, which updates a factor of P, is used then. All called functions
+are in this file, because numba invalidates its cache by file.
 """
 
 import numpy as np
@@ -43,7 +43,7 @@ def _eliminate(M: FloatArray, n: int) -> bool:
 
 @njit(types.void(_OUT, types.int64, _OUT, _OUT), cache=True, nogil=True)
 def _solve(M: FloatArray, n: int, K: FloatArray, H_inverse: FloatArray) -> None:
-    """K = L'⁻¹ W and H⁻¹ = L'⁻¹ L⁻¹ from what `_eliminate` left."""
+    """K = L'⁻¹ W and H⁻¹ = L'⁻¹ L⁻¹ from the result of `_eliminate`."""
     m = M.shape[0] - n
     for i in range(m):
         for c in range(m):
@@ -73,7 +73,8 @@ def _cost_to_go(joined: FloatArray, stage_cost: FloatArray, P: FloatArray, M: Fl
 
 @njit(types.boolean(_OUT, types.int64, _OUT), cache=True, nogil=True)
 def _subtract(M: FloatArray, n: int, P: FloatArray) -> bool:
-    """P = M[:n, :n] - W' W, exactly symmetric. False = a diagonal entry lost more than half of its digits."""
+    """P = M[:n, :n] - W' W, exactly symmetric. False = a diagonal entry lost more than half of its digits by
+    cancellation."""
     kept = True
     for i in range(n):
         whole = M[i, i]
@@ -91,8 +92,8 @@ def _subtract(M: FloatArray, n: int, P: FloatArray) -> bool:
 def backward(joined: FloatArray, stage_cost: FloatArray, P: FloatArray, K: FloatArray, H_inverse: FloatArray) -> bool:
     """Fills K (N, m, n) and H_inverse (N, m, m) backward from P (n, n), which becomes that of the start.
 
-    joined: [A B], (n, n + m); stage_cost: (n + m, n + m). False = not done: at a step a force has no effect on the
-    cost, or rounding would decide what is left of it.
+    joined: [A B], (n, n + m); stage_cost: (n + m, n + m). Returns False where a force has no effect on the cost at some
+    step, or rounding makes its effect uncertain.
     """
     n, samples = P.shape[0], K.shape[0]
     M = np.empty_like(stage_cost)

@@ -2,7 +2,7 @@
 
 The forces are linear in the trajectory, and R r = sum over i, j of R_ij (e_i r_j). So the nine solutions for what axis
 j wants, wanted along axis i, give each rotation as their combination; a recording along one direction needs only three.
-From rest: a start in motion would add the same free part to every rotation.
+All start from rest: an initial motion would add its free response, which does not rotate.
 """
 
 from dataclasses import dataclass
@@ -55,13 +55,13 @@ def normal_basis(gains: StoredGains, recording: FloatArray) -> RotationBasis:
 
 
 def every_rotation(trajectory: FloatArray) -> FloatArray:
-    """(p * p, N, p): number i p + j holds what axis j wants, along axis i."""
+    """(p * p, N, p): row i p + j contains component j of the trajectory, along axis i."""
     p = trajectory.shape[1]
     return np.array([np.outer(samples, axis) for axis in np.eye(p) for samples in trajectory.T])
 
 
 def every_normal(recording: FloatArray, outputs: int) -> FloatArray:
-    """(p, N, p): number i holds the recording along axis i. Raises TrackingError on a recording that is not (N,)."""
+    """(p, N, p): row i contains the recording along axis i. Raises TrackingError on a recording that is not (N,)."""
     samples = np.asarray(recording, dtype=np.float64)
     if samples.ndim != 1 or not samples.size:
         raise TrackingError(f"a recording along one direction has shape {samples.shape}; it must be (N,), N >= 1")

@@ -2,8 +2,9 @@
 
     sum over k of (y_k - r_k)' Q (y_k - r_k) + u_k' R u_k,    x_{k+1} = A x_k + B u_k,  y_k = C x_k + D u_k
 
-A device that answers a constant force with no acceleration has zeros near z = 1: a model's exact inverse drifts there,
-where nothing was identified. The force weight bounds that; the low-frequency weight bounds it there only.
+A device that does not answer a constant force with acceleration has zeros near z = 1: the exact inverse of its model
+drifts at low frequencies, where nothing was identified. The force weight limits that at all frequencies, the
+low-frequency weight at low ones only.
 """
 
 from dataclasses import dataclass
@@ -17,19 +18,19 @@ from equalizer.signals.signal import FloatArray
 
 
 class TrackingError(ValueError):
-    """A tracking problem without a valid solution, or with arguments that do not fit it."""
+    """A tracking problem without a valid solution, or with inconsistent arguments."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackingWeights:
-    """Raises TrackingError on what cannot weigh anything."""
+    """Weights of the cost. Raises TrackingError for invalid ones."""
 
     weight: float = 1e-3
-    """R = weight * I, of |u|². Read it against |G|²: the level falls short by about weight / |G|²."""
+    """R = weight * I, of |u|². To be compared with |G|²: the level falls short by about weight / |G|²."""
     output_weight: FloatArray | None = None
     """Q, (p, p), symmetric, no negative eigenvalue; None = identity."""
     low_frequency_weight: float = 0.0
-    """Of |low-passed u|². It shortens how far ahead the inverse must look."""
+    """Weight of |low-passed u|². It shortens the preview that the inverse needs."""
     low_frequency_hz: float = 3.0
 
     def __post_init__(self) -> None:
@@ -45,14 +46,14 @@ class TrackingWeights:
 
 @dataclass(frozen=True, eq=False)
 class TrackingProblem:
-    """Matrices of the model with its penalised extra outputs. Made by `make_tracking_problem`; arrays are read-only."""
+    """Matrices of the model with its penalised outputs. Made by `make_tracking_problem`; arrays are read-only."""
 
     A: FloatArray
     """(n, n)"""
     B: FloatArray
     """(n, m)"""
     C: FloatArray
-    """(q, n): the p tracked outputs first, then those that are wanted to be zero."""
+    """(q, n): the p tracked outputs first, then those with zero reference."""
     D: FloatArray
     """(q, m)"""
     Q: FloatArray
@@ -70,7 +71,7 @@ class TrackingProblem:
 
     @property
     def order(self) -> int:
-        """n, with the states of the penalties: the model's own come first."""
+        """n, the order including the states of the penalties; the model's own states come first."""
         return int(self.A.shape[0])
 
     @property
@@ -90,7 +91,8 @@ class TrackingProblem:
 
     @cached_property
     def stage_cost(self) -> FloatArray:
-        """(n + m, n + m): of [x, u] where nothing is wanted: [C D]' Q [C D] with R added to the forces' part."""
+        """(n + m, n + m): quadratic cost of [x, u] with zero reference: [C D]' Q [C D], with R added to the forces'
+        block."""
         n, outputs = self.order, np.hstack((self.C, self.D))
         cost = outputs.T @ self.Q @ outputs
         cost[n:, n:] += self.R
@@ -98,7 +100,7 @@ class TrackingProblem:
 
     @cached_property
     def pull(self) -> FloatArray:
-        """(p, n + m): Q [C D], how a wanted sample pulls on state and force."""
+        """(p, n + m): Q [C D], the linear term of the cost per reference sample."""
         return read_only((self.Q @ np.hstack((self.C, self.D)))[: self.outputs])
 
     def state(self, x0: FloatArray | None) -> FloatArray:

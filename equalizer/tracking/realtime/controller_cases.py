@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from equalizer.tracking.lqr.changing_direction import play
 from equalizer.tracking.lqr.tracking_problem import TrackingError
-from equalizer.tracking.lqr.turning import play
 from equalizer.tracking.realtime.realtime_controller import RealtimeController
 
 OF_CAP = 0.9
 """Largest force of a case over the cap, because the cap is not compared."""
 
 NO_FORCE = 1e-12
-"""Of the cap: what a comparison allows as a difference. A way whose largest force is below it is none."""
+"""Tolerance of a comparison, relative to the cap. A way whose largest force is below it counts as zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,7 +21,7 @@ class ControllerCases:
     """T ticks of transient and stream, from rest."""
 
     rotations: FloatArray
-    """(T, p, p): one that wanders, and no rotation alone: the level changes with it."""
+    """(T, p, p): directions that change over time and are not only rotations: the level changes too."""
     transient_forces: FloatArray
     """(T, m)"""
     wanted: FloatArray

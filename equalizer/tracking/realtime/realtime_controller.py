@@ -13,6 +13,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.band_split import Bands, CausalSplit
 from equalizer.tracking.feedforward.feedforward import band_edges
+from equalizer.tracking.lqr.changing_direction import TurningTransient, turning_transient
 from equalizer.tracking.lqr.lqr import TrackResult, stored_gains
 from equalizer.tracking.lqr.padding import CAUSAL
 from equalizer.tracking.lqr.preview import PreviewLoss, PreviewTracker, preview_loss, preview_tracker, stream
@@ -22,7 +23,6 @@ from equalizer.tracking.lqr.tracking_problem import (
     TrackingWeights,
     make_tracking_problem,
 )
-from equalizer.tracking.lqr.turning import TurningTransient, turning_transient
 
 TAP_S, TAP_DECAY_S = 0.2, 0.04
 """The transient where none is given: five time constants of a tap such as contacts leave behind."""

@@ -17,12 +17,12 @@ UP = np.kron(np.eye(3), np.array([[1.0], [-1.0]]))
 """(6, 3): the axis that points up in each position."""
 
 WORST_RESIDUAL = 0.05
-"""Of g. Six readings and twelve unknowns leave six residuals; tilts of 1 to 2 degrees in laying the sensor down give
-0.02 to 0.04 of g, a position taken for another gives more than 0.5."""
+"""Largest residual, in g. Six readings and twelve unknowns leave six residuals; tilts of 1 to 2 degrees in laying the
+sensor down give 0.02 to 0.04 g, a mistaken position more than 0.5."""
 
 
 WORST_CONDITION = 10.0
-"""Of the sensitivity: the ADXL335's channels differ by 10 %, a dead one by any factor."""
+"""Largest condition number of the sensitivity: the ADXL335's channels differ by 10 %, a dead channel by any factor."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

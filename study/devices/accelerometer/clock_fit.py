@@ -22,7 +22,7 @@ class ClockFit:
     rate: float
     """Host seconds in a second of the device."""
     longest_delay_s: float
-    """Of an arrival, beyond the least."""
+    """Largest delay of an arrival beyond the smallest one."""
 
     @property
     def drift_ppm(self) -> float:

@@ -31,7 +31,7 @@ LAYOUT = np.dtype(
 
 
 def crc_of(rows: Bytes) -> npt.NDArray[np.uint16]:
-    """Of each row of bytes, shape (n, k): shape (n,)."""
+    """Checksum of each row of bytes, shape (n, k): shape (n,)."""
     crc = np.full(len(rows), START, dtype=np.uint16)
     for column in rows.T:
         crc = (crc << 8) ^ _TABLE[(crc >> 8) ^ column]
@@ -166,7 +166,7 @@ def _in_order(last: Packets, starts: Indices, packets: Packets) -> bool:
 
 
 def _whole_packets(stream: Bytes) -> Indices:
-    """Where packets with the right check sum begin."""
+    """Positions at which packets with a correct checksum begin."""
     last = len(stream) - SIZE + 1
     if last <= 0:
         return np.zeros(0, dtype=np.intp)

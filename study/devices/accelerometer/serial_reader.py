@@ -11,14 +11,14 @@ AT_ONCE = 4096
 """Bytes: 0.1 s at 2 kHz."""
 
 WAIT_S = 0.01
-"""For a byte, on a silent line: so long until a reader hears that it is to end."""
+"""Timeout for a byte on a silent line, and so the longest time until the thread notices `close`."""
 
 
 class Port(Protocol):
     """An open serial line."""
 
     def read(self, size: int) -> bytes:
-        """At most size bytes, soon: fewer or none where no more came."""
+        """Read at most `size` bytes, with a short timeout: fewer or none if no more came."""
         ...
 
     def close(self) -> None: ...

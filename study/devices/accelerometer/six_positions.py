@@ -17,16 +17,16 @@ BeforeEach = Callable[[str, tuple[float, float, float] | None], None]
 None for the first."""
 
 REST_S = 2.0
-"""In each position: at 2 kHz the mean of 4000 samples, 1 mg of noise away from the truth at the most."""
+"""Duration in each position: at 2 kHz the mean of 4000 samples, within 1 mg of noise."""
 
 SETTLE_S = 0.3
-"""What comes sooner may be of the position before."""
+"""Time after a position changes in which samples may still belong to the old one."""
 
 MANY, DRAIN_S = 200, 2.0
 """Samples that come at once are old ones, which are let go by for so long at the most."""
 
 RANGE_G = 3.0
-"""What the ADXL335 promises to measure; beyond, a channel counts as clipped."""
+"""Guaranteed range of the ADXL335; beyond it, a channel counts as clipped."""
 
 
 def calibrate_on_table(path: str, baud: int, before_each: BeforeEach, rest_s: float | None = None) -> str:

@@ -90,7 +90,7 @@ GRACE_S = 0.02
 """When the whole process stood still, its loop looks late too: it gets so long to prove itself alive."""
 
 STOP_S = 0.005
-"""How long an emergency stop waits for the loop to write the zero."""
+"""Longest wait of an emergency stop for the loop to write the zero."""
 
 JOIN_S = 0.5
 """A driver that hangs must not hang the program as well."""

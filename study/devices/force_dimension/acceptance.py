@@ -27,7 +27,7 @@ class Acceptance:
     accepted_on: str
     """ISO 8601 date."""
     force_n: float
-    """That was held when the loop was stopped on purpose."""
+    """Force that was held when the loop was stopped on purpose."""
     gone_after_s: float
     """Until the device said that it was off."""
     asked_n: float = 0.0

@@ -17,7 +17,7 @@ FORCE_N = 0.5
 HELD_S, FADE_S, EVERY_S = 0.12, 0.05, 0.002
 """Short: without spring and friction the handle moves by some 15 mm until the device brakes."""
 REACHED = 0.8
-"""Of it: a damper takes some."""
+"""Share of `FORCE_N` that must have been commanded in total: the damper subtracts some."""
 WITHHELD_S = 0.2
 """Then the zero is sent even so."""
 

@@ -58,7 +58,7 @@ class Handle:
         self._open = True
 
     def velocity_mps(self) -> tuple[float, float, float]:
-        """As the library estimates it, over its last 20 ms."""
+        """Velocity as estimated by the library, over its last 20 ms."""
         x, y, z = c_double(), c_double(), c_double()
         self.library.call("dhdGetLinearVelocity", byref(x), byref(y), byref(z), self.number)
         return x.value, y.value, z.value

@@ -53,9 +53,9 @@ class SensorSettings:
 @dataclass(frozen=True, config=STRICT)
 class LabSettings:
     effector_mass_kg: float | None = Field(default=None, gt=0, le=2)
-    """What the gravity compensation carries: handle and sensor. None: the model's own."""
+    """Mass that the gravity compensation carries: handle and sensor. None: the model's own."""
     effective_mass_kg: float | None = Field(default=None, ge=0.01, le=5)
-    """What the centring spring moves, at the handle. None: the assumption in the table of models."""
+    """Mass that the centring spring moves, at the handle. None: the assumption in the table of models."""
     accelerometer: SensorSettings | None = None
     pulse: PulseSettings | None = None
     """A line that gets a pulse at the onset of each trial's force."""

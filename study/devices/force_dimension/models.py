@@ -6,16 +6,16 @@ from dataclasses import dataclass
 @dataclass(frozen=True, slots=True)
 class DeviceModel:
     name: str
-    """As the vendor writes it."""
+    """Name as written by the vendor."""
     system_types: tuple[int, ...]
-    """What dhdGetSystemType answers (SDK 3.17.5)."""
+    """Return value of dhdGetSystemType (SDK 3.17.5)."""
     max_force_n: float
     """Continuous maximum along any direction at the centre, as CHAI3D's table of devices has it."""
     effective_mass_kg: float
     """At the handle; the centring spring is made from it. The vendor publishes none: these are assumptions, from the
     simulated omega.3 and from the heavier wrists. An error changes the spring's natural frequency by its root."""
     effector_mass_kg: float | None
-    """For the gravity compensation. None: what the library takes by itself."""
+    """Mass for the gravity compensation. None: the library's default."""
 
 
 MODELS = {
@@ -25,7 +25,7 @@ MODELS = {
     "delta3": DeviceModel("delta.3", (63,), 20.0, 0.5, None),
     "sigma7": DeviceModel("sigma.7", (104, 105), 12.0, 0.8, None),
 }
-"""By the name that `--device` takes."""
+"""Models by the name that `--device` takes."""
 
 
 def name_of_type(system_type: int) -> str | None:

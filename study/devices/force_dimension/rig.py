@@ -23,7 +23,7 @@ from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, Halves
 from study.errors import DeviceError
 
 REST_SHARE = 0.25
-"""Of the watchdog's time, between two zeros while nothing is played."""
+"""Share of the watchdog's time between two zeros while nothing is played."""
 
 
 class Accelerometer(Protocol):
@@ -100,7 +100,8 @@ class ForceDimensionRig:
         return None if self._accelerometer is None else self._accelerometer.sensed(since_s, tick_s, rate_hz)
 
     def withhold(self, seconds: float) -> float:
-        """As if the loop had stopped: for so long nothing is sent, zeros neither. When the last force was sent, s."""
+        """Simulates a stopped loop: sends nothing for this long, not even zeros. Returns the time of the last force,
+        s."""
         with self._sending:
             self._cells[halves.WITHHELD_UNTIL_S] = time.monotonic() + seconds
             return float(self._cells[halves.SENT_S])

@@ -31,7 +31,7 @@ def clear(force: FloatArray) -> None:
 
 @part
 def kept_share(norm: float, cap: float) -> float:
-    """What is left of a force of this norm: 1 up to the cap, 0 where either is no number."""
+    """Factor that limits a force of this norm to the cap: 1 up to the cap, 0 where either is not a number."""
     if not (cap > 0.0 and norm < OVERFLOWING):
         return 0.0
     return 1.0 if norm <= cap * WITHIN else cap * WITHIN / norm

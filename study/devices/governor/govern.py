@@ -101,7 +101,7 @@ def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
 
 @part
 def _gains(state: FloatArray) -> tuple[float, float]:
-    """Of stimulus and spring, at this tick. A release in the middle of a fade-in starts from where that was."""
+    """Force of stimulus and spring at this tick. A release during a fade-in starts from the amplitude reached."""
     tick, cosine = state[TICK], state[RAISED_COSINE]
     if state[PHASE] == PLAYING:
         state[STIMULUS_GAIN] = _fade_share(tick, state[FADE_IN], cosine)
@@ -113,7 +113,7 @@ def _gains(state: FloatArray) -> tuple[float, float]:
 
 @part
 def _stamp(state: FloatArray, settings: FloatArray) -> None:
-    """How many ticks went by since the last reading: by the loop's clock where it stamps its readings."""
+    """Ticks since the last reading, by the loop's clock where it stamps its readings."""
     elapsed = state[TICK] - state[READ_AT]
     if state[STAMP_S] > 0.0 and state[READ_AT_S] > 0.0:
         elapsed = (state[STAMP_S] - state[READ_AT_S]) / settings[TICK_S]

@@ -12,10 +12,11 @@ from study.devices.rig import READING_SIZE
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 VELOCITY_CORNER_HZ = 50.0
-"""Of the low-pass behind the spring's damping: far above the spring, far below the encoders' chatter."""
+"""Corner frequency of the low pass in the spring's damping: far above the spring, far below the encoders' quantization
+noise."""
 
 ACCELERATION_S = 0.02
-"""Over which the readings' acceleration is averaged."""
+"""Time over which the readings' acceleration is averaged."""
 
 SETTLE_S = 0.5
 """Before a recording's first sample: half for the spring to come in, half for the handle to come to rest."""
@@ -146,7 +147,7 @@ class Governor:
         )
 
     def rows(self) -> FloatArray:
-        """What was recorded, shape (n, cells.ROW_SIZE), n at most the length of the ring."""
+        """The recorded rows, shape (n, cells.ROW_SIZE), n at most the length of the ring."""
         recorded, size = int(self.state[cells.RECORDED]), len(self.buffer)
         kept = min(recorded, size)
         return self.buffer[np.arange(recorded - kept, recorded) % size]

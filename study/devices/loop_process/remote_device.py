@@ -21,7 +21,7 @@ from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 OPENING_S = 180.0
-"""To import everything, to compile it where that was never done, and to open the device."""
+"""Timeout for importing, for compiling where necessary, and for opening the device."""
 
 ANSWER_S = 3.0
 """Beyond what a busy computer is late by, and beyond the safety layer's own waits: its loop is given up after 0.1 s, a
@@ -80,7 +80,7 @@ class RemoteDevice:
         """Asked to close; nothing is asked any more; nor does the process run."""
         self._losing = threading.Lock()
         self._lost = ""
-        """How it was lost."""
+        """Reason for the loss."""
         # Twice: an interruption that waits as the first begins ends it before its first line.
         atexit.register(self._close_at_exit)
         atexit.register(self._close_at_exit)

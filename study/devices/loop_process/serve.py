@@ -121,7 +121,7 @@ def run(parent: int, *handles: int) -> None:
 
 
 class Lifetime:
-    """How long the process may run."""
+    """Longest time that the process may still run."""
 
     def __init__(self, parent: int, told_to_end: list[int]) -> None:
         self._parent = parent

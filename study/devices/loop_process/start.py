@@ -16,7 +16,7 @@ from study.devices.loop_process.line import LINES, End, Line
 from study.errors import DeviceError
 
 DEAD_S = 2.0
-"""For the system to end a process that was killed."""
+"""Timeout for the system to end a process that was killed."""
 
 
 class LoopProcess:
@@ -53,12 +53,12 @@ class LoopProcess:
             raise
 
     def hang_up(self) -> None:
-        """It lets go and ends by itself when it hears that."""
+        """Ask it to release the force and to end by itself."""
         for line in (self.work, self.signs, self.look, self.stop, self.close):
             line.end()
 
     def kill(self) -> None:
-        """At once: the device's own watchdog then drops the force."""
+        """Kill it: the device's own watchdog then drops the force."""
         self._killed = True
         self._process.kill()
 

@@ -24,7 +24,7 @@ from study.errors import DeviceError, StudyError
 from study.store.formats.recording_file import read_recording
 
 REPEATED_S = 0.5
-"""Of a repeated stimulus, whole loops: long enough that a hand's unrest does not look like a stamp."""
+"""Length of a repeated stimulus in whole loops: long enough that the hand's motion does not look periodic."""
 OVER_S = 0.02
 """Within so long the end of a repeated stretch goes over into its beginning."""
 NOMINAL = MODELS["omega3"]

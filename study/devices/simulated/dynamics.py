@@ -52,7 +52,7 @@ def add_stops(state: FloatArray, parameters: FloatArray, pull: FloatArray) -> No
 
 
 class Held(NamedTuple):
-    """What one tick holds."""
+    """Quantities that stay constant during one tick, except `stretch`."""
 
     command: FloatArray
     """(3,) motor torques, N m."""

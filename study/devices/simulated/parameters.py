@@ -81,7 +81,7 @@ class HandleModes:
     damping_ratios: tuple[float, ...] = (0.028, 0.03, 0.025, 0.025, 0.022, 0.022)
     masses_kg: tuple[float, ...] = (0.019, 0.008, 0.008, 0.007, 0.006, 0.006)
     gains: tuple[float, ...] = (0.0, 0.3, 0.35, 0.4, 0.5, 0.6)
-    """How much of a mode's displacement the accelerometer's place shares."""
+    """Share of a mode's displacement at the accelerometer."""
     directions: tuple[Vector, ...] = (
         (0.85, 0.53, -0.02),
         (0.3, 0.8, 0.5),
@@ -113,7 +113,7 @@ class Accelerometer:
     turns_deg: Vector = (0.7, -0.8, 0.9)
     """Mounting error about x, y, z: package tolerance is 1 degree."""
     cross_axis: Vector = (0.010, -0.008, 0.009)
-    """Of yz, zx, xy: the data sheet's 1 %."""
+    """Cross-axis sensitivity yz, zx, xy: the data sheet's 1 %."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import ANSWER, DIED, RECORDING, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
-from study.store.disk.carried_folder import Files, read_files, write_files
+from study.store.disk.folder_contents import Files, read_files, write_files
 from study.store.disk.text_file import read_text, write_text
 from study.workflows.pieces import finished_pieces
 
@@ -85,7 +85,7 @@ class Engine:
 
 
 Workers = int | Executor
-"""So many processes of this computer, or an executor whose workers are sent the cases: they may share no disk."""
+"""Number of processes on this computer, or an executor to whose workers the cases are sent: they may share no disk."""
 
 
 def ask_engine(folder: ProofFolder, names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]) -> None:

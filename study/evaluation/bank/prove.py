@@ -55,13 +55,13 @@ class Proof:
     folder: ProofFolder
     plan: BankPlan
     seal: str
-    """SHA-256 of labels.sha256 before anything was diagnosed."""
+    """SHA-256 of labels.sha256, taken before any diagnosis."""
     outcomes: tuple[Outcome, ...]
     score: Score
     engines: tuple[str, ...]
-    """Digests of the code that answered the bank."""
+    """Digests of the code that diagnosed the bank."""
     beside: tuple[str, ...]
-    """Digests of the code that answered follow-ups and controls."""
+    """Digests of the code that diagnosed follow-ups and controls."""
     controls: tuple[ControlOutcome, ...]
     followed: tuple[FollowUp, ...]
     left_out: int

@@ -45,7 +45,7 @@ class BankPlan:
     seed: int
     cases: int
     brief: bool = False
-    """One axis and short periods: for tests, and for a quick look."""
+    """One axis and short periods: for tests, and for a quick try."""
 
 
 def drawable_cases(plan: BankPlan) -> tuple[Draw, ...]:

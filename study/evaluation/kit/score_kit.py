@@ -25,7 +25,7 @@ class KitScore:
     sha256: str
     """SHA-256 of the table of labels."""
     compared_with: str
-    """With what that hash was compared, in words."""
+    """Source of the hash that it was compared with, in words."""
 
 
 def score_kit(path: Path, diagnoses: Path, out: Path, seal: str | None = None) -> KitScore:

@@ -12,8 +12,8 @@ from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_mode
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.prediction_error import PredictionError, prediction_error
-from analysis.diagnosis.first_model.model_of_balance import FirstModel
-from analysis.diagnosis.first_model.plain_form import plain_form
+from analysis.diagnosis.first_model.model_from_balance import FirstModel
+from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare
 from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, named_sentences
@@ -29,7 +29,7 @@ from study.evaluation.real.real_folder import RealRecording
 from study.importing.build_recording import build_recording
 from study.importing.map_library import FoundMap
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error
-from study.workflows.diagnosis.fitted_first import first_model_of, fit_linear_model
+from study.workflows.diagnosis.fit_without_model import first_model_of, fit_linear_model
 from study.workflows.forked_map import map_forked
 
 
@@ -190,7 +190,7 @@ def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherT
     try:
         recording = import_real_recording(test)
         if _is_plain(wanted):
-            (recording,) = all_as_force_driven(plain_form((recording,), turns=False)[0])
+            (recording,) = all_as_force_driven(one_motion_per_force((recording,), turns=False)[0])
         retuned, after = (
             prediction_error(recording, model, "all") for model in (_require_retuned(found), found.improved)
         )

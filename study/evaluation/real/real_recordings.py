@@ -30,8 +30,8 @@ from study.evaluation.real.real_folder import RealFolder, RealRecording, read_re
 from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_time
-from study.store.disk.carried_folder import Files, read_files, write_files
 from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.folder_contents import Files, read_files, write_files
 from study.store.disk.new_folder import new_folder
 from study.store.disk.provenance import Provenance
 from study.store.formats.mechanical_model_file import write_mechanical_model
@@ -64,7 +64,7 @@ class RealPlan:
     inject: int = 0
     """Number of faults to inject into the diagnosed recordings; 0 = none."""
     seed: int = 1
-    """Seed of these draws."""
+    """Seed of the draws."""
 
 
 def diagnose_folder(

@@ -26,9 +26,9 @@ class PlacedModels:
     between: tuple[IdentifiedModel, ...]
     """Identified beside the centre, not at the edge."""
     frictionless: IdentifiedModel
-    """At the centre, of the device without friction."""
+    """Model at the centre, of the device without friction."""
     hand: IdentifiedModel
-    """At the centre, in a hand."""
+    """Model at the centre, in a hand."""
 
     @property
     def workspace(self) -> WorkspaceModels:

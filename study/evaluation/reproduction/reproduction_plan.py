@@ -21,9 +21,9 @@ class ReproducedProtocols:
     study: str = "direction_threshold"
     ellipsoid: str = "ellipsoid"
     sweep: str = "sweep"
-    """Over the whole range, for figures 1 and 4."""
+    """Sweep over the whole range, for figures 1 and 4."""
     band: str = "sweep_band"
-    """Over the equalized band, for figure 5."""
+    """Sweep over the equalized band, for figure 5."""
     hand: str = "sweep_hand"
     """The same in a hand, for the table of baselines."""
 

@@ -25,8 +25,8 @@ class Results:
     """Held-out test of the centre's model."""
     tested_frictionless: HeldOut | None
     remarks: tuple[str, ...]
-    """On recordings and models, in sentences."""
+    """Remarks on recordings and models, as sentences."""
     sources: tuple[Path, ...]
     """Input files."""
     protocol_hash: str
-    """Of the study protocol."""
+    """Hash of the study protocol."""

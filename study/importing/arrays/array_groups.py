@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 _SEPARATORS = ("__", "/", ".", "_", " ")
 _LOOSE = ("_", " ", ".")
-"""Separators that are common in names: a prefix before one of them must contain a digit."""
+"""Common separators in names; a prefix before one of them must contain a digit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def _group_arrays(names: Sequence[str], long_ones: Sequence[str], separator: str
 
 
 def _split(name: str, separator: str) -> tuple[str, str, str]:
-    """At the last stroke, else at the first separator; what stands in brackets is a unit."""
+    """Splits a name at the last slash, else at the first separator; text in brackets is a unit."""
     plain, bracket, unit = re.match(r"([^\[(]*)([\[(]?)(.*)", name, re.DOTALL).groups()  # type: ignore[union-attr]
     before, between, after = plain.rpartition(separator) if separator == "/" else plain.partition(separator)
     return before, between, after + bracket + unit if between else ""

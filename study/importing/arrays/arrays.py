@@ -26,7 +26,7 @@ WORKBOOKS = (".xlsx", ".xlsm")
 RECORDS = (".json", ".jsonl", ".ndjson")
 HDF5 = (".h5", ".hdf5")
 FOREIGN = (*TABLES, *WORKBOOKS, *RECORDS, ".npz", ".npy", ".mat")
-"""Kinds of files that are never recordings of ours; HDF5 may be."""
+"""File types that never hold our own recordings; HDF5 may."""
 
 _CHECK = "Check the file; nothing else can be read from it."
 MEND = "Do that, and import again; docs/importing.md lists the keys of a map."
@@ -41,7 +41,7 @@ class Arrays:
     clocks: tuple[str, ...] = ()
     """Arrays that were dates or clock times, now in seconds since the first."""
     notes: tuple[str, ...] = ()
-    """Sentences: how such arrays were read, and what was left out."""
+    """Sentences on how such arrays were read, and on what was left out."""
 
     @property
     def name(self) -> str:
@@ -49,7 +49,7 @@ class Arrays:
 
 
 def left_out(array: Array) -> str:
-    """What stands for an array that is not read: what it is, or what is wrong with it; empty for all others."""
+    """Placeholder for an array that is not read, with its kind or its problem as text; empty for all other arrays."""
     said = array.item() if array.dtype.kind == "O" and array.size == 1 else ""
     return said if isinstance(said, str) else ""
 

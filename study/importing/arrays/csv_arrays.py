@@ -23,25 +23,25 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_ROWS = 20_000_000
-"""Five hours at 1 kHz."""
+"""Most rows of a table: five hours at 1 kHz."""
 MOST_COLUMNS = 10_000
 _LONGEST_LINE = 2**20
-"""Characters: a hundred for each of so many columns."""
+"""Longest line in characters: a hundred for each of the most columns."""
 _LONGEST_SHOWN = 60
-"""Characters of a field in a sentence about it."""
+"""Most characters of a field that are quoted in a sentence about it."""
 _HOLDS_NUMBER = re.compile(r'(?:^|[,;\t|])[\s"]*[-+.]?\d[\d.,:eE+-]*[\s"]*(?:[,;\t|]|$)')
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
 _MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
 
 
 class FaultyColumn(str):
-    """What is wrong with a field of a column; stands in the place of its numbers, for it matters only where they are
+    """Placeholder for a column with an invalid field, with the problem as text: it matters only where the column is
     used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Columns by name; of them those that were dates or clock times, now in seconds since the first; remarks."""
+    """Columns by name; names of those that were dates or clock times, now in seconds since the first; remarks."""
 
     by_name: dict[str, npt.NDArray[Any]]
     clocks: tuple[str, ...]
@@ -49,14 +49,15 @@ class Table:
 
 
 def read_csv_arrays(path: Path, settings: CsvMap) -> Table:
-    """Empty fields are missing samples. Raises CannotReadError; ValueError with line and column of a problem."""
+    """Read the columns of a table. Empty fields are missing samples. Raises CannotReadError; ValueError with line and
+    column of a problem."""
     whole = read_text(path, settings.encoding)
     made = read_lines(_lines(whole.text, settings), settings)
     return replace(made, notes=(*made.notes, *filter(None, (whole.note,))))
 
 
 def read_lines(lines: list[Line], settings: CsvMap) -> Table:
-    """Of a table's lines that are not empty. Raises ValueError with line and column of a problem."""
+    """Columns from the lines of a table that are not empty. Raises ValueError with line and column of a problem."""
     layout = find_layout(lines, settings)
     if not layout.body:
         raise ValueError("it has a header, but no rows below it")
@@ -76,7 +77,7 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
     try:
         found = _read(text, layout, {"dtype": kinds, "na_values": _MISSING})
     except ValueError:
-        found = _read(text, layout, {"dtype": str})  # slower, and it tells which field is wrong
+        found = _read(text, layout, {"dtype": str})  # slower, but it finds the invalid field
     if len(found) != len(body):
         number = next((number for number, line in body if line.count('"') % 2), body[0][0])
         raise ValueError(f"line {number}: a quote is opened and not closed in its line; take it out, or close it")
@@ -90,8 +91,8 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
 
 
 def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
-    """Without columns of words alone. In place of a column with words among its numbers, what is wrong with it. Raises
-    ValueError for a field that is a number in another notation."""
+    """The columns without those that contain only words. A column with words among its numbers is replaced by its
+    problem. Raises ValueError for a number in another notation."""
     numbers: dict[str, npt.NDArray[Any]] = {}
     stamps, words = {}, []
     for name, column in columns.items():
@@ -106,7 +107,7 @@ def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: Ta
                 numbers[name] = _without_blanks(_numbers(column, name, body, layout))
             except ValueError as problem:
                 if not all(is_number(field, layout.decimal) or is_text(field) for field in column.str.strip()):
-                    raise  # a number in another notation is no remark
+                    raise  # a number in another notation is an error, not a remark
                 numbers[name] = np.array(FaultyColumn(problem), dtype=object)
     joined = join_stamps(stamps)
     in_seconds = {name: _seconds_name(name, columns) for name in joined}
@@ -118,19 +119,19 @@ def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: Ta
 
 
 def _without_blanks(column: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """The number alone, of a column that holds it in its first row and nothing below, as a rate."""
+    """The single number of a column that has a value in its first row only, such as a rate."""
     single = len(column) > 1 and not np.isnan(column[0]) and bool(np.isnan(column[1:]).all())
     return np.asarray(column[0]) if single else column
 
 
 def _seconds_name(name: str, others: Iterable[str]) -> str:
-    """Of a column of stamps that becomes one of seconds."""
+    """Name of a column of time stamps after its conversion to seconds."""
     plain = unit_in(name)[0]
     return f"{plain} [s]" if f"{plain} [s]" not in others else f"{plain} stamp [s]"
 
 
 def _number_in_words(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> FaultyColumn:
-    """What is wrong where a column that was taken for words holds a number; empty if it holds none."""
+    """The problem of a column that was recognised as words but contains a number; empty without one."""
     numbers = column.fillna("").map(lambda field: holds_number([field.strip()], layout.decimal)).to_numpy()
     if not numbers.any():
         return FaultyColumn()
@@ -143,7 +144,7 @@ def _is_missing(column: "pd.Series[str]") -> "pd.Series[bool]":
 
 
 def timed_arrays(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
-    """Arrays of dates, times, or texts of them become seconds, as columns of a table do. Raises ValueError."""
+    """Convert arrays of dates, times, or texts of them to seconds, like columns of a table. Raises ValueError."""
     found, clocks, notes = {}, [], []
     for name, array in stored.items():
         dated = _seconds(array)
@@ -187,7 +188,7 @@ def _lines(text: str, settings: CsvMap) -> list[Line]:
 
 
 def _with_whole_header(lines: list[Line]) -> list[Line]:
-    """Names in quotes with a line break in them on one line; lines that hold a number stay as they are."""
+    """Join names in quotes that contain a line break to one line; lines with a number are not changed."""
     begin = next((place for place, (_, text) in enumerate(lines) if _HOLDS_NUMBER.search(text)), 0)
     joined: list[Line] = []
     for number, text in lines[:begin]:
@@ -200,7 +201,7 @@ def _with_whole_header(lines: list[Line]) -> list[Line]:
 
 
 def _comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
-    """How many lines between the rows are comments. Raises ValueError for one that has as many fields as a row."""
+    """Number of comment lines between the rows. Raises ValueError for a comment with as many fields as a row."""
     first, width = layout.body[0][0], len(layout.names)
     header = max((number for number, line in lines if number < first and not is_comment(line)), default=first)
     below = [line for line in lines if line[0] > header and is_comment(line[1])]
@@ -230,7 +231,7 @@ def _require_equal_rows(body: list[Line], layout: TableLayout) -> None:
 
 
 def _mend_row(number: int, line: str, body: list[Line], delimiter: str) -> str:
-    """What to do about a row of another width."""
+    """Advice for a row of another width."""
     if any(_THOUSANDS.fullmatch(field.strip(' "')) for field in re.split(r"[;\t|]", line)):
         return NO_THOUSANDS
     if delimiter in ", " and re.search(rf"(?<![\d.])[1-9]\d{{0,2}}{delimiter}\d{{3}}(?!\d)", line):
@@ -243,7 +244,7 @@ def _mend_row(number: int, line: str, body: list[Line], delimiter: str) -> str:
 
 
 def _read(text: str, layout: TableLayout, how: dict[str, Any]) -> "pd.DataFrame":
-    # Imported where tables are read: it takes longer than all that is done with other files.
+    # Imported where tables are read: it takes longer than reading any other file.
     import pandas as pd
 
     table: pd.DataFrame = pd.read_csv(

@@ -17,9 +17,9 @@ from study.store.disk.strict_json import load_json
 
 Array = npt.NDArray[Any]
 JSON_BYTES = 2**26
-"""Largest JSON file: parsed, it takes some twenty times its bytes."""
+"""Largest JSON file in bytes: parsed, it takes about twenty times as much memory."""
 _MOST_OBJECTS, _MOST_VALUES = 2**21, 2**24
-"""Records take hundreds of bytes each, in memory."""
+"""Most records: each takes hundreds of bytes of memory."""
 _OURS = "hapteq"
 _OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
 _LOOKED_AT = 4096
@@ -28,7 +28,7 @@ _VALUE_KEYS = ("values", "value", "data", "samples")
 
 
 def read_json_arrays(path: Path) -> dict[str, Array]:
-    """Raises OSError; ValueError with what is wrong."""
+    """Arrays of a JSON file. Raises OSError; ValueError with the problem."""
     try:
         text = read_regular(path, JSON_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as problem:
@@ -46,7 +46,7 @@ def read_json_arrays(path: Path) -> dict[str, Array]:
 
 
 def is_own_document(path: Path) -> bool:
-    """Whether a JSON file says near its beginning that it is one of ours."""
+    """Whether the beginning of a JSON file declares one of our own formats."""
     with open_regular(path) as file:
         return _OWN_FORMAT.search(file.read(_LOOKED_AT)) is not None
 
@@ -78,7 +78,7 @@ def _record(number: int, line: str) -> Any:
 
 
 def _arrays(value: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
-    """Arrays with the keys that lead to them."""
+    """Arrays by the path of keys that leads to them."""
     match value:
         case dict():
             yield from _of_object(value, place)
@@ -91,7 +91,7 @@ def _arrays(value: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...
 
 
 def _of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
-    """Of `{"unit": "N", "values": [...]}` one array, with its unit in brackets."""
+    """The array of `{"unit": "N", "values": [...]}`, with its unit in brackets."""
     units = [value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)]
     lists = [key for key, entry in value.items() if isinstance(entry, list)]
     values = lists[0] if len(lists) == 1 else next((key for key in _VALUE_KEYS if key in lists), "")
@@ -107,7 +107,8 @@ def _of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[tup
 
 
 def _beside_values(entry: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
-    """Words beside values, as their description. Raises ValueError for what may change them, as a scale does."""
+    """Texts beside values, as their description. Raises ValueError for keys that may change the values, such as a
+    scale."""
     if entry is not None and (not isinstance(entry, str) or is_number(entry.strip(), ".")):
         name = "/".join(place[:-1])
         raise ValueError(
@@ -118,8 +119,8 @@ def _beside_values(entry: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[s
 
 
 def _columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
-    """A column for each key of any record, missing where a record does not have it; objects inside a record one level
-    deep, as `imu.x`. Raises ValueError where there are too many."""
+    """One column for each key of any record, with missing samples where a record lacks it; objects inside a record are
+    read one level deep, as `imu.x`. Raises ValueError with too many keys."""
     flat = [dict(_fields(record)) for record in records]
     keys = dict.fromkeys(key for record in flat for key in record)
     if len(keys) > MOST_COLUMNS or len(keys) * len(flat) > _MOST_VALUES:
@@ -138,8 +139,8 @@ def _fields(record: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _array(value: Any) -> Array:
-    """Numbers, missing where there is none; texts, which may be dates, where any entry is no number; else an object
-    that stands for what holds no numbers."""
+    """Numbers, missing where an entry has none; texts, which may be dates, where any entry is not a number; else a
+    placeholder for entries without numbers."""
     if isinstance(value, list) and value and all(_is_scalar(entry) for entry in value):
         if all(isinstance(entry, str) or entry is None for entry in value):
             return _of_texts(["" if entry is None else entry.strip() for entry in value])

@@ -34,7 +34,7 @@ _SAVED_INSTEAD = {
 
 
 def instead(name: str, what: str) -> str:
-    """What to do in Matlab before it is saved again, by what an array is; empty where nothing general is known."""
+    """Advice by the kind of array: how to convert it in Matlab before saving; empty where nothing general is known."""
     for said, statement in _SAVED_INSTEAD.items():
         if said in what:
             return f"in Matlab: {statement.format(name=name, plain=name.replace('.', '_'))}"
@@ -42,7 +42,7 @@ def instead(name: str, what: str) -> str:
 
 
 OF_CELL = re.compile(r"\d+-of-\d+/")
-"""Begin of the name of an array that stood in a cell."""
+"""Prefix of the name of an array from a cell."""
 
 
 class _Cells(tuple[Array, ...]):
@@ -62,13 +62,13 @@ class _Bytes:
         return len(self.content) - self.at
 
     def element(self) -> "tuple[int, _Bytes]":
-        """Type and content of the next element; `at` moves behind it. Raises ValueError if it is longer than what is
-        left."""
+        """Type and content of the next element; `at` moves behind it. Raises ValueError if it is longer than the rest
+        of the file."""
         if self.left < 8:
             raise ValueError("it is cut off")
         kind, size = struct.unpack_from(self.order + "II", self.content, self.at)
         begin, padded = self.at + 8, True
-        if kind >> 16:  # four bytes or fewer stand in the tag itself
+        if kind >> 16:  # data of up to four bytes are stored in the tag itself
             kind, size, begin = kind & 0xFFFF, kind >> 16, self.at + 4
             padded = False
         if size > (4 if not padded else self.left - 8):
@@ -79,7 +79,7 @@ class _Bytes:
         return kind, _Bytes(self.content[begin : begin + size], self.order)
 
     def numbers(self) -> Array:
-        """Numbers of the next element. Raises ValueError if it holds none."""
+        """Numbers of the next element. Raises ValueError if it has none."""
         kind, found = self.element()
         if kind not in _TYPES:
             raise ValueError(f"an element of the type {kind} stands where numbers are needed")
@@ -101,7 +101,7 @@ def read_mat5_arrays(path: Path) -> dict[str, Array]:
             kind, element = _unpack(element, limit).element()
         if kind == _MATRIX:
             name, value = _matrix(element, 0)
-            if name and not name.startswith("__"):  # what objects hold has no name
+            if name and not name.startswith("__"):  # the contents of objects have no name
                 _add(found, name, value)
     return found
 
@@ -138,7 +138,7 @@ def _matrix(element: _Bytes, depth: int) -> tuple[str, Any]:
 
 
 def _no_numbers(what: str) -> Array:
-    """Stands for what is left out, and says what it was."""
+    """Placeholder for an array that is left out, with its kind as text."""
     return np.array(what, dtype=object)
 
 
@@ -150,7 +150,7 @@ def _numeric(element: _Bytes, shape: tuple[int, ...], number: str) -> Array:
 
 
 def _structures(element: _Bytes, count: int, depth: int) -> dict[str, Any]:
-    """Fields by name; of several structures each under its number, as in `signals.2`."""
+    """Fields by name; of an array of structures each under its number, as in `signals.2`."""
     length = int(element.numbers()[0])
     names = bytes(element.element()[1].content)
     if length < 1 or len(names) % length:
@@ -163,7 +163,7 @@ def _structures(element: _Bytes, count: int, depth: int) -> dict[str, Any]:
 
 
 def _cells(element: _Bytes, count: int, depth: int) -> Any:
-    """Arrays of numbers that have as many dimensions, and as many rows or columns; all else is left out."""
+    """Arrays of numbers with the same number of dimensions, and of rows or columns; all others are left out."""
     if count * 8 > element.left:
         raise ValueError(f"a cell of {count} arrays is longer than what is left of the file")
     every = [_field(element, f"{number}", depth) for number in range(1, count + 1)]

@@ -22,7 +22,7 @@ Array = npt.NDArray[Any]
 _PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _CELL = "a cell, which is read where the file was saved with -v7"
 _NO_NUMBERS = np.array(None, dtype=object)
-"""Stands for texts and objects, of which only the existence is reported."""
+"""Placeholder for texts and objects, which are reported but not read."""
 
 
 def read_npz_arrays(path: Path) -> dict[str, Array]:

@@ -1,4 +1,4 @@
-"""Cells of a table: rows split into fields, and what is a number in them."""
+"""Cells of a table: rows split into fields, and recognition of numbers in them."""
 
 import csv
 import re
@@ -8,7 +8,7 @@ from equalizer.signals.units import UnknownUnitError, parse_unit, plain_unit
 from study.importing.arrays.time_stamps import is_stamp
 
 Line = tuple[int, str]
-"""Number in the file, from 1, and text."""
+"""A line with its number in the file, from 1."""
 
 NOT_AVAILABLE = "#n/a"
 EMPTY = (
@@ -17,7 +17,7 @@ EMPTY = (
 )  # fmt: skip
 COMMENTS = ("#", "%")
 _ERRORS = (NOT_AVAILABLE, "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#null!")
-"""Cells of a spreadsheet that begin like a comment, but are none."""
+"""Cells of a spreadsheet that look like the beginning of a comment but are not."""
 _LONGEST_ERROR = 8
 _LIKE_A_NUMBER = re.compile(r"[-+]?[.,]?\d[\d.,:/' \u00a0\u202f-]*(?:[dDeE][-+]?\d+)?(?P<rest>.*)")
 _BRACKETED = re.compile(r"[\[(].*[\])]")
@@ -38,13 +38,14 @@ def split_row(line: str, delimiter: str) -> list[str]:
         return re.split(r"\s+(?![\[(])", line.strip())  # `force [N]` is one field
     try:
         fields = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
-    except csv.Error:  # the reader takes no field above 131 072 letters, as a long line of another delimiter is
+    except csv.Error:  # a field above 131 072 characters, such as a line with another delimiter
         fields = line.split(delimiter)
     return [field.strip() for field in fields]
 
 
 def is_number(field: str, decimal: str) -> bool:
-    """Or an empty field. With a decimal comma a point is none: it would separate thousands."""
+    """Whether a field is a number, or empty. With a decimal comma, a field with a point is no number: the point would
+    separate thousands."""
     try:
         float(field.replace(".", " ").replace(",", ".") if decimal == "," else field)
     except ValueError:
@@ -57,20 +58,20 @@ def is_empty(field: str) -> bool:
 
 
 def filled_width(fields: Sequence[str]) -> int:
-    """Without empty fields at the end."""
+    """The fields without empty ones at the end."""
     return max((place for place, field in enumerate(fields, start=1) if field), default=0)
 
 
 def is_text(field: str) -> bool:
-    """Whether a field is words, or a digit with letters (`3a`), not a number in a spelling that is not understood
-    (`1.234,5`, `12:30`, `3 mm`) nor several in one field."""
+    """Whether a field is words, or a digit with letters (`3a`). A number in an unknown notation (`1.234,5`, `12:30`, `3
+    mm`), or several numbers in one field, are not words."""
     like = _LIKE_A_NUMBER.fullmatch(field)
     number = like is not None and (not re.fullmatch(r"\w+", like["rest"]) or is_unit(like["rest"]))
     return not number and not is_stamp(field) and not is_number(field, ".")
 
 
 def is_unit(text: str) -> bool:
-    """Whether it is a unit in a known spelling."""
+    """Whether a field is a unit in a known spelling."""
     try:
         parse_unit(plain_unit(text))
     except UnknownUnitError:
@@ -79,7 +80,7 @@ def is_unit(text: str) -> bool:
 
 
 def holds_data(fields: Sequence[str], decimal: str) -> bool:
-    """Whether any is a number in any spelling, a date or a clock time, as no header has."""
+    """Whether any field is a number in any notation, a date or a clock time, which a header does not contain."""
     return holds_number(fields, decimal) or any(is_stamp(field) or _is_spelled_number(field) for field in fields)
 
 
@@ -89,7 +90,8 @@ def _is_spelled_number(field: str) -> bool:
 
 
 def are_numbers(fields: Sequence[str], decimal: str, texts: Collection[int] = ()) -> bool:
-    """Or dates and clock times beside a number; texts: columns that hold words, which do not count."""
+    """Whether a row consists of numbers, or of dates and clock times with at least one number. texts: columns of words,
+    which do not count."""
     plain = [field for place, field in enumerate(fields) if place not in texts and not is_stamp(field)]
     return all(is_number(field, decimal) for field in plain) and not all(map(is_empty, plain))
 
@@ -99,7 +101,8 @@ def holds_number(fields: Sequence[str], decimal: str) -> bool:
 
 
 def first_numbers(rows: Sequence[Line], delimiter: str, decimal: str, texts: Collection[int] = ()) -> int | None:
-    """Index of the first row of numbers, or of the first of the rows directly above it that miss every number."""
+    """Index of the first row of numbers, or of the first of the rows directly above it in which every number is
+    missing."""
     split = (split_row(text, delimiter) for _, text in rows)
     found = next(((k, len(row)) for k, row in enumerate(split) if are_numbers(row, decimal, texts)), None)
     begin, width = found or (None, 0)

@@ -1,7 +1,7 @@
-"""Where the parts of a table are: delimiter, decimal sign, header, row of units, and rows of numbers.
+"""Layout of a table: delimiter, decimal sign, header, row of units, and rows of numbers.
 
-Seen from the numbers upwards, since they are what all tables have in common: the row above them is the header, or
-units with the header above; what stands higher is remarks.
+It is found from the rows of numbers, which all tables have: the row above them is the header, or units with the header
+above; rows further up are remarks.
 """
 
 import re
@@ -30,7 +30,7 @@ from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.signal_words import is_peak_value, name_signal
 
 _UNITLESS = (*EMPTY, "1")
-# From the text's begin or a bracket on: without that, the time of a search would grow with the square of the length.
+# The pattern starts at the beginning of the text or at a bracket: otherwise a search would take quadratic time.
 _BRACKETED = re.compile(r"(?<![^\[\]()])[^\[\]()]+[\[(][^\[\]()]*[\])]")
 
 
@@ -39,15 +39,15 @@ class TableLayout:
     delimiter: str
     decimal: str
     names: tuple[str, ...]
-    """With the unit in brackets where a row of units states it."""
+    """Column names, with the unit in brackets where a row of units states it."""
     body: Sequence[Line]
     texts: frozenset[int] = frozenset()
-    """Columns that hold words, by their place."""
+    """Indices of columns of words."""
     notes: tuple[str, ...] = ()
 
 
 def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
-    """lines: not empty, those that are comments included. Raises ValueError with what contradicts."""
+    """Layout from the lines that are not empty, comments included. Raises ValueError for contradictions."""
     rows = [line for line in lines if not is_comment(line[1])]
     if not rows:
         raise ValueError("it holds no lines")
@@ -80,7 +80,8 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
 
 
 def _with_given_names(rows: Sequence[Line], begin: int | None, marks: TableMarks, settings: CsvMap) -> TableLayout:
-    """Of a table whose map names its columns, or that has no row of numbers: its header is as wide as its last row."""
+    """Layout of a table whose map names its columns, or that has no row of numbers: its header is as wide as its last
+    row."""
     width = len(split_row(rows[-1][1], marks.delimiter))
     wide = [place for place, (_, text) in enumerate(rows) if len(split_row(text, marks.delimiter)) == width]
     rows = rows[0 if settings.names else wide[0] :]
@@ -92,7 +93,7 @@ def _with_given_names(rows: Sequence[Line], begin: int | None, marks: TableMarks
 
 
 def _without_empty_ends(body: Sequence[Line], delimiter: str, least: int) -> Sequence[Line]:
-    """Without the delimiters with which all rows end, as far as at least so many columns are left."""
+    """The rows without the delimiters at the end of every row, as long as at least `least` columns are left."""
     if delimiter == " ":
         return body
     surplus = len(split_row(body[0][1], delimiter)) - max(least, 1)
@@ -107,7 +108,7 @@ def _without_empty_ends(body: Sequence[Line], delimiter: str, least: int) -> Seq
 def _without_remarks_below(
     rows: Sequence[Line], begin: int, marks: TableMarks
 ) -> tuple[Sequence[Line], tuple[str, ...]]:
-    """Without lines of words below the last row, as `End of file`, that are no row; a sentence for each."""
+    """The rows without lines of words below the last row, such as `End of file`; with a sentence for each."""
     width, end = len(split_row(rows[begin][1], marks.delimiter)), len(rows)
     while end > begin + 1:
         fields = [field for field in split_row(rows[end - 1][1], marks.delimiter) if field]
@@ -118,7 +119,7 @@ def _without_remarks_below(
 
 
 def _count_faulty(above: Sequence[Line], width: int, marks: TableMarks) -> int:
-    """How many rows directly above the first row of numbers are data too, with a cell that is wrong."""
+    """Number of rows directly above the first row of numbers that are data with an invalid cell."""
     rows = (split_row(text, marks.delimiter) for _, text in reversed(above))
     return sum(1 for _ in takewhile(lambda fields: len(fields) == width and holds_data(fields, marks.decimal), rows))
 
@@ -128,8 +129,8 @@ def _strip_comment(line: str) -> str:
 
 
 def _rows_above(lines: Sequence[Line], rows: Sequence[Line], begin: int, delimiter: str) -> list[list[str]]:
-    """Those that are no comments, and below them a comment that holds units; comments where there is nothing else. A
-    mark of comments that stands alone in the first of as many fields as there are columns is a name."""
+    """Header lines: those that are not comments, and a comment below them that states units; comments if there are no
+    others. A comment mark alone in the first of as many fields as there are columns is a name."""
     narrow = len(split_row(_without_empty_ends(rows[begin:], delimiter, 1)[0][1], delimiter))
     widths = range(narrow, len(split_row(rows[begin][1], delimiter)) + 1)
     plain = [
@@ -152,15 +153,15 @@ def _is_marked_header(fields: list[str], widths: range, delimiter: str) -> bool:
 
 
 def _first_header(above: Sequence[Line], width: int, marks: TableMarks) -> int:
-    """The first row above the numbers that is as wide and holds none; else the first."""
+    """The first row above the numbers with the same width and without a number; else the first row."""
     split = [split_row(text, marks.delimiter) for _, text in above]
     words = [len(row) == width and not holds_number(row, marks.decimal) and not _are_units(row) for row in split]
     return words.index(True) if True in words else 0
 
 
 def _fit_header(header: list[str], fields: Sequence[str], delimiter: str) -> list[str]:
-    """As wide as a row of numbers, where empty fields at its end are too many; where names hold the delimiter, but
-    each ends with its unit in brackets; or where it has one name for a date and the clock time behind it."""
+    """Whether a row is as wide as a row of numbers, apart from: empty fields at its end; names that contain the
+    delimiter, where each ends with its unit in brackets; or one name for a date and the clock time behind it."""
     width = len(fields)
     if len(header) > width and not any(header[width:]):
         return header[:width]
@@ -173,17 +174,17 @@ def _fit_header(header: list[str], fields: Sequence[str], delimiter: str) -> lis
 def _header_and_units(
     above: Sequence[list[str]], width: int, decimal: str
 ) -> tuple[list[str] | None, list[str] | None]:
-    """The rows directly above the numbers; None where there is none of their width without a number in it."""
+    """The header rows directly above the numbers; None without a row of their width that has no number."""
     words = [fields if len(fields) == width else None for fields in above]
     last = words[-1] if words else None
     before = words[-2] if len(words) > 1 else None
-    if last and len(words) > 1 and _are_units(last):  # units below what is no header do not become the header
+    if last and len(words) > 1 and _are_units(last):  # a row of units is not the header
         return (before, last) if before and not holds_data(before, decimal) else (None, None)
     return (None if last is None or holds_data(last, decimal) else last), None
 
 
 def _are_units(fields: Sequence[str]) -> bool:
-    """Each a known unit, in brackets or not, or nothing; or all that say something in brackets."""
+    """Whether each field is a known unit, in brackets or not, or empty; or all texts are in brackets."""
     said = [field for field in fields if field.lower() not in _UNITLESS]
     return bool(said) and (all(is_unit(_bare(field)) for field in said) or all(_bare(field) != field for field in said))
 

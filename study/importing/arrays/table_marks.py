@@ -1,4 +1,4 @@
-"""Delimiter and decimal sign of a table, and its columns of words, by which its rows are numbers."""
+"""Delimiter, decimal sign and columns of words of a table, found by which reading makes its rows numbers."""
 
 import re
 from collections import Counter
@@ -20,7 +20,7 @@ from study.importing.map_format.signal_words import name_signal
 
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _SAMPLED = 32
-"""Rows that delimiter and decimal sign are tried on."""
+"""Number of rows on which delimiters and decimal signs are tried."""
 _POINTED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+")
 NO_THOUSANDS = "write numbers without signs between thousands"
 
@@ -30,14 +30,14 @@ class TableMarks:
     delimiter: str
     decimal: str
     texts: frozenset[int] = frozenset()
-    """Columns that hold words, by their place."""
+    """Indices of columns of words."""
 
 
 def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
-    """Delimiter and decimal sign by which there are as many columns as the map names; or by which most rows are
-    numbers: of several, tabs before blanks, those that split the line above them alike, then those with the most
-    columns. Where more are, those by which the most columns are numbers beside columns of words; else what splits the
-    rows alike. Raises ValueError where a comma or a point may be either sign."""
+    """Find delimiter and decimal sign: those that give as many columns as the map names; else those by which most rows
+    are numbers. Among several, tabs are preferred to blanks, then delimiters that split the line above alike, then
+    those with the most columns. Else those with the most columns of numbers beside columns of words; else those that
+    split all rows alike. Raises ValueError where a comma or point is ambiguous."""
     sample = rows[:: max(len(rows) // _SAMPLED, 1)]
     tabbed = all("\t" in text for _, text in sample[len(sample) // 2 :])
     best, found = (False, 0, False, False, 0), None
@@ -71,7 +71,7 @@ def _rows_of_numbers(sample: Sequence[Line], marks: TableMarks) -> list[list[str
 
 
 def _pairs(sample: Sequence[Line], settings: CsvMap) -> Iterator[tuple[str, str]]:
-    """Delimiter and decimal sign that may be; both a comma where fields are quoted."""
+    """Possible pairs of delimiter and decimal sign; both may be a comma where fields are quoted."""
     quoted = any('"' in text for _, text in sample)
     for decimal in (settings.decimal,) if settings.decimal else (".", ","):
         for delimiter in (settings.delimiter,) if settings.delimiter else _DELIMITERS:
@@ -80,8 +80,8 @@ def _pairs(sample: Sequence[Line], settings: CsvMap) -> Iterator[tuple[str, str]
 
 
 def _is_no_name(header: str, decimal: str, columns: int) -> bool:
-    """Whether the line above rows with a decimal comma speaks for commas that delimit: one with a comma (`t,u,` above
-    `0,1`), or a remark of several words (`Rig 3`) above what would be a single column."""
+    """Whether the line above rows with a decimal comma shows that commas are delimiters: a line with a comma (`t,u,`
+    above `0,1`), or a remark of several words (`Rig 3`) above a single column."""
     if decimal != ",":
         return False
     said = name_signal(header)
@@ -90,7 +90,7 @@ def _is_no_name(header: str, decimal: str, columns: int) -> bool:
 
 
 def _beside_words(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None:
-    """By the lower half of the rows, which is below any header."""
+    """Columns of words, from the lower half of the rows, which is below any header."""
     best, found = 0, None
     for delimiter, decimal in _pairs(sample, settings):
         rows = [split_row(text, delimiter) for _, text in sample[len(sample) // 2 :]]
@@ -105,7 +105,7 @@ def _beside_words(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None
 
 
 def _require_decimals(sample: Sequence[Line], marks: TableMarks) -> None:
-    """Raises ValueError where each comma in a number may as well separate thousands, as in 1,250 but not in 0,250."""
+    """Raises ValueError where each comma in a number may be a thousands separator, as in 1,250 but not in 0,250."""
     read = [(number, split_row(text, marks.delimiter)) for number, text in sample]
     with_comma = [
         (number, field)
@@ -123,7 +123,7 @@ def _require_decimals(sample: Sequence[Line], marks: TableMarks) -> None:
 
 
 def _require_points(rows: Sequence[Line], sample: Sequence[Line], marks: TableMarks) -> None:
-    """Raises ValueError where each point in a column may as well separate thousands, as in 1.886 beside 946."""
+    """Raises ValueError where each point in a column may be a thousands separator, as in 1.886 beside 946."""
     columns = list(zip(*_rows_of_numbers(sample, marks), strict=False))
     for place in (place for place, fields in enumerate(columns) if _may_be_thousands(fields)):
         whole = [fields[place] for fields in _rows_of_numbers(rows, marks) if len(fields) > place]
@@ -146,7 +146,8 @@ def _may_be_thousands(fields: Sequence[str]) -> bool:
 
 
 def _likely_delimiter(sample: Sequence[Line], decimal: str) -> str:
-    """That which splits the most rows of the lower half alike, into the most fields: for the error to be precise."""
+    """The delimiter that splits the most rows of the lower half alike, into the most fields: for a precise error
+    message."""
     lower = [text for _, text in sample[len(sample) // 2 :]]
 
     def alike(mark: str) -> tuple[int, int]:

@@ -1,8 +1,9 @@
-"""The text of a table: its encoding, as stated or found from the bytes.
+"""The text of a table: its encoding, as stated or detected from the bytes.
 
-UTF-8 and UTF-16 show by themselves. In other encodings each byte sequence means something else: Windows' western one is
-taken where bytes beyond ASCII stand alone or within words, as in `µs`, `°` and `Größe`; else the encoding in which the
-text holds a word for what is measured. Where several do, or none does, the readings are named.
+UTF-8 and UTF-16 can be recognised by their structure. Other encodings assign a meaning to every byte sequence:
+Windows-1252 is taken where bytes beyond ASCII stand alone or within words, as in `µs`, `°` and `Größe`; else the
+encoding in which the text contains a known word for a quantity. If several do, or none, the candidates are named in the
+error.
 """
 
 import codecs
@@ -15,7 +16,7 @@ from study.regular_file import TABLE_BYTES, read_regular
 from study.store.disk.file_errors import CannotReadError
 
 _LOOKED_AT = 4096
-"""Bytes in which UTF-16 without a mark shows: every other byte of a table in it is zero."""
+"""Bytes searched for UTF-16 without a byte order mark: every other byte of a table is then zero."""
 _READ_FOR_WORDS = 65536
 _ENCODINGS = ("gb18030", "shift_jis", "euc_jp", "euc_kr", "big5", "cp1251", "koi8_r", "cp1250", "cp1253")
 _BEYOND_ASCII = re.compile(r"[^\x00-\x7f]+")
@@ -26,11 +27,12 @@ _SHOWN = 24
 class TableText:
     text: str
     note: str
-    """A sentence where the encoding was found from words; else empty."""
+    """A sentence where the encoding was detected from words; else empty."""
 
 
 def read_text(path: Path, encoding: str) -> TableText:
-    """encoding: as the map states; empty to find it. Raises CannotReadError; ValueError with the key to state it."""
+    """Read the text. encoding: as stated by the map; empty to detect it. Raises CannotReadError; ValueError with the
+    key that states it."""
     try:
         data = read_regular(path, TABLE_BYTES)
     except OSError as problem:
@@ -63,7 +65,7 @@ def _decode(data: bytes, encoding: str) -> str:
 
 
 def _of_other_encoding(data: bytes) -> TableText:
-    """By the lines beyond ASCII that are no remarks."""
+    """Detection from the lines beyond ASCII that are not remarks."""
     begin = data if len(data) <= _READ_FOR_WORDS else data[: data.rfind(b"\n", 0, _READ_FOR_WORDS) + 1]
     lines = [line for line in begin.splitlines() if not line.isascii() and not line.lstrip().startswith((b"#", b"%"))]
     beyond = b"\n".join(lines)
@@ -97,7 +99,7 @@ def _is_western(data: bytes) -> bool:
 
 
 def _readable(data: bytes, encoding: str) -> str:
-    """The text; empty where it cannot be in this encoding."""
+    """The decoded text; empty where the bytes are not valid in this encoding."""
     try:
         return data.decode(encoding)
     except UnicodeDecodeError:

@@ -1,8 +1,8 @@
 """Read dates and clock times (`2024-03-01T12:00:00.123+01:00`, `12:00:00.123`) as seconds since the first.
 
 Field by field: the date, the time of day and the offset from UTC. A date in a column of its own belongs to the clock
-time beside it. Dates that do not begin with the year leave open which number is the day: they are understood only
-where all are the same.
+time beside it. In dates that do not begin with the year, day and month cannot be distinguished: they are accepted only
+where all dates are the same.
 """
 
 import re
@@ -31,7 +31,7 @@ class StampColumn:
     """Fields of one column: seconds of a date, of a clock time, or of both."""
 
     seconds: npt.NDArray[np.float64]
-    """(n,) Since the midnight before the first; NaN where the field is empty."""
+    """(n,), since the midnight before the first; NaN where the field is empty."""
     has_date: bool
     has_clock: bool
     first: str
@@ -43,8 +43,8 @@ def is_stamp(field: str) -> bool:
 
 
 def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
-    """None unless each field is a stamp or missing, and they are of one kind. Raises ValueError for dates whose order
-    is open, for stamps that do not exist, or that have a zone only in part."""
+    """Time stamps of a column; None unless each field is a stamp or missing, and all are of one kind. Raises ValueError
+    for dates of ambiguous order, for stamps that do not exist, and where only some have a time zone."""
     given = fields.notna()
     text = fields[given].str.strip()
     if text.empty or not text.map(is_stamp).all():
@@ -83,8 +83,8 @@ def _zone_s(zone: str) -> float:
 
 
 def _of_dates(dates: "pd.Series[str]") -> Seconds:
-    """Seconds since the first date: since 1970 they would leave no digits for microseconds."""
-    days: dict[str, float] = {}  # none for the only date where its order is open
+    """Seconds since the first date: seconds since 1970 would leave no digits for microseconds."""
+    days: dict[str, float] = {}  # no value for a single date of ambiguous order
     several = dates.nunique() > 1
     for date in dates.unique():
         numbers = [int(part) for part in re.split(r"\D", date)]
@@ -105,8 +105,8 @@ def _day(numbers: list[int], date: str) -> float:
 
 
 def join_stamps(columns: Mapping[str, StampColumn]) -> dict[str, StampColumn]:
-    """A column of dates is added to a column of clock times beside it, and disappears. Clock times without a date
-    that pass midnight go on with the next day."""
+    """Columns of dates are added to the columns of clock times beside them, and removed. Clock times without a date
+    continue with the next day at midnight."""
     dates = {name: column for name, column in columns.items() if not column.has_clock}
     clocks = {name: column for name, column in columns.items() if not column.has_date}
     joined = dict(columns)

@@ -1,7 +1,7 @@
-"""Read the sheets of a workbook (.xlsx) as tables: their cells are written as lines, and read as those of a text file.
+"""Read the sheets of a workbook (.xlsx) as tables: their cells are converted to lines and read like a text file.
 
-A sheet that is hidden or holds no rows of numbers is left out. Of several others each is named (`Run 1/force [N]`), as
-a part.
+Hidden sheets and sheets without rows of numbers are left out. With several sheets, names begin with that of the sheet
+(`Run 1/force [N]`).
 """
 
 import io
@@ -29,25 +29,24 @@ if TYPE_CHECKING:
 _BEGIN_OF_OLD = b"\xd0\xcf\x11\xe0"
 _DELIMITER = "\t"
 _MOST_ROWS, _MOST_COLUMNS = 2**20, 2**14
-"""Of a sheet, by the standard."""
+"""Most rows and columns of a sheet, by the standard."""
 _MOST_CELLS = 2**24
 _MOST_STATED = 2**22
-"""Cells that are written in a sheet: each takes a tenth of a millisecond, and as a table it is read a hundred times
-faster."""
+"""Most cells of a sheet: each takes a tenth of a millisecond; a text table is read a hundred times faster."""
 _NEVER_COMPUTED = re.compile(rb'<c (?![^<>]*t="str")[^<>]*><f[^<>]*(?:/>|>[^<]*</f>)(?:<v ?/>|<v></v>)?</c>')
 _PERCENT = re.compile(r"%|percent|pct", re.IGNORECASE)
 
 
 class _NotReadError(ValueError):
-    """A sheet that is whole, but not read."""
+    """A valid sheet that is not read, with the reason."""
 
 
 class _Percent(float):
-    """A number that its sheet shows times 100, with a percent sign."""
+    """A number that its sheet displays times 100, with a percent sign."""
 
 
 def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
-    """Raises OSError; ValueError with the sheet and what is wrong in it."""
+    """Arrays of a workbook. Raises OSError; ValueError with the sheet and the problem."""
     book = _open(read_regular(path))
     try:
         hidden = [sheet.title for sheet in book.worksheets if sheet.sheet_state != "visible" and not settings.sheet]
@@ -74,7 +73,7 @@ def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
 
 
 def _open(data: bytes) -> "Workbook":
-    # Imported where workbooks are read: it takes longer than all that is done with other files.
+    # Imported where workbooks are read: it takes longer than reading any other file.
     from openpyxl import load_workbook
 
     if data.startswith(_BEGIN_OF_OLD):
@@ -88,7 +87,7 @@ def _open(data: bytes) -> "Workbook":
                 if name.startswith("xl/worksheets/"):
                     _require_plain(name, archive.read(name))
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # on styles and on extensions of cells, which are no numbers
+            warnings.simplefilter("ignore")  # about styles and extensions, which do not affect numbers
             return load_workbook(io.BytesIO(data), read_only=True, data_only=True)
     except (DeclaredSizeError, _NotReadError):
         raise
@@ -106,14 +105,14 @@ def _read_rows(sheet: Any) -> list[tuple[int, tuple[Any, ...]]]:
 
 
 def _require_plain(member: str, sheet: bytes) -> None:
-    """Raises ValueError where a sheet has too many cells, which are counted before anything parses them."""
+    """Raises ValueError where a sheet has too many cells; they are counted before anything parses them."""
     cells, rows = sheet.count(b"<c ") + sheet.count(b"<c>"), sheet.count(b"<row")
     if cells > min(_MOST_STATED, rows * _MOST_COLUMNS):
         raise _NotReadError(f"{member} of it has {cells} cells in {rows} rows; save the sheet as .csv")
 
 
 def _require_computed(sheet: Any) -> None:
-    """Raises ValueError for formulas whose values nothing knows."""
+    """Raises ValueError for formulas whose values were not saved."""
     with sheet.parent._archive.open(sheet._worksheet_path) as member:  # noqa: SLF001 openpyxl tells it no other way
         if _NEVER_COMPUTED.search(member.read()):
             raise _NotReadError(
@@ -122,7 +121,7 @@ def _require_computed(sheet: Any) -> None:
 
 
 def _rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
-    """Rows that hold something, with their numbers."""
+    """Rows with any content, with their numbers."""
     _require_computed(sheet)
     sheet.reset_dimensions()  # some programs state fewer rows than they write
     filled = 0
@@ -148,7 +147,7 @@ def _value(cell: Any) -> Any:
 
 
 def _is_of_numbers(cells: Sequence[Any]) -> bool:
-    """Two numbers or more, or nothing else: a name with its value is a setting."""
+    """Whether a row has two numbers or more, or nothing else: a name with a value is a setting."""
     filled = [cell for cell in cells if cell is not None]
     numbers = [cell for cell in filled if isinstance(cell, int | float) or _is_number_in_text(cell)]
     return len(numbers) > 1 or (bool(numbers) and len(numbers) == len(filled))
@@ -190,7 +189,8 @@ def _width(cells: Sequence[Any]) -> int:
 
 
 def _line(number: int, cells: Sequence[Any], width: int, how: tuple[Collection[int], str]) -> Line:
-    """how: columns of which some cell says percent, whose numbers are taken as they are shown; the decimal sign."""
+    """The cells of a row as text. how: columns in which a cell shows percent, whose numbers are taken as displayed; and
+    the decimal sign."""
     percents, decimal = how
     fields = [
         f"{cell * 100:.15g}".replace(".", decimal)

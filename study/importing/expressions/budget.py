@@ -1,7 +1,7 @@
 """Limit of the cost of a map's expressions: numbers held at once, numbers computed in total, and nesting.
 
 A definition may use another twice, and that one a third twice: forty of these are 10^12 values, although the map is
-short. So cost is counted during evaluation, not estimated from the text.
+short. Therefore the cost is counted during evaluation, not estimated from the text.
 """
 
 from collections.abc import Iterator

@@ -1,6 +1,6 @@
 """Evaluate expressions of a map: arithmetic over arrays. Parsed by Python's parser, never evaluated by it.
 
-Everything outside the lists below is refused by name: no attributes, no calls but ours, no comprehensions.
+Everything outside the lists below is refused by name: no attributes, no other function calls, no comprehensions.
 """
 
 import ast
@@ -49,7 +49,7 @@ def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
     tree = parse_expression(text)
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, which is told as such later
+            warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, which is reported later
             value: Value | str = _Evaluation(text, lookup, clock, budget).of(tree)
     except (MemoryError, RecursionError) as error:
         raise ImportProblemError(f"'{text}' needs more memory than there is") from error

@@ -25,7 +25,7 @@ class Function:
     fewest: int
     most: int
     call: Callable[..., Any]
-    """Called with the clock, then the values."""
+    """Arguments: the clock, then the values."""
 
 
 def _plain(usage: str, meaning: str, function: Callable[..., Any], count: int = 1) -> Function:

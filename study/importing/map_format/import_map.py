@@ -1,4 +1,4 @@
-"""What a map says: which array is which channel, in which unit, on which clock, and which samples are what.
+"""The import map: which array is which channel, in which unit, on which clock, and the role of samples.
 
 Every key of a map's TOML is a field here; docs/importing.md is made from these descriptions.
 """
@@ -18,7 +18,7 @@ Kind = Literal["multisine", "sweep", "sine", "slow", "noise", "binary", "step", 
 
 @dataclass(frozen=True, config=STRICT)
 class CsvMap:
-    """How tables are written, where it cannot be seen from the file itself."""
+    """Notation of tables, where it cannot be detected from the file itself."""
 
     skip_lines: Annotated[int, Field(ge=0, description="Lines before the header. Default 0.")] = 0
     delimiter: Annotated[str, Field(description="Between fields. Default: what the numbers show.")] = ""

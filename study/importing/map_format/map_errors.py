@@ -32,7 +32,7 @@ class ImportRefusedError(StudyError):
 
 
 class MapNeededError(WrongUseError):
-    """Nothing says what the arrays are. `skeleton`: a map for this file, to be completed."""
+    """The meaning of the arrays is not known. `skeleton`: a map for this file, to be completed."""
 
     def __init__(self, file: str, why: str, skeleton: str) -> None:
         super().__init__(
@@ -46,7 +46,7 @@ class MapNeededError(WrongUseError):
 
 
 def _sentence(problem: str) -> str:
-    """Names and fields shortened: those of a damaged file may have a million letters."""
+    """Shorten names and fields: those of a damaged file may have a million letters."""
     short = _QUOTED.sub(r"'\1…'", problem)
     if len(short) > _LONGEST_SENTENCE:
         short = f"{short[:_LONGEST_SENTENCE].rpartition('; ')[0] or short[:_LONGEST_SENTENCE]}; and more"
@@ -54,8 +54,8 @@ def _sentence(problem: str) -> str:
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """ "; did you mean 'x'", where something is close."""
-    names = list(islice(known, _MOST_NAMES))  # of a million it would take minutes
+    """ "; did you mean 'x'" for a similar name; else empty."""
+    names = list(islice(known, _MOST_NAMES))  # for a name of a million letters it would take minutes
     close = (
         get_close_matches(word[:_LONGEST_WORD], names, n=1)
         or [name for name in names if name.lower() == word.lower()][:1]

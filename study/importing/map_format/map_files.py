@@ -39,7 +39,7 @@ def part_files(wanted: ImportMap, files: Sequence[Path]) -> tuple[PartFiles, ...
 
 
 def _order_files(wanted: ImportMap, files: Sequence[Path]) -> list[Path]:
-    """Sorted by the map's patterns, then as given."""
+    """Files sorted by the map's patterns, then as given."""
     found = []
     for path in files:
         fits = [number for number, pattern in enumerate(wanted.files) if fnmatchcase(path.name, pattern)]

@@ -23,13 +23,14 @@ from study.importing.map_format.import_map import SignalRole
 
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+(?:\([^\[\]()]*\))?)[\])]\s*")
 _SAID_BEHIND = re.compile(r"(?<=\w)(?:\s*/\s*|\s*,\s+|\s+in\s+)(?=\S)")
-"""`force / N`, `force, N`, `Kraft in N`: as standards and testing machines write it."""
+"""Units behind a slash, comma or `in` (`force / N`, `force, N`, `Kraft in N`), as in standards and of testing
+machines."""
 _NO_UNITS = ("n/a", "na", "none", "-", "--")
 _PEAK = re.compile(r"(?<![a-z])(peak|pk|rms)\b|(?<=[av])(peak|pk|rms)\b", re.IGNORECASE)
 LONGEST_NAME = 300
-"""Characters; no channel is called by more, and to search for a unit in them takes time by the square."""
+"""Longest name in characters; the search for a unit takes quadratic time."""
 _REMEMBERED = 2**14
-"""Names: the headers of one file are asked for again and again."""
+"""Size of the cache of names: the headers of one file are interpreted repeatedly."""
 _FOREIGN = {
     "time": ("时间", "時間", "時刻", "시간", "время", "χρόνος"),
     "force": ("载荷", "荷重", "하중", "сила", "усилие", "δύναμη"),
@@ -46,7 +47,7 @@ _FOREIGN = {
 FOREIGN_WORDS = {word: quantity for quantity, words in _FOREIGN.items() for word in words}
 """Words in other scripts, by which an encoding is recognised, and the quantity of each."""
 _SURE = ("rad", "mrad", "rpm", "kN", "N m", "mN m")
-"""Units that are nothing else at the end of a name, as `A` of `phase_A` is; so are those with a stroke."""
+"""Units that are unambiguous at the end of a name, unlike `A` in `phase_A`; so are those with a slash."""
 _WRITTEN_TOGETHER = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
 _SAID: dict[str, SignalRole] = {
     **dict.fromkeys(("command", "cmd", "commanded", "comando", "mando", "befehl", "commande"), "command"),
@@ -55,12 +56,12 @@ _SAID: dict[str, SignalRole] = {
     **dict.fromkeys(("supply", "battery", "bus", "ambient", "setting"), "condition"),
 }  # fmt: skip
 _SHORT: dict[str, SignalRole] = {"u": "command", "y": "response"}
-"""Textbook names of input and output, if both exist and no `x`: then `y` would be an axis."""
+"""Textbook names of input and output, if both exist and there is no `x`: `y` would then be an axis."""
 _ALONE: dict[str, SignalRole] = {
     **dict.fromkeys(("input", "entrada", "eingang", "entrée", "entree"), "command"),
     **dict.fromkeys(("output", "salida", "ausgang", "sortie"), "response"),
 }
-"""Names of input and output where they are all of a name: an output speed is known as a speed."""
+"""Names of input and output, valid only as the whole name: an output speed is a speed."""
 _Role = SignalRole | Literal[""]
 _DRIVES, _FEEDS = ("force", "torque"), ("current", "voltage")
 _MOTIONS, _PLACES = ("acceleration", "velocity"), ("position", "angle")
@@ -73,12 +74,12 @@ class ParsedName:
     header: str
     name: str
     unit: str
-    """As in the file; empty if none is stated or known."""
+    """Unit as in the file; empty if none is stated or known."""
     quantity: str
-    """Empty if neither the unit nor a word tells it."""
+    """Quantity; empty if neither the unit nor a word determines it."""
     doubt: str
-    """What is uncertain: an unknown unit, a unit from a name without a supporting word (`phase_A`), or a
-    contradiction. Empty if nothing is."""
+    """Uncertainty: an unknown unit, a unit from a name without a supporting word (`phase_A`), or a contradiction; else
+    empty."""
 
     @property
     def sure(self) -> bool:
@@ -149,10 +150,9 @@ def _unknown(unit: str) -> str:
 
 
 def roles_of(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
-    """Roles by quantity: forces are commands, or voltages or currents if there are none, or else what is called a
-    command; accelerations and
-    velocities are responses, or positions if there are no others; other known quantities are conditions. None if
-    something is open or contradicted by a name (`open_roles` says what)."""
+    """Roles by quantity: forces are commands, or voltages or currents if there are none, or else channels named as
+    commands; accelerations and velocities are responses, or positions if there are no others; other known quantities
+    are conditions. None if something is open or contradicted by a name (`open_roles` says what)."""
     return None if open_roles(columns) else [role for role in _roles(columns, _said_roles(columns)) if role]
 
 
@@ -185,7 +185,7 @@ def propose_roles(columns: Sequence[ParsedName]) -> list[_Role]:
 
 
 def may_be_imposed(columns: Sequence[ParsedName]) -> bool:
-    """Whether there are forces and places alone, and no name says which of them is the command."""
+    """Whether there are only forces and positions, and no name says which of them is the command."""
     quantities = {column.quantity for column in columns}
     plain = not {"command", "helper", "response"} & set(_said_roles(columns))
     return plain and bool(quantities & set(_DRIVES) and quantities & set(_PLACES)) and not quantities & set(_MOTIONS)
@@ -223,7 +223,7 @@ def _by_quantity(columns: Sequence[ParsedName], said: Sequence[_Role]) -> dict[s
     by_quantity: dict[str, SignalRole] = {}
     if quantities & set(_DRIVES):
         by_quantity.update({**dict.fromkeys(_FEEDS, "helper"), **dict.fromkeys(_DRIVES, "command")})
-    elif len(quantities & set(_FEEDS)) == 1:  # which of both would be the command cannot be told
+    elif len(quantities & set(_FEEDS)) == 1:  # the command cannot be identified
         by_quantity.update(dict.fromkeys(_FEEDS, "command"))
     by_quantity.update(dict.fromkeys(_PLACES, "position"))
     by_quantity.update(dict.fromkeys(answers, "response"))

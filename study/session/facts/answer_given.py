@@ -1,5 +1,7 @@
-"""An answer, with what is known of the device when it comes: a trial whose program dies before its measurement is
-judged by what happened until then."""
+"""The event of an answer, with the device's counters at that moment.
+
+If the program is killed before the measurement of the trial is logged, the trial is judged by these counters.
+"""
 
 from typing import Annotated, Literal
 
@@ -12,12 +14,12 @@ from study.session.facts.sitting_events import FACT
 
 @dataclass(frozen=True, config=FACT)
 class AnswerHealth:
-    """Counted since the stimulus began, in ticks, as `study.devices.device.Health` counts."""
+    """Device counters in ticks since the stimulus began, as in `study.devices.device.Health`."""
 
     fault: Annotated[str, Field(pattern="^[A-Z_]{1,40}$")]
     """Name of the device's fault; NONE where there was none."""
     felt_whole: bool
-    """No fault stopped the stimulus before the answer."""
+    """Whether the stimulus was complete until the answer: no fault had stopped it."""
     ticks: Count
     missed_ticks: Count
     stimulus_clipped: Count
@@ -27,12 +29,12 @@ class AnswerHealth:
     peak_command_n: Magnitude
     late_ticks: Count | None = None
     latest_s: Seconds | None = None
-    """Null, both, in logs of older versions."""
+    """Both are null in logs of older versions."""
 
 
 @dataclass(frozen=True, config=FACT)
 class AnswerGiven:
-    """Written before anything reacts to it."""
+    """The participant's answer, written before the program acts on it."""
 
     utc: UtcTime
     run: Index

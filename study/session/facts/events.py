@@ -92,7 +92,7 @@ FIELDS_SINCE: dict[str, object] = {
     "nominal_n": None,
     "sensor": None,
 }
-"""Fields that came after the first logs, as they are where a line does not say them: then they are not written."""
+"""Defaults of fields that were added after the first logs; fields with these values are not written."""
 
 
 @dataclass(frozen=True, config=FACT)
@@ -105,7 +105,7 @@ class DeviceFacts:
 
 @dataclass(frozen=True, config=FACT)
 class SessionOpened:
-    """First line of every log: all that the rest follows from."""
+    """First line of every log: everything that the rest of the session depends on."""
 
     utc: UtcTime
     format: Literal["hapteq-session"]
@@ -113,7 +113,7 @@ class SessionOpened:
     session: str
     subject: str
     participant_number: Index
-    """How many participants began this protocol before: chooses the row of a balanced order."""
+    """Number of participants who began this protocol before; it selects the row of a balanced order."""
     observer: str | None
     """Name of the simulated participant; null for a person."""
     protocol_text: str
@@ -124,11 +124,12 @@ class SessionOpened:
     equalizer: str
     versions: dict[str, str]
     equalized: EqualizedFacts | None = None
-    """Null: the commanded force is what was wanted."""
+    """Equalizer of the stimuli; null: the commanded force is the wanted force."""
     monotonic_s: Seconds | None = None
     dose_elsewhere: DoseElsewhere | None = None
     rules: Literal[1, 2] = 1
-    """Of void trials, refusals and places, see `state.rules`. A session keeps those that it began with."""
+    """Version of the rules for void trials, refusals and places, see `state.rules`. A session keeps the version that it
+    began with."""
     event: Literal["session_opened"] = "session_opened"
 
 
@@ -145,20 +146,20 @@ class TrialPresented:
     level_db: LevelDb
     level_n: ForceN
     direction: Literal[1, 2]
-    """The number that is the right answer; with swapped labels not the number of the protocol's direction."""
+    """Number of the correct answer; with swapped labels it differs from the number of the protocol's direction."""
     angle_deg: AngleDeg
     polarity: Literal[-1, 1]
     wanted_mps2: Magnitude | None = None
-    """The acceleration that the level stands for; null where levels are commanded forces."""
+    """Wanted acceleration of the level; null where levels are commanded forces."""
     nominal_n: ForceN | None = None
-    """Level of the staircase, around which the amplitude was drawn; null where nothing is roved."""
+    """Level of the staircase, around which the amplitude was drawn; null without roving."""
     monotonic_s: Seconds | None = None
     event: Literal["trial_presented"] = "trial_presented"
 
 
 @dataclass(frozen=True, config=FACT)
 class TrialMeasured:
-    """What the device did in an answered trial. It closes the trial: the answer counts."""
+    """Measurement of an answered trial. It closes the trial: the answer counts."""
 
     utc: UtcTime
     run: Index
@@ -176,7 +177,7 @@ class TrialMeasured:
     late_ticks: Count | None = None
     latest_s: Seconds | None = None
     vibrated_s: Seconds | None = None
-    """How long the hand was shaken, fades included: for the vibration dose."""
+    """Duration of the vibration, fades included, for the vibration dose."""
     offset_mm: Magnitude | None = None
     """Farthest the handle was from its place while recorded: a lean on the spring."""
     sensor: SensorFacts | None = None
@@ -207,7 +208,7 @@ class TrialSpoiled:
 
 @dataclass(frozen=True, config=FACT)
 class SessionInterrupted:
-    """The participant or experimenter left on purpose, or a fault ended the sitting. It can be resumed."""
+    """The participant or experimenter ended the sitting, or a fault did. The session can be resumed."""
 
     utc: UtcTime
     reason: str
@@ -221,7 +222,7 @@ class SessionResumed:
     device: DeviceFacts
     versions: dict[str, str]
     mended: str = ""
-    """A torn last line that a crash left behind, kept here for the record."""
+    """An incomplete last line that a crash left behind, kept for the record."""
     dose_elsewhere: DoseElsewhere | None = None
     monotonic_s: Seconds | None = None
     event: Literal["session_resumed"] = "session_resumed"
@@ -254,11 +255,13 @@ EVENTS: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="e
 
 
 def event_line(event: Event) -> bytes:
-    """One line of JSON, newline included. What earlier versions did not log is left out where it is not known."""
+    """One line of JSON, newline included. Fields that earlier versions did not log are left out where they have their
+    default."""
     unsaid = {name for name, untouched in FIELDS_SINCE.items() if getattr(event, name, untouched) == untouched}
     return EVENTS.dump_json(event, exclude=unsaid) + b"\n"
 
 
 def parse_event(line: bytes) -> Event:
-    """Every field as its type. Raises pydantic.ValidationError (a ValueError) where the line is no event of ours."""
+    """Parse a line to its event type. Raises pydantic.ValidationError (a ValueError) where the line is none of our
+    events."""
     return EVENTS.validate_json(line, strict=True)

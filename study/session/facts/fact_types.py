@@ -1,4 +1,4 @@
-"""Types of the fields of logged facts: what a value must be, so that no later reader can fail on it.
+"""Types of the fields of logged facts: constraints on values, so that no later reader can fail on them.
 
 Bounds are wider than anything that a device or a person can do. They keep powers finite, numbers printable, times
 comparable and files inside the session's folder.
@@ -19,7 +19,8 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,199}", re.ASCII)
 
 
 def utc_time(text: str) -> str:
-    """The same text. Raises ValueError unless it is an aware time that can be converted and subtracted."""
+    """The text, unchanged. Raises ValueError unless it is a time with UTC offset that can be converted and
+    subtracted."""
     if not _ISO_8601.fullmatch(text):
         raise ValueError("is no time with date and UTC offset in ISO 8601")
     if datetime.fromisoformat(text).year not in _YEARS:
@@ -43,11 +44,11 @@ UtcTime = Annotated[str, AfterValidator(utc_time)]
 """Date, time and UTC offset, ISO 8601. `datetime.fromisoformat` reads it as an aware datetime."""
 Count = Annotated[int, Field(ge=0, le=10**9)]
 Index = Annotated[int, Field(ge=0, le=10**6)]
-"""Of a run, a trial or an attempt, from 0."""
+"""Index of a run, a trial or an attempt, from 0."""
 Seed = Annotated[int, Field(ge=0, lt=2**256)]
 Seconds = Annotated[float, Field(ge=0, le=1e9)]
-"""A duration; as `monotonic_s`, a reading of the computer's monotonic clock beside `utc`, of which only differences
-within a sitting say anything (null where it was not logged)."""
+"""A duration; as `monotonic_s`, a reading of the computer's monotonic clock beside `utc`, which is meaningful only in
+differences within a sitting (null where it was not logged)."""
 FrequencyHz = Annotated[float, Field(gt=0, le=1e6)]
 ForceN = Annotated[float, Field(ge=0, le=1e3)]
 LevelDb = Annotated[float, Field(ge=-1e4, le=1e4)]
@@ -60,4 +61,4 @@ Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 RecordingPath = Annotated[str, AfterValidator(_check_recording_path)]
 """`recordings/<name>.h5`, relative to the session's folder."""
 FileName = Annotated[str, AfterValidator(_check_file_name)]
-"""Of a file directly in the session's folder."""
+"""Name of a file directly in the session's folder."""

@@ -1,7 +1,7 @@
-"""What a level means where stimuli are equalized: a wanted acceleration, equal for both directions.
+"""Meaning of a level where stimuli are equalized: a wanted acceleration, equal for both directions.
 
-Levels stay newtons, so that cap, steps and rules stay what they are: a level is the highest force that either of the
-two directions needs for its acceleration. Both directions then reach the cap at the same acceleration.
+Levels stay newtons, so that cap, steps and rules do not change: a level is the larger of the two forces that the
+directions need for the same acceleration. Both directions then reach the cap at the same acceleration.
 """
 
 from pydantic.dataclasses import dataclass
@@ -12,27 +12,27 @@ from study.session.facts.sitting_events import FACT
 
 @dataclass(frozen=True, config=FACT)
 class LevelScale:
-    """At one frequency."""
+    """Scale at one frequency."""
 
     frequency_hz: FrequencyHz
     n_per_mps2: Positive
     """Level for a wanted acceleration of 1 m/s²."""
     reachable_mps2: Magnitude
-    """At the cap of the staircase, in either direction."""
+    """Acceleration at the cap of the staircase, in either direction."""
 
 
 @dataclass(frozen=True, config=FACT)
 class EqualizedFacts:
-    """Through what the stimuli of a session go."""
+    """The equalizer of a session's stimuli."""
 
     model: FileName
-    """File in the session folder."""
+    """File of the model in the session folder."""
     sha256: Sha256
-    """Of that file."""
+    """SHA-256 of that file."""
     levels: tuple[LevelScale, ...]
-    """One per frequency that may be played."""
+    """Scales, one per frequency that may be played."""
     quality: str = ""
-    """Of the model, by what was measured, in words; empty in logs of earlier versions."""
+    """Errors of the model by what was measured, in words; empty in logs of earlier versions."""
 
 
 def acceleration_of_level(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float | None:

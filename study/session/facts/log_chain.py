@@ -9,7 +9,7 @@ import hashlib
 from dataclasses import dataclass
 
 DIGITS = 32
-"""Of SHA-256, in hexadecimal: 128 bits."""
+"""Length of a checksum in hexadecimal digits: the first 128 bits of SHA-256."""
 SEED = "0" * DIGITS
 """Checksum before the first line."""
 
@@ -38,7 +38,7 @@ class ChainBrokenError(ValueError):
 
 
 def write_chained(chain: Chain, event: bytes) -> tuple[Chain, bytes]:
-    """event: a JSON object without a line end. Returns the line with its checksum, line end included."""
+    """Append an event (a JSON object without a line end). Returns the line with its checksum, line end included."""
     after = _after(chain, event, carried=True)
     return after, event[:-1] + _FIELD + after.head.encode() + _END + b"\n"
 
@@ -61,7 +61,7 @@ def _after(chain: Chain, event: bytes, carried: bool) -> Chain:
 
 
 def _split(line: bytes) -> tuple[bytes, str | None]:
-    """Event bytes and checksum; on the raw bytes, so that nothing is parsed and written again."""
+    """Bytes of the event and checksum, split on the raw bytes, so that nothing is parsed and written again."""
     digits = line[-len(_END) - DIGITS : -len(_END)]
     ends_so = line[-_LENGTH:].startswith(_FIELD) and line.endswith(_END)
     if not ends_so or len(line) <= _LENGTH or not _HEXADECIMAL.issuperset(digits):

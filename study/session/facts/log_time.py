@@ -27,14 +27,14 @@ class ClockStep:
     """The wall clock of the computer was set between two entries of the log."""
 
     utc: str
-    """Of the first entry after it, by the clock as it was set."""
+    """UTC time of the first entry after the step, by the clock as it was set."""
     by_s: float
-    """Positive: forward."""
+    """Size of the step in seconds; positive: forward."""
     between_sittings: bool
 
     @property
     def sentence(self) -> str:
-        """For the experimenter."""
+        """Sentence for the experimenter."""
         step = _duration(abs(self.by_s))
         limits = "Time limits and the vibration dose do not follow it; the times in the log do."
         if self.by_s > 0:
@@ -65,7 +65,7 @@ def clock_step(before: Moment, now: Moment, between_sittings: bool = False) -> C
 
 
 def seconds_between(first_utc: str, second_utc: str) -> float:
-    """By the wall clock: negative if it was set back. Both ISO 8601; 0 if the first is empty."""
+    """Seconds by the wall clock: negative if it was set back. Both ISO 8601; 0 if the first is empty."""
     if not first_utc:
         return 0.0
     return (datetime.fromisoformat(second_utc) - datetime.fromisoformat(first_utc)).total_seconds()

@@ -23,27 +23,27 @@ FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 @dataclass(frozen=True, config=FACT)
 class DoseElsewhere:
-    """What the same hand got since its last night's rest in other sessions of the participant, see `Dose`."""
+    """Vibration dose of the same hand since its last night's rest in other sessions of the participant, see `Dose`."""
 
     sessions: tuple[str, ...]
     squared_s: Magnitude
     vibrated_s: Seconds
     unmeasured_s: Seconds
     still_s: Seconds
-    """Since it last moved in any of them."""
+    """Seconds since the hand last moved in any of them."""
     unread: tuple[str, ...] = ()
-    """Sessions that cannot be read: nothing of them is counted."""
+    """Sessions that cannot be read and are not included."""
 
 
 @dataclass(frozen=True, config=FACT)
 class FormFilled:
-    """Consent, exclusion, set-up or debrief. What a form asks for the moment only (why a person may not take part)
-    is not kept: `answers` holds what the study needs."""
+    """Answers to a form: consent, exclusion, set-up or debrief. Answers that matter only at the moment (why a person
+    may not take part) are not kept: `answers` contains what the study needs."""
 
     utc: UtcTime
     form: Literal["consent", "exclusion", "setup", "debrief"]
     version: str
-    """Of the form, as its protocol states it."""
+    """Version of the form, as stated by its protocol."""
     ethics_id: str
     passed: bool
     """False: consent was not given, or a person may not take part. Always true for the other forms."""
@@ -58,8 +58,8 @@ class PlaceTaken:
 
     utc: UtcTime
     participant_number: Count
-    """How many participants of this protocol took their places before; from here on this one holds, not that of the
-    opening line."""
+    """Number of participants of this protocol who took their places before; it replaces the number of the opening
+    line."""
     monotonic_s: Seconds | None = None
     event: Literal["place_taken"] = "place_taken"
 
@@ -82,7 +82,7 @@ class DemoPlayed:
     frequency_hz: FrequencyHz
     level_n: ForceN
     direction: Literal[1, 2]
-    """The number on the screen."""
+    """Number of the direction on the screen."""
     angle_deg: AngleDeg
     seconds: Seconds
     monotonic_s: Seconds | None = None
@@ -91,7 +91,7 @@ class DemoPlayed:
 
 @dataclass(frozen=True, config=FACT)
 class OnsetPulsed:
-    """A pulse on the lab's line, sent as the device had begun the trial's force; logged when the trial is over."""
+    """A trigger pulse on the lab's line at the onset of the trial's force; logged when the trial is over."""
 
     utc: UtcTime
     run: Index
@@ -99,7 +99,7 @@ class OnsetPulsed:
     attempt: Index
     line: str
     pulsed_s: Seconds | None
-    """Monotonic clock of the session as the line had taken it; null: lost, see `trouble`."""
+    """Monotonic time of the session at which the line accepted the pulse; null: lost, see `trouble`."""
     trouble: str = ""
     monotonic_s: Seconds | None = None
     event: Literal["onset_pulsed"] = "onset_pulsed"
@@ -111,18 +111,18 @@ class ProbePlayed:
 
     utc: UtcTime
     number: Index
-    """Counts all probes of the session, from 0."""
+    """Number of the probe in the session, from 0."""
     kind: Literal["hand", "free", "reference"]
-    """With a hand; as a test whether the handle is free; the reference."""
+    """Kind: with a hand on the handle; a test whether the handle is free; the reference."""
     level_n: ForceN
-    """Peak of the norm."""
+    """Peak of the norm of the force."""
     monotonic_s: Seconds | None = None
     event: Literal["probe_played"] = "probe_played"
 
 
 @dataclass(frozen=True, config=FACT)
 class ProbeMeasured:
-    """What came of the probe that was played last. One without this line was cut off by the program's end."""
+    """Result of the last probe. A probe without this line was cut off by the program's end."""
 
     utc: UtcTime
     number: Index
@@ -130,29 +130,29 @@ class ProbeMeasured:
     recording: RecordingPath | None = None
     sha256: Sha256 | None = None
     rms_mps2: Magnitude | None = None
-    """Of the measured acceleration, all axes together; null where nothing was kept."""
+    """Rms of the measured acceleration, all axes together; null without a recording."""
     apparent_mass_kg: Magnitude | None = None
-    """Force over acceleration at its upper lines: a hand on the handle adds to it."""
+    """Apparent mass: force over acceleration at the upper lines; a hand on the handle increases it."""
     trouble: str = ""
-    """Why nothing was kept of it, or what speaks against using it."""
+    """Why there is no recording, or why it should not be used."""
     monotonic_s: Seconds | None = None
     event: Literal["probe_measured"] = "probe_measured"
 
 
 @dataclass(frozen=True, config=FACT)
 class MaskingPlayed:
-    """From here on the program plays masking noise, or does no more."""
+    """The program starts or stops playing masking noise."""
 
     utc: UtcTime
     playing: bool
     output: str
     level_db: float
-    """Re the file of `hapteq noise`."""
+    """Level relative to the file of `hapteq noise`."""
     low_hz: FrequencyHz
     high_hz: FrequencyHz
     seed: Count
     trouble: str = ""
-    """Why it fell silent, where it was not stopped."""
+    """Why it stopped, where it was not stopped on purpose."""
     monotonic_s: Seconds | None = None
     event: Literal["masking_played"] = "masking_played"
 
@@ -190,7 +190,7 @@ class NoteTaken:
     who: Literal["participant", "experimenter", "program"]
     text: str
     adverse: bool = False
-    """Something happened to the participant: pain, numbness, a fright."""
+    """An adverse event of the participant: pain, numbness, a fright."""
     monotonic_s: Seconds | None = None
     event: Literal["note_taken"] = "note_taken"
 

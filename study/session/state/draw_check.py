@@ -7,7 +7,7 @@ from study.session.state.due_trial import Present
 
 
 class LogContradiction(ValueError):  # noqa: N818 - a contradiction is what it is
-    """An event cannot follow the previous ones, or a logged level is not what the rules give."""
+    """An event cannot follow the previous ones, or a logged level differs from that of the rules."""
 
 
 def check_draw(event: TrialPresented, expected: Present) -> None:

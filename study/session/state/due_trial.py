@@ -22,7 +22,8 @@ from study.session.state.rules import same_stimulus_again
 from study.session.stimulus.stimulus import direction_angle_deg
 
 _ROVED = (Phase.TRAINING, Phase.TEST)
-"""Of staircases on directions. Catch trials are at full level, and a detection trial asks for no direction."""
+"""Trial phases of staircases on directions. Catch trials are at full level, and detection trials ask for no
+direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,15 +38,15 @@ class Present:
     level_db: float
     level_n: float
     label: int
-    """Number of the right answer: of a direction or, in a detection run, of an interval."""
+    """Number of the correct answer: of a direction or, in a detection run, of an interval."""
     direction: int
     """The protocol's direction to play; differs from the label where labels are swapped."""
     angle_deg: float
     polarity: int
     wanted_mps2: float | None = None
-    """The acceleration that the level stands for; None where levels are commanded forces."""
+    """Wanted acceleration of the level; None where levels are commanded forces."""
     nominal_n: float | None = None
-    """Level of the staircase, around which `level_n` was drawn; None where nothing is roved."""
+    """Level of the staircase, around which `level_n` was drawn; None without roving."""
 
 
 @dataclass(frozen=True, slots=True)

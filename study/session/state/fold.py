@@ -104,7 +104,7 @@ def _with_probing(state: SessionState, probing: ProbingState) -> SessionState:
 
 
 def _probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> SessionState:
-    """Never within a trial: what a hand feels in one is the trial's own stimulus and nothing else."""
+    """Probes are not played within a trial: the hand must feel the trial's stimulus only."""
     if state.presented is not None:
         raise LogContradiction(f"{event.event} while a trial is open")
     probing = state.sitting.probing

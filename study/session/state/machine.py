@@ -25,7 +25,7 @@ class CheckDevice:
 
 @dataclass(frozen=True, slots=True)
 class Demonstrate:
-    """Each direction at each frequency, labelled, as often as the participant wants."""
+    """The demonstration: each direction at each frequency, labelled, as often as the participant wants."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Leave:
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """All is done."""
+    """The session is finished."""
 
 
 Preparation = FillIn | CheckDevice | Leave

@@ -1,4 +1,4 @@
-"""Probes and references of a session as its log tells them, and which one is due. Part of the fold."""
+"""Probes and references of a session, folded from its log, and which one is due next."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ if TYPE_CHECKING:
     from protocols.definition.probes import ProbeSettings
 
 STRONGEST_WEIGHT_HZ = 12.5
-"""Where hand-arm vibration is weighted most: a probe's acceleration counts as if all of it lay there."""
+"""Frequency of the largest weight of hand-arm vibration: a probe's acceleration counts as if it were all at it."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProbingState:
     played: int = 0
-    """In the session, of all kinds."""
+    """Number of probes in the session, of all kinds."""
     with_hand: int = 0
-    """Of them with the hand on the handle: the next level follows from it."""
+    """Number with the hand on the handle, which determines the next level."""
     open: ProbePlayed | None = None
-    """Played, and not measured yet, or cut off for good by the program's end."""
+    """The probe that was played and is not measured yet, or was cut off by the program's end."""
     since_s: float | None = None
-    """Since the last one with a hand in this sitting; None before."""
+    """Seconds since the last probe with a hand in this sitting; None before the first."""
     referenced: bool = False
-    """The reference of this sitting, since its last long pause, was played, tried or declined."""
+    """Whether the reference of this sitting, since its last long pause, was played, tried or declined."""
     hand_mass_kg: float | None = None
-    """Apparent mass of the handle with the hand, at the last such probe since a long pause; None where not known."""
+    """Apparent mass of the handle with the hand at the last such probe since a long pause; None where not known."""
     hand_level_n: float = 0.0
     """Level of that probe."""
 
@@ -42,18 +42,18 @@ class Probe:
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A reference is due: nothing holds the handle."""
+    """A reference is due, with a free handle."""
 
 
 def due_probe(probing: ProbingState, settings: ProbeSettings) -> Probe | None:
-    """The next probe with a hand; None where none is due yet."""
+    """The next probe with a hand; None if none is due yet."""
     if not settings.levels_n or (probing.since_s is not None and probing.since_s < settings.interval_s):
         return None
     return Probe(settings.levels_n[probing.with_hand % len(settings.levels_n)])
 
 
 def due_reference(probing: ProbingState, settings: ProbeSettings) -> Reference | None:
-    """After the first probe with a hand, beside which a free handle is seen to be free."""
+    """The next test for a free handle, after the first probe with a hand, with which it is compared."""
     due = settings.reference_s > 0 and not probing.referenced and probing.since_s is not None
     return Reference() if due else None
 

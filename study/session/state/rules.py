@@ -5,11 +5,11 @@ the participant number is that of the opening line.
 
 Version 2:
 
-* A void trial comes again with the SAME stimulus: direction (or interval), level, polarity. A redraw at will lets a
-  participant wait for an easy trial: feel, ask again when unsure, answer when sure. Thresholds then come out too low
-  by some 2 dB.
+* A void trial comes again with the SAME stimulus: direction (or interval), level, polarity. A redraw on request
+  would let a participant wait for an easy trial: feel, ask again when unsure, answer when sure. Thresholds would then
+  be too low by some 2 dB.
 * That holds for every cause. A pause, leaving, Ctrl-C, a late answer and a handle pushed until the safety layer lets
-  go are open to a participant as the repeat key is; a redraw after any of them would be the same trick by another key.
+  go are available to a participant like the repeat key; a redraw after any of them would have the same effect.
 * Only the repeat key is limited (`trial.repeats_per_run`): a pause and leaving are rights, and are never refused. They
   leave a second look at the same stimulus, and as many more as are wanted: a participant who pauses whenever unsure
   lowers the thresholds (by 1.9 to 4.8 dB in simulations without a limit). Nothing here prevents that. Every cause is

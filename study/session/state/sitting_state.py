@@ -14,12 +14,12 @@ from study.session.state.vibration_dose import NO_DOSE, Dose, add, total
 
 @dataclass(frozen=True, slots=True)
 class Night:
-    """A rest after which the dose started again."""
+    """A rest after which the dose started again from zero."""
 
     still_s: float
-    """How long the handle had not moved, by the clock."""
+    """Time without movement of the handle, by the clock."""
     dose: Dose
-    """The dose that it reset."""
+    """The dose that was reset."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,23 +41,23 @@ class SittingState:
     last: Moment = Moment("")  # noqa: RUF009 - frozen
     """Time of the last log entry, up to which everything here counts."""
     sat_s: float | None = None
-    """Since the handle first moved in this sitting; None before."""
+    """Seconds since the handle first moved in this sitting; None before."""
     busy_voids: int = 0
     """Trials of this sitting that were void because the computer was too busy."""
     answers_before: int = 0
-    """Given in earlier sittings."""
+    """Answers given in earlier sittings."""
     still_s: float | None = None
-    """Since the handle last moved, in any sitting; None before."""
+    """Seconds since the handle last moved, in any sitting; None before."""
     dose: Dose = NO_DOSE
-    """Since the last long rest: see NIGHT_H."""
+    """Dose since the last long rest: see NIGHT_H."""
     elsewhere: Dose = NO_DOSE
-    """In other sessions of the participant since then, as known at the beginning of this sitting."""
+    """Dose of the participant's other sessions since then, as known at the beginning of this sitting."""
     not_counted: tuple[str, ...] = ()
     """Sessions of the participant that could not be read then."""
     night: Night | None = None
     """The last long rest."""
     clock_steps: tuple[ClockStep, ...] = ()
-    """Where the computer's wall clock was set."""
+    """Steps of the computer's wall clock."""
     probing: ProbingState = ProbingState()  # noqa: RUF009 - frozen
 
 

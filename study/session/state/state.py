@@ -31,14 +31,14 @@ class SessionState:
     trial: int
     attempt: int
     presented: TrialPresented | None
-    """The open trial."""
+    """The open trial, if any."""
     answered: AnswerGiven | None
-    """Its answer, not yet closed by a measurement."""
+    """The answer of the open trial, whose measurement is not logged yet."""
     trials: tuple[Trial, ...]
     rest_due_s: float
     closed: bool
     practice: PracticeState = field(default_factory=PracticeState)
-    """Of the current run, if it is a practice run; its staircase is then unused."""
+    """Answers of the current run, if it is a practice run; its staircase is then unused."""
     sitting: SittingState = field(default_factory=SittingState)
 
     @property
@@ -47,7 +47,7 @@ class SessionState:
 
     @property
     def turned_away_for_good(self) -> bool:
-        """Refused or excluded, under rules by which that is final."""
+        """Whether the participant refused or was excluded, where the rules make that final."""
         return bool(self.sitting.turned_away) and refusal_is_final(self.opened)
 
     @property
@@ -61,7 +61,7 @@ class SessionState:
 
 
 def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionState:
-    """Raises LogContradiction where the opening line does not go with its protocol."""
+    """The state after the opening line. Raises LogContradiction where it does not match its protocol."""
     _check_scales(opened, protocol)
     state = SessionState(
         opened=opened,

@@ -10,7 +10,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 HIGHEST_HARMONIC = 5
-"""As for acceleration ellipses: beyond it a mechanism passes on little of what its friction and drives add."""
+"""Highest harmonic, as for acceleration ellipses: a mechanism transmits little beyond it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_h
     return Delivered(
         along_mps2=float(np.abs(along)),
         off_axis_mps2=float(np.linalg.norm(off_axis)),
-        # Of the handle, as the accelerometer sees it: encoders sit behind cables that give way.
+        # From the accelerometer at the handle: encoders are behind elastic cables.
         displacement_mm=1000.0 * float(np.abs(along)) / (2 * np.pi * frequency_hz) ** 2,
         harmonics_mps2=_harmonics(recording, frequency_hz),
     )
@@ -48,6 +48,6 @@ def _harmonics(recording: Recording, frequency_hz: float) -> float | None:
     highest = min(HIGHEST_HARMONIC, below)
     if highest < 2:
         return None
-    # A fit of its own: the fundamental of older sessions was fitted without harmonics, and stays as it was.
+    # Harmonics are fitted separately: the fundamental of older sessions was fitted without them, and must not change.
     found = phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz, highest)
     return float(np.linalg.norm(found[1:]))

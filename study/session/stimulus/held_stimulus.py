@@ -1,4 +1,5 @@
-"""The stimulus as a device sees it: separate from how it is made, so that devices do not depend on equalizers."""
+"""The stimulus in the form that a device plays: separate from how it is computed, so that devices do not depend on
+equalizers."""
 
 from dataclasses import dataclass
 

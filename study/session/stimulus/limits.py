@@ -30,7 +30,7 @@ class Limits:
     watchdog_s: float
     release_s: float
     feedback_cap_n: float = SafetySettings.feedback_cap_n
-    """Of spring and damper: each alone, and both together."""
+    """Limits of the force of spring and damper: each alone, and their sum."""
     plausibility: PlausibilitySettings = field(default_factory=PlausibilitySettings)
 
 

@@ -11,9 +11,9 @@ from study.session.stimulus.held_stimulus import HeldStimulus
 
 FADE_S = 0.25
 HELD_S = FADE_S + PERIOD_S + 0.1
-"""Until it fades out: the fade, one whole period, and a tenth of a second for what the program does meanwhile."""
+"""Duration until it fades out: the fade, one whole period, and a tenth of a second of margin for the program."""
 PHASES_SEED = 16
-"""Every probe has the same phases: only so may one be compared with another line by line."""
+"""Seed of the phases, the same for every probe, so that probes can be compared line by line."""
 
 
 def probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:

@@ -28,11 +28,11 @@ class Piece:
     unit_vector: tuple[float, float, float] | None
     """None for all axes at once."""
     frequency_hz: float | None = None
-    """Of a sinusoid; None for a sweep or a multisine."""
+    """Frequency of a sinusoid; None for a sweep or a multisine."""
     band_hz: tuple[float, float] | None = None
-    """Of a sweep or a multisine."""
+    """Band of a sweep or a multisine."""
     realisation: int = 1
-    """Of a multisine's phases, from 1."""
+    """Number of the realisation of a multisine's phases, from 1."""
 
     def at(self, amplitude_n: float) -> "Piece":
         """The same excitation with another peak (N)."""

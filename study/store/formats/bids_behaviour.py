@@ -17,14 +17,14 @@ from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 VERSION = "1.10.0"
 FIXED = ("subject", "session")
-"""Part of the file name, and therefore no columns."""
+"""Columns that are part of the file name instead."""
 
 TASK = (
     "Each trial plays a sinusoidal force at the hand, in one of two orthogonal directions; the participant answers "
     "which."
 )
 FACTS_NAME = "facts.json"
-"""As in the tidy form, here below `code`."""
+"""File name as in the tidy form, here below `code`."""
 QUESTION = "In which of the two directions did the force act? Answer 1 or 2."
 README = """# {name}
 
@@ -83,7 +83,8 @@ def _title(protocol_text: str) -> str:
 
 
 def _target(protocol_text: str) -> str:
-    """Where the staircase converges (Levitt 1971); empty for rules of several wrong answers, and without a rule."""
+    """Convergence level of the staircase (Levitt 1971); empty for rules with several wrong answers, and without a
+    rule."""
     rule = tomllib.loads(protocol_text).get("staircase", {})
     if rule.get("up_after_wrong") != 1 or "down_after_right" not in rule:
         return ""

@@ -1,4 +1,4 @@
-"""The file of a daily check, format `hapteq-daily-check`, version 1: what was compared, each number then and now."""
+"""The file of a daily check, format `hapteq-daily-check`, version 1: compared numbers, then and now."""
 
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -18,13 +18,13 @@ class DailyCheck:
     """Serial number, firmware and SDK."""
     utc: str
     passed: bool
-    """Nothing changed beyond its limit."""
+    """Whether nothing changed beyond its limit."""
     sentences: tuple[str, ...]
-    """One for each kind of change, as the screen shows them; or why the check broke off."""
+    """One line for each kind of change, as on the screen; or why the check was aborted."""
     changes: tuple[dict[str, Any], ...]
     """Kind, axis, accepted and today's number, error, limit, unit, whether it changed, band."""
     recording: str
-    """File beside this one; empty where it broke off before one was written."""
+    """File beside this one; empty where the check was aborted before it was written."""
     recording_sha256: str
     baseline_sha256: str
 

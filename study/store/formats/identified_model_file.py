@@ -67,7 +67,7 @@ def read_identified_model(path: Path) -> IdentifiedModel:
 
 
 def is_identified_model(path: Path) -> bool:
-    """By the format attribute. Raises StudyError for a file without, or with an unknown one."""
+    """Read a model of either kind, by the format attribute. Raises StudyError for a file without a known one."""
     with open_hdf5(path, KIND, FORMAT, VERSION):
         return True
 

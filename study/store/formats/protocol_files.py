@@ -133,7 +133,7 @@ def _find_lock(protocol: Protocol, path: Path | None, data: Path | None) -> Prot
 
 
 def _lock_at(path: Path, protocol: Protocol) -> ProtocolLock | None:
-    if not os.path.lexists(path):  # a link that leads nowhere is a lock that cannot be read, not none
+    if not os.path.lexists(path):  # a dangling link is an unreadable lock, not a missing one
         return None
     text = read_text(path, DOCUMENT_BYTES)
     try:

@@ -40,7 +40,7 @@ class ExportedTrials:
     trials: tuple[Trial, ...]
     protocol_text: str
     facts: Mapping[str, Any]
-    """Provenance, seeds, devices: what only this program needs."""
+    """Provenance, seeds, devices, which only this program needs."""
     files: tuple[Path, ...]
 
 

@@ -163,7 +163,7 @@ def _amplitude_scale(file: Any) -> float:
     try:
         factors = {parse_unit(text).factor for text in texts_attribute(file.get("command", file), "unit")}
     except ValueError:
-        return 1.0  # the command itself reports what is wrong with it
+        return 1.0  # problems of the command are reported by the command itself
     return factors.pop() if len(factors) == 1 else 1.0
 
 
@@ -180,9 +180,9 @@ def _meta(file: Any) -> dict[str, Any]:
 
 def _write_signal(file: Any, name: str, signal: Signal, precision: str) -> None:
     samples = signal.samples.astype(precision)
-    # A session keeps thousands of short recordings: they are written faster as they are.
+    # Short recordings, of which a session has thousands, are not compressed: they are written faster.
     packed = {"compression": "gzip", "shuffle": True} if samples.nbytes > _PACK_ABOVE_BYTES else {}
-    # With a checksum, which detects samples that the disk has changed.
+    # The checksum detects samples that were changed on the disk.
     dataset = file.create_dataset(name, data=samples, fletcher32=True, **packed)
     write_texts(dataset, "quantity", signal.quantity)
     write_texts(dataset, "unit", signal.unit)

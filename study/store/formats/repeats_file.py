@@ -19,27 +19,27 @@ KIND = "document of repeats"
 
 @dataclass(frozen=True, slots=True)
 class Repeats:
-    """Errors are root mean squares in the band over that of what is wanted."""
+    """Errors are root mean squares in the band, relative to the wanted signal."""
 
     trajectory_sha256: str
-    """Of the wanted samples and their rate."""
+    """SHA-256 of the wanted samples and their rate."""
     model_sha256: str
-    """Of the model file, or of all of them together."""
+    """SHA-256 of the model file, or of all model files together."""
     forces_sha256: str
-    """Of the table of forces beside this document."""
+    """SHA-256 of the table of forces beside this document."""
     device: str
     place_m: tuple[float, float, float]
     band_hz: tuple[float, float]
     errors: tuple[float, ...]
-    """As measured, noise included, play by play; the first is that of the forces begun with."""
+    """Measured errors, noise included, play by play; the first is that of the initial forces."""
     kept: int
-    """Which play's forces are in the table, from 0."""
+    """Index of the play whose forces are in the table, from 0."""
     noise_floor: float
-    """What the sensor's noise alone gives."""
+    """Error due to the sensor's noise alone."""
     gains: tuple[float, ...]
     """Share of each error that was corrected."""
     fitted: tuple[float, ...]
-    """Share of each correction that fitted under the cap."""
+    """Share of each correction that fits under the cap."""
     verdict: str
     remark: str
     interrupted: bool

@@ -24,7 +24,7 @@ def is_tidy_csv(folder: Path) -> bool:
 def write_tidy_csv(
     folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
 ) -> tuple[Path, ...]:
-    """folder: there, and empty. name: of the study. facts: JSON values. Raises CannotWriteError."""
+    """Write the table. folder: existing and empty. name: of the study. facts: JSON values. Raises CannotWriteError."""
     rows = [["column", "description", "unit"], *([column, *TRIAL_COLUMNS[column]] for column in columns(Trial))]
     texts = {
         TRIALS_NAME: rows_to_csv(trials, Trial),
@@ -38,7 +38,7 @@ def write_tidy_csv(
 
 
 def read_tidy_csv(folder: Path) -> ExportedTrials:
-    """As `write_tidy_csv` wrote it. Raises CannotReadError, UnusableFileError."""
+    """Read what `write_tidy_csv` wrote. Raises CannotReadError, UnusableFileError."""
     path = folder / FACTS_NAME
     try:
         facts = load_json(read_text(path))

@@ -8,7 +8,7 @@ from study.store.disk.text_file import read_text, write_text
 
 
 def read_trajectory(path: Path) -> Trajectory:
-    """Either kind, distinguished by its header. Raises CannotReadError, UnusableFileError."""
+    """Read a table of either kind, distinguished by its header. Raises CannotReadError, UnusableFileError."""
     try:
         return parse_trajectory(read_text(path))
     except TableError as error:

@@ -39,7 +39,7 @@ class EventLog:
     def reopen(cls, path: Path) -> "EventLog":
         """Open an existing log for appending. Raises StudyError if it cannot be written to."""
         try:
-            open_regular(path).close()  # a pipe would wait for its other end
+            open_regular(path).close()  # a named pipe would block until its other end is opened
             descriptor = os.open(path, os.O_WRONLY | os.O_APPEND)
         except OSError as problem:
             raise StudyError(
@@ -61,7 +61,7 @@ class EventLog:
             _write_all(self._descriptor, line)
             os.fsync(self._descriptor)
         except BaseException as problem:
-            # Also on Ctrl-C: half a line would spoil the one that comes after it.
+            # Also on Ctrl-C: half a line would corrupt the next one.
             with contextlib.suppress(OSError):
                 os.ftruncate(self._descriptor, before)
             if isinstance(problem, OSError):
@@ -121,7 +121,7 @@ def readable_events(path: Path) -> tuple[Event, ...]:
             chain, event = read_chained(chain, line)
             events.append(parse_event(event))
     except (OSError, ValueError):
-        pass  # here the damage begins; the caller knows of it
+        pass  # the damage begins here; the caller reports it
     return tuple(events)
 
 
@@ -154,7 +154,7 @@ def _lock_file(descriptor: int, path: Path) -> None:
             saved="Nothing was changed.",
         ) from problem
     except OSError:
-        return  # a network folder without such locks: the lock file has to do
+        return  # a network file system without such locks: the lock file has to suffice
 
 
 @contextlib.contextmanager
@@ -187,7 +187,7 @@ def _next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
         wrong, whole = "is not an event that this version knows", f"The {number - 1} lines before it are whole."
         if isinstance(problem, ChainBrokenError):
             wrong = f"{problem}"
-            if number > 1 and not chain.since:  # what came before has its first checksum here
+            if number > 1 and not chain.since:  # earlier lines without checksum are covered by this one
                 wrong, whole = f"{problem}, or one of the lines before it was changed", "Nothing was changed."
         raise StudyError(
             "The session log is damaged",

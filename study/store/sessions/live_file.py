@@ -29,7 +29,7 @@ def write_live(folder: Path, live: Live) -> None:
     values = {name: _finite(value) for name, value in asdict(live).items()}
     text = json.dumps({"format": LIVE_FORMAT, "version": LIVE_VERSION, **values}, allow_nan=False)
     part = folder / f".{LIVE_NAME}.part"
-    # No fsync: only the present counts, and a disk that waits would hold the session up.
+    # No fsync: only the current state matters, and a slow disk would delay the session.
     with suppress(OSError):
         write_private(part, f"{text}\n".encode())
         part.replace(folder / LIVE_NAME)

@@ -28,7 +28,7 @@ _NAME = re.compile(r"seal(-(?P<number>\d{1,6}))?\.json", re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class Seal:
-    """Of the log when this was written."""
+    """Length of the log when the seal was written."""
 
     session: str
     lines: Count
@@ -36,14 +36,14 @@ class Seal:
     head: Annotated[str, Field(pattern=f"^[0-9a-f]{{{DIGITS}}}$")]
     """Checksum of the last line: the head of the hash chain."""
     sha256: Sha256
-    """Of these bytes of `events.jsonl`."""
+    """SHA-256 of these bytes of `events.jsonl`."""
 
 
 SEAL: TypeAdapter[Seal] = TypeAdapter(Seal)
 
 
 def seal_paths(folder: Path) -> dict[int, Path]:
-    """By number, in the order of writing."""
+    """Seals by number, in the order of writing."""
     found = ((_NAME.fullmatch(path.name), path) for path in folder.glob("seal*.json"))
     return dict(sorted((int(match["number"] or 1), path) for match, path in found if match))
 

@@ -42,7 +42,7 @@ class RequestInbox:
     def __init__(self, session: Path) -> None:
         self._folder = session / REQUESTS_NAME
         self._passed_over: set[str] = set()
-        """Names that could be neither used nor removed: looked at once, not twenty times a second."""
+        """Names that could be neither used nor removed: examined once, not twenty times a second."""
 
     def send(self, request: Request) -> str:
         """Returns the request's name, for `unread` and `take_back`. Raises StudyError if it cannot be written."""

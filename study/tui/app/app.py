@@ -53,7 +53,7 @@ class HapteqApp(App[None]):
     def __init__(self, start: AppStart) -> None:
         super().__init__()
         self.outcome: Finished | Failed | None = None
-        """Of the last sitting: what the command line prints when the screen is gone."""
+        """Result of the last sitting, which the command line prints after the screen has closed."""
         self._start = start
         self._direct = start.first is not None
         self._engine = EngineLine(self)

@@ -82,13 +82,13 @@ class SittingScreens:
     ) -> None:
         """forget_earlier: lets keys that were read before now answer nothing."""
         self.path = ""
-        """Of the session, once it is opened."""
+        """Folder of the session, once it is opened."""
         self._app = app
         self._send = send
         self._keys = keys
         self._forget_earlier = forget_earlier
         self._number = 0
-        """Of what is asked now; 0 while nothing is."""
+        """Number of the present question; 0 without one."""
         self._shown: Screen[Any] | None = None
         self._trial: TrialScreen | None = None
         self._preparing: PreparingScreen | None = None

@@ -56,8 +56,8 @@ from study.workflows.session.end_sitting import end_sitting, finish_closed
 from study.workflows.session.plan_sitting import plan_sitting
 from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
 from study.workflows.trial.display import PersonsHand
-from study.workflows.views.ask_session import ask_session
 from study.workflows.views.list_sessions import home_view, model_words, protocol_line
+from study.workflows.views.send_request import send_request
 from study.workflows.views.view_session import session_view
 
 REPLY_S = 0.5
@@ -100,7 +100,7 @@ class EngineCommands:
             case CalibrateSensor() | KeepSensor():
                 self._calibrate(command)
             case AskBeside(session=session, request=request):
-                ask_session(SessionFolder(Path(session)), request, self._clock)
+                send_request(SessionFolder(Path(session)), request, self._clock)
 
     def _begin(self, order: SessionOrder) -> None:
         model = Path(order.model) if order.model else None

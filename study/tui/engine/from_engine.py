@@ -138,7 +138,7 @@ class ErrorText:
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """Of a finished session, as the command line prints them."""
+    """Results of a finished session, as the command line prints them."""
 
     table: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -171,7 +171,7 @@ class Failed:
 
     error: ErrorText
     path: str = ""
-    """Of the session that can be resumed, where one was opened."""
+    """Path of the session that can be resumed, where one was opened."""
 
 
 FromEngine = (

@@ -52,7 +52,7 @@ class RemoteDisplay:
         self._load = load
         self._number = 0
         self._late_s = 0.0
-        """How late this program itself woke up at the most, since something was asked."""
+        """Longest delay of this program's own wake-ups since a question was asked."""
 
     def fill_in(self, form: Form) -> FormReply:
         reply: FormReply = self._ask(Call.FILL_IN, form)

@@ -30,7 +30,7 @@ class WaitOver(Enum):
 
     INPUT_ENDED = "the input ended"
     CUT_SHORT = "the stimulus ended early"
-    """By the request that the sign of life heard."""
+    """Ended by a request that the sign of life received."""
     TIME_LIMIT = "no answer within the time limit"
 
 

@@ -22,7 +22,7 @@ from study.tui.watch.watch_words import (
 
 BELL = "\a"
 LABEL_CELLS = 11
-"""Of the words before each line of `status`."""
+"""Width of the words before each line of `status`."""
 
 
 def changes(before: WatchView | None, now: WatchView) -> list[str]:

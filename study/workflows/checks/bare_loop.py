@@ -1,7 +1,7 @@
 """A bare C loop, timed beside a device's loop: what this computer allows at best, under the same load.
 
-Compiled anew each time, by the system's compiler or the one of the extra `compiler`; where there is none, or the
-system has no POSIX clocks, it is said that nothing was compared.
+Compiled anew each time, by the system's compiler or the one of the extra `compiler`; without a compiler or POSIX
+clocks, the report says that nothing was compared.
 """
 
 import contextlib
@@ -20,12 +20,12 @@ from study.session.views.views import DeviceFinding
 SOURCE = Path(__file__).with_name("bare_loop.c")
 COMPILERS = ("cc", "gcc", "clang")
 PRIORITY = 40
-"""As that of a device's loop."""
+"""Real-time priority, as that of a device's loop."""
 
 WORSE_BY = 1.5
-"""So many times the late ticks of a bare loop are fine for ours, which does the work of the safety layer."""
+"""Accepted ratio of the late ticks of the device's loop, which runs the safety layer, to those of a bare loop."""
 CHANCE = 3.0
-"""Standard errors of the two counts, as of independent events, within which a difference is chance."""
+"""Standard errors of the two counts, as of independent events, within which a difference counts as chance."""
 
 COMPILING_S = 120.0
 OVERTIME_S = 30.0
@@ -39,15 +39,15 @@ ADVICE = (
 class BareLoop:
     ticks: int
     late_ticks: int
-    """Their work ended after the next was due; missed ones are among them."""
+    """Ticks whose work ended after the next was due, missed ones included."""
     latest_s: float
     before_others: bool
-    """Whether it got real-time priority, where it was to have it."""
+    """Whether it got the real-time priority that was requested."""
 
 
 @dataclass(slots=True)
 class BareRun:
-    """result: None until it is over; why: where there is none."""
+    """result: None until the loop has ended; why: reason if there is none."""
 
     result: BareLoop | None = None
     why: str = ""
@@ -55,7 +55,8 @@ class BareRun:
 
 @contextlib.contextmanager
 def timed_beside(seconds: float, rate_hz: float, before_others: bool) -> Iterator[BareRun]:
-    """Runs one during the block and, where that is shorter, to its own end; its result is there after the block."""
+    """Run a bare loop during the block or, where that is shorter, to its own end; the result is available after the
+    block."""
     run = BareRun()
     with tempfile.TemporaryDirectory() as folder:
         program = _compile(Path(folder), run)
@@ -87,7 +88,7 @@ def _read(process: "subprocess.Popen[bytes]", seconds: float, run: BareRun) -> N
 
 
 def judge_beside(late_ticks: int, ticks: int, run: BareRun) -> DeviceFinding:
-    """late_ticks: of the loop beside it, missed ones among them."""
+    """late_ticks: of the loop beside it, missed ones included."""
     if run.result is None:
         return DeviceFinding(NAME, f"not compared: {run.why}", fine=True)
     bare = run.result

@@ -26,14 +26,14 @@ SMALLEST = (80, 24)
 """Columns and rows of a terminal in which every screen fits."""
 
 ROOM_BYTES = 10**9
-"""Some ten sessions with all their recordings."""
+"""Free disk space that is enough for about ten sessions with all recordings."""
 
 
 @dataclass(frozen=True, slots=True)
 class Terminal:
     encoding: str
     kind: str
-    """TERM."""
+    """Value of the environment variable TERM."""
     columns: int
     rows: int
 

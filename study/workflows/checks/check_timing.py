@@ -35,7 +35,7 @@ latest."""
 class Timing:
     seconds: float
     health: Health
-    """Of the device's own loop."""
+    """Lateness of the device's own loop."""
     lateness: Lateness
     findings: tuple[DeviceFinding, ...]
     bare: BareLoop | None = None

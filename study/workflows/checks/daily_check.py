@@ -36,12 +36,12 @@ BASELINES, CHECKS = "baselines", "daily_checks"
 
 @dataclass(frozen=True, slots=True)
 class Moving:
-    """What happens while the device moves by itself."""
+    """Callbacks while the device moves by itself."""
 
     announce: Callable[[str], None]
-    """Gets the notice before it moves; an exception from it keeps the device still."""
+    """Receives the notice before it moves; an exception from it keeps the device still."""
     show: Callable[[float], None]
-    """Gets the seconds that were played."""
+    """Receives the seconds played so far."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +55,8 @@ def seconds_of_play() -> float:
 
 
 def record_baseline(name: str, moving: Moving) -> tuple[str, str]:
-    """Record what the daily checks compare with. Its name in `device_folder`, and its SHA-256. Raises StudyError, also
-    where it does not tell enough to compare with."""
+    """Record the baseline of the daily checks. Returns its name in `device_folder` and its SHA-256. Raises StudyError,
+    also where the recording is not good enough for a comparison."""
     plan = _plan(name, BASELINES)
     with contextlib.closing(_open(plan)) as device:
         return _baseline_on(device, plan, moving)
@@ -72,7 +72,8 @@ def _baseline_on(device: Device, plan: RecordingPlan, moving: Moving) -> tuple[s
         if each["played_amplitude_n"] < each["requested_amplitude_n"] or each["sensor_clipped"] or each["total_clipped"]
     ]
     found = [f"Sensor or force was at its limit in {len(limited)} of {len(facts)} pieces."] if limited else []
-    # Compared with itself nothing differs: what is not fine was not measured well enough to tell a change later.
+    # Compared with itself nothing differs: a finding means that it was not measured well enough to detect a later
+    # change.
     unsure = [finding for finding in change_findings(compare_recordings(recorded, recorded)) if not finding.fine]
     found += [f"Too inaccurate to compare with: {finding.name}, {finding.value}." for finding in unsure]
     if found:
@@ -107,7 +108,7 @@ def check_on(device: Device, plan: RecordingPlan, moving: Moving) -> CheckedToda
         record_on(device, plan, moving.show, announce)
         changes = compare_recordings(baseline, read_recording(plan.out))
     except BaseException as error:
-        if begun:  # an earlier pass of the day must not stand
+        if begun:  # an earlier pass of the same day must not remain valid
             with contextlib.suppress(StudyError, OSError):
                 why = str(error) or type(error).__name__
                 _write_check(device.info, plan, digest, False, (f"It broke off: {why}",), ())
@@ -144,7 +145,7 @@ def _write_check(
 
 def compare_recordings(baseline: Recording, today: Recording) -> tuple["Change", ...]:
     """Raises DeviceError where one of them does not tell what is compared."""
-    # Imported here: every sitting asks for the last check, and only a check compares; it takes as long as all the rest.
+    # Imported here: every sitting reads the last check, but only a check needs the comparison, which is slow to import.
     from analysis.device_change.compare_devices import compare_devices
     from analysis.device_change.measure_device import NotMeasurableError
 

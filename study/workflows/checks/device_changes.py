@@ -1,4 +1,4 @@
-"""What changed at a device since its acceptance, in findings with numbers and limits."""
+"""Changes of a device since its acceptance, as findings with numbers and limits."""
 
 import math
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ def change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ...]:
 
 
 def _finding(kind: str, changes: Sequence["Change"], rubs: bool) -> DeviceFinding:
-    """rubs: the friction changed, from which gain and response change too."""
+    """rubs: whether the friction changed, which also changes gain and response."""
     value = f"{'; '.join(_words(change) for change in changes)} ({_limit_words(changes[0])})"
     axes = ", ".join(change.axis for change in changes if change.changed)
     causes = FRICTION_FIRST if rubs and kind in ("gain", "response") else f"{CAUSES[kind]} {IF_IT_STAYS}"

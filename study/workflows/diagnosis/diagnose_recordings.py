@@ -13,7 +13,7 @@ from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import Compared
-from analysis.diagnosis.first_model.model_of_balance import FirstModel
+from analysis.diagnosis.first_model.model_from_balance import FirstModel
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
@@ -65,7 +65,7 @@ class DiagnosePlan:
     discovery: bool = True
     """Also search for laws outside the catalogue."""
     force_constants: tuple[float, ...] = ()
-    """One for all commands or one per command, where these are not forces."""
+    """Force constants: one for all commands or one per command, where these are not forces."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -228,7 +228,7 @@ def _model(
     if found.simulated:
         return FirstModel(_twin(within), (TWIN_SAID,))
     # Imported here: a given model needs no fit of a first one.
-    from study.workflows.diagnosis.fitted_first import first_model_of, fit_linear_model
+    from study.workflows.diagnosis.fit_without_model import first_model_of, fit_linear_model
 
     if clean is None:
         return first_model_of(found, plan.without, bounds, within)

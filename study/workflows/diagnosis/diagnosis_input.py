@@ -37,7 +37,7 @@ def read_input(
     sources: Sequence[Path], seed: int, plain: bool = False, constants: tuple[float, ...] = ()
 ) -> DiagnosisInput:
     """Read recordings, or one session's folder. plain: in the form in which forces can be balanced, see
-    `plain_form`. constants: see `with_force_constant`. Raises StudyError."""
+    `one_motion_per_force`. constants: see `with_force_constant`. Raises StudyError."""
     folders = [source for source in sources if source.is_dir()]
     if folders and len(sources) > 1:
         raise not_diagnosable_error(

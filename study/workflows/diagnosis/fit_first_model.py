@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.data.as_recorded import has_carried_weight
+from analysis.diagnosis.data.recorded_conditions import has_carried_weight
 from analysis.diagnosis.first_model.choose_structure import Choice, choose_structure
 from analysis.diagnosis.first_model.model_structures import KINDS, Kind, Number, StructureRefused
 from analysis.diagnosis.first_model.reversed_commands import as_recorded

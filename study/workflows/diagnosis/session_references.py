@@ -23,7 +23,8 @@ class SessionReferences:
 
 
 def find_references(session: Path) -> SessionReferences | None:
-    """None where none was kept, or none is as it was logged. Raises StudyError where the session cannot be read."""
+    """The references as recordings; None where none was kept, or none matches the log. Raises StudyError where the
+    session cannot be read."""
     folder = find_session(str(session), session.absolute().parent)
     folded = fold_session(folder)
     if not folded.state.protocol.probes.played:

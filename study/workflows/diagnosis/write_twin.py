@@ -52,7 +52,7 @@ class TwinPlan:
 class WrittenTwin:
     plan: TwinPlan
     model: MechanicalModel
-    """As written."""
+    """The model as written."""
     fit: MechanicalFit
     piece: RigidBody
     notes: tuple[str, ...]

@@ -8,7 +8,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.tracking.bands.two_models import BandFacts, banded_feedforward
+from equalizer.tracking.bands.narrow_and_wide_models import BandFacts, banded_feedforward
 from equalizer.tracking.compensation.known_physics import Compensation, compensate
 from equalizer.tracking.feedforward.feedforward import Feedforward, FeedforwardSettings
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, require_rate
@@ -51,7 +51,7 @@ class EqualizedTrajectory:
     solved: Feedforward
     """Feedforward from the linear models alone."""
     peaks: Peaks
-    """Of `forces`."""
+    """Force peaks of `forces`."""
     bands: BandFacts | None
     compensation: Compensation | None
 

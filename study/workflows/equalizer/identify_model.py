@@ -24,7 +24,7 @@ from study.store.disk.provenance import gather_provenance
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import read_recording
-from study.workflows.equalizer.freed_recordings import removable_effects, remove_effects
+from study.workflows.equalizer.recordings_without_effects import removable_effects, remove_effects
 from study.workflows.free_name import require_free
 
 NEAR_M = 0.001

@@ -11,7 +11,7 @@ from analysis.wording import typeset
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import ModelQuality, worst_quality
 from equalizer.plant.model_response import model_response
-from equalizer.tracking.bands.two_models import TwoModels
+from equalizer.tracking.bands.narrow_and_wide_models import TwoModels
 from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY
 from equalizer.tracking.workspace.feedforward_at_place import used_models
 from equalizer.tracking.workspace.interpolation_choice import InterpolationChoice, PlaceCheck, choose_interpolation
@@ -49,7 +49,7 @@ class ModelsForPlaying:
 
     @property
     def quality(self) -> ModelQuality | None:
-        """Of the worst model; None if any has none."""
+        """Expected error of the worst model; None if any has none."""
         return worst_quality(tuple(model.quality for model in self.given))
 
     @property

@@ -1,8 +1,8 @@
 """A recorded transient, turned to the normal of a contact, played on the device: `hapteq contact`.
 
-All that depends on the recording is computed before the contact: three solutions of the causal tracking problem, one
-per axis. At the contact the normal is known, and the forces are their combination. Beside them the recording is played
-as a force along the normal with one gain, as it would be without a model.
+Everything that depends on the recording is computed before the contact: three solutions of the causal tracking problem,
+one per axis. At the contact the normal is known, and the forces are a linear combination of them. For comparison the
+recording is also played as a force along the normal with one gain, as without a model.
 """
 
 import contextlib
@@ -44,14 +44,14 @@ from study.workflows.equalizer.play_forces import (
 )
 
 GAIN_LINES = 100
-"""Of the band, over which the one gain of the comparison is right in the mean."""
+"""Number of lines in the band over which the gain of the comparison is averaged."""
 REST = Padding(after_s=0.5)
-"""Played after the recording, to come to rest."""
+"""Time played after the recording, to come to rest."""
 FADE_S = 0.2
-"""At its end: what a solution with a free end does in its last ticks serves nothing, and would end with a step."""
+"""Fade-out at its end: a solution with a free end has useless forces in its last ticks, and would end with a step."""
 AGAIN, NOTHING = "Start again.", "Nothing was written."
 SETTLE_S = 1.0
-"""Between two plays, and before the first."""
+"""Rest between two plays, and before the first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class ContactPlan:
     model: Path
     transient: Path
     normal: Vector
-    """Of any length above zero."""
+    """Contact normal, of any length above zero."""
     out: Path
     device: str = "simulated"
     scale: float = 1.0
@@ -71,14 +71,14 @@ class ContactPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedTransient:
-    """One way to play the transient."""
+    """The transient played in one way."""
 
     forces: FloatArray
-    """(N, 3), N, as they go to the device."""
+    """(N, 3), N: commands to the device."""
     measured: FloatArray
-    """(N, 3), m/s^2: the part in the model's band."""
+    """(N, 3), m/s^2: measured acceleration in the model's band."""
     error: float
-    """Relative, in the band, as measured; noise included."""
+    """Relative error in the band, as measured; noise included."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +93,7 @@ class ContactPlay:
     start: CausalStart
     equalized: PlayedTransient
     plain: PlayedTransient
-    """The recording as a force along the normal, with one gain."""
+    """The recording played as a force along the normal, with one gain."""
 
 
 def play_contact(
@@ -158,7 +158,7 @@ def _along(recording: FloatArray, normal: FloatArray, rows: int) -> FloatArray:
 
 
 def _beside_spring(forces: FloatArray, wanted: FloatArray, models: ModelsForPlaying) -> FloatArray:
-    """Commands that leave to the spring what it does along the wanted motion."""
+    """Commands less the force of the spring along the wanted motion."""
     commands = compensate_spring(lambda _: forces, acting_spring(models), models.nearest.sample_rate_hz, models.band_hz)
     return commands(wanted)
 
@@ -222,7 +222,7 @@ def _play_both(
 
 
 def _settings(plan: ContactPlan, models: ModelsForPlaying, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
-    """A force that begins with the contact begins with a step."""
+    """Without fade-in: a force that begins with the contact begins with a step."""
     settings, rate_hz = playback_settings(plan.cap_n, models), models.nearest.sample_rate_hz
     steps = [np.linalg.norm(np.diff(each, axis=0, prepend=0, append=0), axis=1).max() for each in forces]
     slew_n_per_s = max(settings.limits.slew_n_per_s, float(max(steps)) * rate_hz + SPRING_SLEW_N_PER_S)

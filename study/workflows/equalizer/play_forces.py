@@ -1,4 +1,4 @@
-"""Forces played on a device that no person holds: under which spring and limits, and what the accelerometer says."""
+"""Plays forces on a device without a hand on the handle: spring, limits, and the accelerometer's reading."""
 
 import math
 from collections.abc import Callable
@@ -12,16 +12,16 @@ from study.errors import DeviceError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
 from study.session.views.handle_notice import BeforeMoving, free_handle_notice
 from study.workflows.equalizer.models_for_playing import ModelsForPlaying
-from study.workflows.equalizer.spring_beside_model import spring_outside_model
+from study.workflows.equalizer.spring_not_in_model import spring_outside_model
 
 SPRING_HZ = 3.5
-"""As in the shipped recordings, for a model that does not say under which spring it was recorded."""
+"""Spring of the shipped recordings, for a model that does not state its spring."""
 SPRING_ROOM_N = 1.5
 HAND_CAP_N = 3.0
 
 
 def require_device_alone(models: ModelsForPlaying) -> None:
-    """Raises StudyError for a model that holds a hand."""
+    """Raises StudyError for a model that was identified with a hand on the handle."""
     if any("held" in model.provenance.get("hand", ()) for model in models.given):
         raise _refusal(
             "The model was recorded with a hand on the handle: its forces are right for that hand in that moment.",
@@ -59,7 +59,7 @@ def playback_settings(cap_n: float, models: ModelsForPlaying) -> DeviceSettings:
             longest_hold_s=600.0,
             watchdog_s=0.5,
             release_s=0.05,
-            feedback_cap_n=cap_n + SPRING_ROOM_N,  # no hand is there; beyond its cap the spring stretches further
+            feedback_cap_n=cap_n + SPRING_ROOM_N,  # without a hand, the spring may be stretched beyond its cap
         ),
         spring_frequency_hz=float(feedback.get("natural_frequency_hz", SPRING_HZ)),
         spring_damping_n_s_per_m=float(feedback.get("damping_n_s_per_m", 0.0)),
@@ -71,19 +71,19 @@ def playback_settings(cap_n: float, models: ModelsForPlaying) -> DeviceSettings:
 
 
 def announce_motion(device: Device, peak_n: float, total_s: float, before_moving: BeforeMoving) -> None:
-    """Before the first force on a real device. peak_n: the cap. total_s: of all plays."""
+    """Notice before the first force on a real device. peak_n: the cap. total_s: duration of all plays."""
     if not device.info.simulated:
         before_moving(free_handle_notice(device.info.name, peak_n, total_s))
 
 
 def play_forces(device: Device, forces: FloatArray, on_progress: Callable[[float], None]) -> Played:
-    """forces: (N, 3), N, at the device's rate. Raises DeviceError."""
+    """Play forces (N, 3), N, at the device's rate. Raises DeviceError."""
     commands = Signal(forces, device.info.sample_rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
     return device.play(commands, on_progress)
 
 
 def measured_acceleration(played: Played) -> FloatArray:
-    """(N, 3), m/s²: the accelerometer's own rows. Raises DeviceError where they do not show what the forces do."""
+    """(N, 3), m/s²: the accelerometer's rows. Raises DeviceError where they do not follow the forces."""
     health = played.health
     if played.recording is None or health.fault is not Fault.NONE:
         raise DeviceError("The device let go", f"While playing: {health.fault.value}.", "Check the device.")

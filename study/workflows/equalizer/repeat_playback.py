@@ -129,7 +129,7 @@ def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
             return begin(repetition)
         if plan.first.shape != signal.samples.shape:
             raise ValueError(f"forces of shape {plan.first.shape} do not go with {len(signal)} rows")
-        # What follows the last row is in no table: the model's own.
+        # After the last row of the table, the model's own forces are played.
         return begin(repetition, np.vstack([plan.first, invert(inside)[len(signal) :]]))
     except ValueError as error:
         raise _refusal(

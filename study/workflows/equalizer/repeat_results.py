@@ -25,7 +25,7 @@ class RepeatPlan:
     inverse: InverseOfLength
     band_hz: tuple[float, float]
     model_sha256: str
-    """Of the models behind the inverse: forces are reused for the same ones only."""
+    """Hash of the models behind the inverse: forces are reused for the same models only."""
     settings: DeviceSettings
     """Without a hand on the handle. Every correction respects the stimulus' cap."""
     device: str
@@ -49,7 +49,7 @@ class Repeated:
     errors: tuple[float, ...]
     """Relative error in the band of each play as measured, noise included."""
     noise_floor: float
-    """The same of noise alone."""
+    """Relative error of noise alone."""
     verdict: Verdict
     kept: int
     """Number of the play with these forces, from 0."""

@@ -35,7 +35,7 @@ class FileContent:
 
     @property
     def header(self) -> tuple[str, ...]:
-        """Fields of the first line, as of a table."""
+        """Fields of the first line, as in a table."""
         rows = csv.reader(io.StringIO((self.text or "").partition("\n")[0]))
         try:
             return tuple(name.strip() for name in next(rows, []))

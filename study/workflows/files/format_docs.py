@@ -119,7 +119,7 @@ def document_schema(payload: Mapping[str, Any], format_name: str, version: int) 
 
 
 def request_schema() -> dict[str, Any]:
-    """One alternative for each thing that can be asked."""
+    """One alternative for each kind of request."""
     schemas = {kind: TypeAdapter(asked).json_schema() for kind, asked in KINDS.items()}
     for kind, schema in schemas.items():
         schema["properties"]["request"] = {"const": kind}

@@ -49,7 +49,7 @@ def recognise_recording(content: FileContent) -> str | None:
 
 
 def describe_recording(found: Recording) -> str:
-    """How long it is, and what it holds."""
+    """Duration and channels of a recording, in words."""
     parts = [
         f"{found.response.duration_s:g} s at {found.sample_rate_hz:g} Hz",
         _count(len(found.command.channels), "command"),

@@ -83,7 +83,7 @@ def recognise_lock(content: FileContent) -> str | None:
 
 
 def _check_session(folder: SessionFolder, path: Path) -> str:
-    """Beyond the log: every recording is the logged one, and the tables agree with the log."""
+    """Checks beyond the log: every recording is the logged one, and the tables agree with the log."""
     folded = _fold(folder, path)
     problems = [
         *_recording_problems(folder, folded),

@@ -60,7 +60,7 @@ def _notes(found: Validation) -> tuple[str, ...]:
 def _is_folder(path: Path) -> bool:
     try:
         return path.is_dir()
-    except OSError:  # a name that no file can have
+    except OSError:  # not a possible file name
         return False
 
 
@@ -90,14 +90,14 @@ def _is_foreign(path: Path) -> bool:
     kind = path.suffix.lower()
     try:
         return kind in FOREIGN and kind not in (*TABLES, *RECORDS) and path.is_file()
-    except OSError:  # a name that no file can have
+    except OSError:  # not a possible file name
         return False
 
 
 def _of_foreign(path: Path, kind: str = "", unknown: tuple[str, ...] = ()) -> Validation:
-    """A recording of others, as an import would read it. kind, unknown: of a file that may be a damaged one of ours,
-    which is said where it is no recording either."""
-    # Here, for the import takes longer to load than most files take to be checked.
+    """A foreign recording, read as an import would read it. kind, unknown: of a file that may be a damaged one of our
+    own, which is reported if it is no recording either."""
+    # Imported here: the import takes longer to load than most files take to check.
     from study.workflows.recording.import_recording import read_foreign
 
     try:

@@ -29,7 +29,7 @@ from study.workflows.pieces import finished_pieces
 CHUNK = 10
 """Studies per piece of work: some seconds, so that little is lost when a worker dies."""
 HABITS_SINCE = ("guessers", "criterion_drift_sd", "unsure", "repeats", "delivery")
-"""Of a crowd; without them a folder that was begun earlier goes on."""
+"""Fields of `Crowd` that were added later; at their defaults, a folder that was begun earlier can be continued."""
 FINISHED_NAME, RESULT_NAME = "studies.jsonl", "power.json"
 
 
@@ -40,7 +40,7 @@ class PowerPlan:
     people: tuple[int, ...]
     """Sample sizes."""
     studies: int
-    """Of each size."""
+    """Number of studies of each size."""
     seed: int
     contrast_hz: tuple[float, ...] = ()
     """The declared contrast, first frequency minus second; empty: the highest frequency minus the lowest."""

@@ -142,7 +142,7 @@ def _meta(plan: RecordingPlan, device: Device, done: list[Take], interrupted: bo
         "place_m": list(plan.place_m),
         "hand": protocol.hand,
         "feedback": spring_facts(protocol.spring, device.info.effective_mass_kg),
-        # As mounted: what is off by the mounting's tolerance is not known when it is recorded.
+        # Nominal mounting: the actual misalignment within its tolerance is not known when it is recorded.
         "sensor": {"frame_to_device": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]},
         "interrupted": interrupted,
         "segments": [segment_facts(take) for take in done],

@@ -152,7 +152,7 @@ def _write(
         make_folder(figures)
         if figures.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
-        # The report is the last that is written: as long as it is not there, all else may be half of the new.
+        # The report is written last: without it, the other files may be from different runs.
         for stale in analysis_outputs(out):
             if stale.parent == figures or stale.name in (DETECTION_NAME, PAGE_NAME):
                 stale.unlink()

@@ -1,4 +1,4 @@
-"""What drifts in a session, from the recordings of its probes, in sentences for who follows it."""
+"""Drifts in a session, from the recordings of its probes, as sentences for the experimenter."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -23,8 +23,8 @@ ALLOWED = {
     "damping": 3.0,
     "stiffness": 75.0,
 }
-"""Beyond these a threshold may move by more than the finest step of a staircase. Friction and gain as in the daily
-check; a delay by one tick of the loop; of a hand half of a light grip."""
+"""Limits above which a threshold may move by more than the finest step of a staircase. Friction and gain as in the
+daily check; delay: one tick of the loop; hand: half of a light grip."""
 
 WITHOUT_HAND = ("friction", "gain", "delay")
 
@@ -33,11 +33,11 @@ WITHOUT_HAND = ("friction", "gain", "delay")
 class _Read:
     rate_hz: float
     timed: tuple[TimedProbe, ...]
-    """Of a probe one; of a reference its two halves."""
+    """Recordings: one of a probe; of a reference its two halves."""
 
 
 class DriftReader:
-    """Keeps what it has read: each look reads and compares new probes only."""
+    """Caches what it has read: each update reads and compares new probes only."""
 
     def __init__(self, folder: SessionFolder) -> None:
         self._folder = folder
@@ -57,7 +57,8 @@ class DriftReader:
         return tuple(line for lines in self._found.values() for line in lines)
 
     def _compare(self, newest: PlayedProbe) -> tuple[Drift, ...]:
-        """The newest one beside the earlier ones of its kind: a hand's of its sitting, a free handle's of them all."""
+        """The newest one compared with earlier ones of its kind: probes with a hand with those of the sitting,
+        references with all."""
         if newest.kind == "reference":
             references = [read for probe, read in self._read if probe.kind == "reference"]
             first, last = references[0], references[-1]
@@ -67,7 +68,7 @@ class DriftReader:
 
     def _say(self, kind: str, found: tuple[Drift, ...]) -> Iterator[DriftLine]:
         named = {(kind, drift.number, drift.axis): drift for drift in found}
-        # What is gone again has no beginning any more.
+        # A drift that has disappeared has no beginning any more.
         self._since_s = {key: s for key, s in self._since_s.items() if key[0] != kind or key in named}
         for key, drift in named.items():
             since_s = self._since_s.setdefault(key, drift.at_s)
@@ -103,7 +104,7 @@ def sentence(drift: Drift) -> str:
 
 
 def is_beyond(drift: Drift) -> bool:
-    """Whether it leaves what the analysis of a session allows."""
+    """Whether it exceeds the limit of the session's analysis."""
     return abs(drift.change) > ALLOWED[drift.number]
 
 

@@ -55,7 +55,7 @@ def write_tables(folder: SessionFolder) -> SessionState:
 
 def write_results(folder: SessionFolder) -> WrittenAnalysis:
     """Write the tables and the analysis of this session alone."""
-    # Statistics and plots take longer to load than all else; who begins or checks a session does not wait for them.
+    # Statistics and plots are slow to import; beginning or checking a session does not wait for them.
     from study.workflows.results.analyze_data import analyze_data
 
     write_tables(folder)

@@ -110,7 +110,7 @@ def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
 
 @contextlib.contextmanager
 def _pulses(clock: Clock) -> Iterator[Callable[[], Pulse | None]]:
-    """On the lab's line; none in virtual time, which passes faster than a recorder's."""
+    """Trigger line of the lab; none in virtual time, which passes faster than a recorder's."""
     line = None if clock.virtual else onset_line()
     try:
         yield no_pulse if line is None else line.pulse
@@ -121,7 +121,7 @@ def _pulses(clock: Clock) -> Iterator[Callable[[], Pulse | None]]:
 
 @dataclass(frozen=True, slots=True)
 class At:
-    """What the participant is at."""
+    """Current activity of the participant."""
 
     device: Device
     equalized: Equalized

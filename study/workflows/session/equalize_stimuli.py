@@ -23,7 +23,7 @@ from study.store.disk.atomic_write import write_atomically
 from study.store.disk.provenance import sha256_of
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.sessions.archive import SessionFolder
-from study.workflows.equalizer.spring_beside_model import spring_outside_model
+from study.workflows.equalizer.spring_not_in_model import spring_outside_model
 
 MODEL_NAME = "model.h5"
 NEAR_M = 0.02
@@ -83,7 +83,7 @@ def equalize_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceIn
     equalizer = _equalizer(identified, protocol, info)
     try:
         scales = level_scales(protocol, equalizer, info.sample_rate_hz)
-    except (ValueError, ArithmeticError) as error:  # what linear algebra says of a model that is none
+    except (ValueError, ArithmeticError) as error:  # linear algebra fails on an invalid model
         raise _refusal(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
     facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales, quality_sentence(identified.quality))
     return Equalized(equalizer, facts, model)

@@ -48,7 +48,7 @@ def find_traces(data: Path, subject: str, proved: Collection[str] = ()) -> Trace
     for path in sorted(data.iterdir()):
         match = FOLDER.fullmatch(path.name)
         if match is not None and match["subject"] == subject:
-            # A log that came into the folder since is not erased for what the folder was.
+            # A log that was added since then is not erased on the evidence of the folder's earlier content.
             if is_session_of(path, subject) or (path.name in proved and _was_session(path)):
                 sessions.append(path.name)
             else:

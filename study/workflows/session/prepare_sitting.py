@@ -42,7 +42,8 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
     reply = sitting.display.fill_in(form)
     outcome = judge_form(state.protocol, form.kind, reply)
     if not outcome.passed and not is_confirmed(sitting.display.fill_in(confirmation_of(form, reply))):
-        # A slip of the finger: asked once more, and what is answered then holds. The slip itself is kept nowhere.
+        # A slip of the finger is possible: the question is asked once more, and the second answer holds. The first is
+        # not stored.
         outcome = judge_form(state.protocol, form.kind, sitting.display.fill_in(form))
     event = FormFilled(
         utc=sitting.clock.utc(),
@@ -82,7 +83,7 @@ def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     device, clock = sitting.device, sitting.clock
     safety = state.protocol.safety
     report = check_device(device, clock, sitting.place_m, safety.total_cap_n, safety)
-    # In virtual time nothing waits for a processor.
+    # In virtual time no process waits for a processor.
     load = None if clock.virtual else load_per_processor()
     computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)
     daily = () if device.info.simulated else (last_check(device.info, state.protocol.setup.daily_check_needed),)

@@ -14,7 +14,7 @@ from study.errors import LeftError, StudyError
 from study.participants.observer import Observer
 from study.participants.observers import observer_named
 from study.participants.population import KINDS, member
-from study.store.disk.carried_folder import Files, read_file, read_files, write_files
+from study.store.disk.folder_contents import Files, read_file, read_files, write_files
 from study.store.disk.new_folder import new_folder
 from study.store.disk.privacy import make_folder
 from study.store.disk.provenance import sha256_of

@@ -49,8 +49,8 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
     close_to_others(folder.path, inside=True)  # an earlier version left its files to everyone
     with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
-        # Yesterday's stop must not end today's sitting; from now on requests are heard. Nor does yesterday's live state
-        # say anything of today, at any time of its own.
+        # A stop request of the interrupted sitting must not end this one, and its live state is outdated; from now on
+        # requests are received.
         RequestInbox(folder.path).clear()
         remove_live(folder.path)
         try:
@@ -70,7 +70,7 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
                 monotonic_s=clock.now_s(),
             )
             log.append(resumed)
-            # Ctrl-C, which a participant may press too, is told from a program that died.
+            # Ctrl-C, which a participant may press too, is distinguished from a program that died.
             interrupted = isinstance(folded.contents.events[-1], SessionInterrupted)
             state = _close_open_trial(apply(folded.state, resumed), folder, log, clock, interrupted)
             yield OpenedSession(folder, log, state)

@@ -62,11 +62,11 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     except BaseException:
         sitting.device.stop()
         raise
-    # Ctrl-C leaves here what is over already.
+    # The session is over: Ctrl-C only ends the goodbye.
     with contextlib.suppress(KeyboardInterrupt):
         outcome = end.state.sitting.turned_away if end.state.closed else ""
         sitting.display.goodbye(Goodbye(not end.left, end.state.answers, end.left, outcome))
-    # As long as the log is open, who notes something is told that the session writes it.
+    # Notes that were taken while the log was open are written before it is sealed.
     end = replace(end, state=write_notes(end.state, sitting))
     if end.state.closed:
         seal_log(sitting.folder.log)

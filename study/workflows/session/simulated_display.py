@@ -99,7 +99,7 @@ class SimulatedDisplay:
             self._on_question(question)
         if self._felt is None:
             raise RuntimeError("a simulated participant was asked before anything was felt")
-        # How long it takes depends on the trial's luck alone; what is answered may depend on what was delivered.
+        # The response time depends on the trial's random numbers alone; the answer may depend on what was delivered.
         seconds = self._observer.reply(self._felt, self._seed).response_time_s
         too_slow = 0 < question.time_limit_s < seconds
         felt = self._wait_and_feel(self._felt, question.time_limit_s if too_slow else seconds, sign_of_life)

@@ -16,9 +16,9 @@ from study.workflows.results.fold_session import fold_session
 from study.workflows.trial.display import SignOfLife
 
 PERIODS = 2.0
-"""So long is felt before the answer: friction and sensor noise vary from period to period."""
+"""Duration that is felt before the answer: friction and sensor noise vary from period to period."""
 TICKS_PER_SIGN = 50
-"""Between signs of life: 50 ms at 1 kHz."""
+"""Ticks between signs of life: 50 ms at 1 kHz."""
 
 
 class SimulatedTouch:
@@ -30,14 +30,14 @@ class SimulatedTouch:
         self._directions: TestDirections | None = None
 
     def on_opened(self, folder: SessionFolder, device: Device) -> None:
-        """The device of the session, and how its directions lie."""
+        """Connects the device of the session and the orientation of its directions."""
         self._device, self._directions = device, fold_session(folder).state.protocol.directions
 
     def seconds(self, stimulus: Present) -> float:
         return PERIODS / stimulus.frequency_hz
 
     def feel(self, stimulus: Present, sign_of_life: SignOfLife) -> Delivered | None:
-        """Takes `seconds(stimulus)`. None without a device, or where the sign of life ended it."""
+        """What was felt, after `seconds(stimulus)`. None without a device, or where the sign of life ended it."""
         if self._device is None or self._directions is None:
             return None
         rate_hz = self._device.info.sample_rate_hz

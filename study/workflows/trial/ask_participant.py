@@ -19,18 +19,18 @@ class Asked:
 
     reply: Reply
     started_s: float
-    """When answering became possible."""
+    """Time at which answering became possible."""
     felt_whole: bool
     """The stimulus was faultless until the answer. Later faults, such as during a slow disk write, do not void the
     answer."""
     played: Played | None
-    """For a stimulus that ended before the question; None if it is still held or never began."""
+    """Result of a stimulus that ended before the question; None if it is still held or never began."""
     holding: bool
-    """It still has to be released."""
+    """Whether it still has to be released."""
     health: Health | None = None
     """Counters of the device at the answer; None if the question was not reached."""
     pulse: Pulse | None = None
-    """At the onset of the force; None where the lab has no line for it, or the force did not begin."""
+    """Pulse at the onset of the force; None where the lab has no line for it, or the force did not begin."""
 
 
 def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
@@ -39,7 +39,9 @@ def ask_participant(state: SessionState, present: Present, question: Question, s
     if present.phase is Phase.DETECTION:
         return _in_one_of_two_intervals(state, present, question, sitting)
     sitting.device.hold(_stimulus(state, present, sitting))
-    started_s = sitting.clock.now_s()  # before the pulse: a lost one takes its time and shortens no response
+    started_s = (
+        sitting.clock.now_s()
+    )  # Taken before the pulse: a lost pulse takes time, which must not shorten the response time.
     pulse = sitting.pulse()
     sitting.hand.feel(present, state.answers)
     reply = _reply_to(question, sitting)

@@ -36,7 +36,7 @@ False: something ended the wait (a fault, a request, a device button); return at
 
 class Display(Protocol):
     def fill_in(self, form: Form) -> FormReply:
-        """Returns when every needed field has an answer that is one of its choices."""
+        """Show a form. Returns when every required field has an answer that is one of its choices."""
         ...
 
     def device_checked(self, report: DeviceReport) -> bool:
@@ -48,7 +48,7 @@ class Display(Protocol):
         ...
 
     def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
-        """What to feel next, if anything."""
+        """Choose the next demonstration, if any."""
         ...
 
     def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
@@ -56,17 +56,17 @@ class Display(Protocol):
         ...
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """Until `look().ready`, looking every 100 ms or so. None when it is; else why the wait was cut short."""
+        """Wait until `look().ready`, checking about every 100 ms. None when it is; else why the wait was cut short."""
         ...
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        """Wait for 1 or 2."""
+        """Wait for the answer 1 or 2."""
         ...
 
     def feedback(self, correct: bool) -> None: ...
 
     def practice_over(self, result: PracticeResult) -> None:
-        """Returns when the participant has read it."""
+        """Show a notice. Returns when the participant has read it."""
         ...
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
@@ -75,28 +75,29 @@ class Display(Protocol):
         ...
 
     def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
-        """Nothing is played until it is decided how to go on. LEAVE where `sign_of_life` ended the wait."""
+        """Show a pause: nothing is played until the participant decides how to continue. LEAVE where `sign_of_life`
+        ended the wait."""
         ...
 
     def await_return(self, reason: str) -> None:
-        """After a void trial: nothing is played until the participant is there."""
+        """After a void trial: wait until the participant is ready."""
         ...
 
     def goodbye(self, notice: Goodbye) -> None: ...
 
     def trouble(self, sentence: str) -> None:
-        """Something to know that does not end the session."""
+        """Show a message that does not end the session."""
         ...
 
 
 class Hand(Protocol):
-    """What holds the handle. A person feels the device; a simulated hand is told the stimulus."""
+    """The hand on the handle. A person feels the device; a simulated hand is given the stimulus."""
 
     def feel(self, stimulus: Present, answers_before: int) -> None: ...
 
 
 class PersonsHand:
-    """A person, who needs no information."""
+    """A person's hand, which needs no information."""
 
     def feel(self, stimulus: Present, answers_before: int) -> None:
         return None

@@ -23,8 +23,9 @@ class Judgement:
 def judge(
     health: Health, settings: MeasurementSettings, felt_whole: bool, at_answer: Health | None = None
 ) -> Judgement:
-    """Judge the trial. health: until the release; at_answer: as it was then, None where both are one. felt_whole:
-    whether the stimulus was faultless until the answer; later faults are only flagged, and late ticks not judged."""
+    """Judge the trial. health: counters until the release; at_answer: those at the answer, None where both are the
+    same. felt_whole: whether the stimulus was complete until the answer; later faults are only flagged, and late ticks
+    not judged."""
     if health.fault is not Fault.NONE and not felt_whole:
         return Judgement(health.fault.value, (), cause_of(health.fault))
     if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):

@@ -1,4 +1,4 @@
-"""Masking noise of a sitting: begun before the first trial, silent in pauses, logged; no trial counts without it."""
+"""Masking noise of a sitting: started before the first trial, silent in pauses, logged; no trial counts without it."""
 
 import contextlib
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from study.workflows.trial.sitting import Sitting, Sound, record
 
 SAMPLE_RATE_HZ = 44_100
 LOOP_S = 60
-"""Longer than a person remembers noise."""
+"""Length of the loop: longer than a person remembers noise."""
 
 
 @contextlib.contextmanager
@@ -41,7 +41,7 @@ def start_masking(state: SessionState, sitting: Sitting) -> SessionState:
 
 
 def check_masking(state: SessionState, sitting: Sitting) -> SessionState:
-    """Before a trial. Raises `DeviceError` where it is not heard any more, which is logged first."""
+    """Before a trial. Raises `DeviceError` where the noise is not audible any more, which is logged first."""
     if sitting.sound is None:
         return state
     try:
@@ -53,7 +53,7 @@ def check_masking(state: SessionState, sitting: Sitting) -> SessionState:
 
 
 def was_masked(sitting: Sitting) -> bool:
-    """Whether the noise was still heard at the answer, where it is wanted. What is wrong is logged before the next
+    """Whether the noise was still audible at the answer, where it is required. A failure is logged before the next
     trial."""
     if sitting.sound is None:
         return True

@@ -23,7 +23,7 @@ from study.workflows.trial.present_trial import await_handle
 from study.workflows.trial.sitting import Sitting, record, release_device, tell
 
 LIGHTER_WITHOUT_A_HAND = 0.9
-"""A handle that was let go answers like a mass at least a tenth smaller than just before, in the hand."""
+"""Largest ratio of the apparent mass after the hand let go to that just before, with the hand."""
 
 NO_QUESTION = "Nothing to answer: the device is measured"
 
@@ -41,11 +41,11 @@ class _Measured:
     """Why it was cut short; None where it was not."""
     played: Played
     mass_kg: float | None
-    """That the handle seems to have; None where nothing was kept."""
+    """Apparent mass of the handle; None without a recording."""
 
 
 def play_probe(state: SessionState, probe: Probe, sitting: Sitting) -> AfterTrial:
-    """One probe with the hand on the handle, which waits for it as a trial does."""
+    """Play a probe with the hand on the handle, after waiting for the hand as a trial does."""
     hindrance = await_handle(state, sitting)
     if hindrance is not None:
         return cut_short(state, hindrance)
@@ -79,7 +79,7 @@ def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
 
 
 def _test_and_play(state: SessionState, held_kg: float, sitting: Sitting) -> AfterTrial:
-    # At the level of the probe that it is compared with: what friction and springs add depends on it.
+    # At the level of the probe that it is compared with: the influence of friction and springs depends on the level.
     test = _hold(state, "free", state.sitting.probing.hand_level_n, sitting)
     after = _after(test.state, test.reply, test.played, sitting)
     if after.leave or after.pause or after.fault is not Fault.NONE:
@@ -125,7 +125,7 @@ def _play_free(state: SessionState, sitting: Sitting) -> AfterTrial:
 
 
 def _hold(state: SessionState, kind: Kind, level_n: float, sitting: Sitting) -> _Measured:
-    """Log, play through the same port and under the same signs of life as a demonstration, and keep what came."""
+    """Log, play through the same port and under the same signs of life as a demonstration, and keep the recording."""
     stimulus = probe_stimulus(state.protocol.probes, level_n, sitting.device.info.sample_rate_hz)
     state = _begin(state, kind, level_n, sitting)
     sitting.supervisor.begin("probe")
@@ -176,8 +176,8 @@ def _end(state: SessionState, recording: Recording | None, seconds: float, troub
 
 
 def _mass_kg(recording: Recording, trouble: str) -> tuple[float | None, str]:
-    """What the handle seems to weigh, None where that cannot be said; and the trouble, with that."""
-    # Here, because most sessions have no probes and begin sooner without it.
+    """Apparent mass of the handle, None where it cannot be estimated; and any trouble, in words."""
+    # Imported here: most sessions have no probes and begin sooner without it.
     from analysis.device_change.probe_lines import apparent_mass_kg, probe_lines
 
     try:
@@ -197,7 +197,7 @@ def _conditions(probe: ProbePlayed, sitting: Sitting) -> dict[str, Any]:
 
 
 def _after(state: SessionState, reply: Unanswered | None, played: Played, sitting: Sitting) -> AfterTrial:
-    """A probe ends a sitting only where a trial would too: on request, or with a device that is lost."""
+    """A probe ends a sitting only where a trial would too: on request, or when the device is lost."""
     fault = played.health.fault
     if leave := reason_to_leave(fault):
         return AfterTrial(state, leave=leave, fault=fault)

@@ -30,7 +30,7 @@ def question_of(state: SessionState, present: Present) -> Question:
     run = state.runs[present.run]
     alike = [other.index for other in state.runs if (other.phase, other.practice) == (run.phase, run.practice)]
     return Question(
-        phase=run.phase,  # a catch trial is one of the test run's, as far as the screen tells
+        phase=run.phase,  # a catch trial looks like one of the test run on the screen
         run_number=1 + alike.index(present.run),
         runs_in_phase=len(alike),
         trial_number=present.trial + 1,
@@ -123,7 +123,7 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
 
 
 def _log_pulse(state: SessionState, present: Present, pulse: Pulse, sitting: Sitting) -> SessionState:
-    """Now, and not as it was sent: no write to the disk may fall between the onset and the question."""
+    """Logged now and not at the onset: no write to the disk may fall between onset and question."""
     fact = OnsetPulsed(
         utc=sitting.clock.utc(),
         run=present.run,
@@ -159,7 +159,7 @@ def _void(state: SessionState, present: Present, asked: Asked, reply: Unanswered
     played = release_device(sitting) if asked.holding else asked.played
     health = played.health if played is not None else None
     fault = health.fault if health is not None else Fault.NONE
-    # An emergency stop is a fault too; who pressed it says more.
+    # An emergency stop is a fault too, but the person who pressed it is more informative.
     faulty = fault is not Fault.NONE and not reply.leave
     reason = fault.value if faulty else reply.reason
     cause = cause_of(fault) if faulty else _cause_of(reply, sitting)

@@ -11,7 +11,7 @@ from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked, Wh
 from study.workflows.trial.requests_port import Requests
 
 LIVE_EVERY_S = 0.25
-"""Often enough for a viewer, with little load on the disk."""
+"""Interval of the live state: often enough for a viewer, with little load on the disk."""
 
 PLAYING = ("trial", "demo", "probe", "reference")
 
@@ -63,7 +63,7 @@ class SessionSupervisor:
             return self.stop_asked is None
         if self.stop_asked is not None or self.pause_asked is not None or self._answer is not None:
             return False
-        # Between stimuli the last one's fault is still there, and over.
+        # Between stimuli the fault of the last one is still reported, although it is over.
         return self._activity not in PLAYING or self._device.fault() is Fault.NONE
 
     def listen(self) -> None:

@@ -62,7 +62,7 @@ class Sitting:
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Centre of the spring, where the handle belongs."""
     pulse: Callable[[], Pulse | None] = no_pulse
-    """Gives a pulse on the lab's line, right after the device has begun a trial's force. Never raises."""
+    """Sends a pulse on the lab's trigger line, right after the device has begun a trial's force. Never raises."""
     sound: Sound | None = None
 
 

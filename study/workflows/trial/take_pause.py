@@ -26,14 +26,14 @@ def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutco
     started_s = sitting.clock.now_s()
 
     def glance() -> bool:
-        """A note is on the disk soon after it was typed, however long the pause."""
+        """Notes are written to the disk soon after they were typed, even in a long pause."""
         nonlocal state
         state = write_notes(state, sitting)
         return supervisor.glance()
 
     decision = sitting.display.pause(PauseNotice(reason, state.answers), glance)
     state = write_notes(state, sitting)
-    # A pause that was asked for during the pause is over: cleared only after the last look.
+    # A pause that was requested during the pause is over: cleared only after the last check.
     supervisor.pause_asked = None
     paused_s = sitting.clock.now_s() - started_s
     state = record(state, PauseTaken(utc=sitting.clock.utc(), who=who, paused_s=paused_s), sitting)

@@ -116,7 +116,7 @@ def trial_measured(present: Present, outcome: Outcome, state: SessionState, sitt
         run=present.run,
         trial=present.trial,
         attempt=present.attempt,
-        # Without a steady part there is nothing to measure, which is no fault: most quick answers come before it.
+        # Without a steady part nothing can be measured, which is no fault: most quick answers come before it.
         status="flagged" if outcome.flags else "unmeasured" if values is None else "ok",
         flags=outcome.flags,
         recording=saved.name if saved else None,

@@ -2,5 +2,5 @@
 
 `list_sessions` -> `session_line`, `session_facts` -> `view_session`; `view_diagnosis` for a diagnosis document;
 `plan_study` for who is done in a study and who comes next.
-`watch_session` follows a running session; `ask_session` and `take_note` send it requests. Begin at `list_sessions.py`.
+`watch_session` follows a running session; `send_request` and `take_note` send it requests. Begin at `list_sessions.py`.
 """

@@ -17,7 +17,7 @@ from study.workflows.views.session_line import session_line
 
 
 def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
-    """Shipped protocols first, then files in the data folder and beside it."""
+    """Protocols to choose from: shipped ones first, then files in the data folder and beside it."""
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
     found = [str(path) for place in places for path in _toml_files(place) if _says_study(path)]
     lines = (protocol_line(name, data) for name in (*list_shipped_protocols(), *found))
@@ -53,7 +53,7 @@ def protocol_line(name: str, data: Path) -> ProtocolLine | None:
 
 
 def model_files(data: Path) -> tuple[str, ...]:
-    """In the data folder and beside it, latest first."""
+    """Model files in the data folder and beside it, latest first."""
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
     found = [path for place in places for path in _hdf5_files(place)]
     return tuple(str(path) for path in sorted(found, key=_mtime_s, reverse=True) if _is_model(path))
@@ -98,7 +98,7 @@ def home_view(data: Path) -> HomeView:
 
 
 def session_lines(data: Path) -> tuple[SessionLine, ...]:
-    """Latest first. Unreadable sessions are listed with a remark."""
+    """Lines of all sessions, latest first. Unreadable sessions are listed with a remark."""
     try:
         folders = session_folders(data)
     except OSError:

@@ -10,7 +10,7 @@ from study.errors import StudyError
 from study.regular_file import open_regular
 
 LONGEST_FIRST_BYTES = 2**20
-"""Of a log's first line, which says what session it is of."""
+"""Largest first line of a log that is read; it identifies the session."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +65,8 @@ class _Signals:
 
 
 def source_id(log: Path) -> str:
-    """By which a recorder finds the stream again after a restart: of this session alone, wherever its folder lies, and
-    telling nothing of it to the network. Raises StudyError."""
+    """Identifier by which a recorder finds the stream again after a restart: unique to the session, independent of its
+    folder, and without information about it. Raises StudyError."""
     try:
         with open_regular(log) as file:
             first = file.readline(LONGEST_FIRST_BYTES)

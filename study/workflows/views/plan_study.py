@@ -27,7 +27,7 @@ BEST_FIRST = ("finished", "running", "unfinished")
 class PlannedStudy:
     plan: StudyPlan
     next_code: str
-    """A free one, in the manner of the latest."""
+    """A free code in the style of the latest one."""
     remarks: tuple[str, ...]
 
 
@@ -38,7 +38,7 @@ class _Begun:
     number: int | None
     line: SessionLine
     protocol_text: str | None
-    """None where the log does not say it: withdrawn or damaged."""
+    """None where it is not in the log: withdrawn or damaged."""
 
 
 def planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[PlannedStudy, ...]:
@@ -82,7 +82,7 @@ def _plan_from_sessions(data: Path, protocol: StudyProtocol, begun: Sequence[_Be
     people: dict[str, list[_Begun]] = {}
     for each in sorted(begun, key=_by_number):
         people.setdefault(each.folder.subject, []).append(each)
-    # As the program gives it to a new participant, whose code no folder has.
+    # As assigned to a new participant, whose code has no folder yet.
     number = participant_number(data, "", protocol.name, simulated)
     plan = plan_study(protocol, [_participant(code, sessions) for code, sessions in people.items()], number)
     return PlannedStudy(plan, _free_code(data, tuple(reversed(people))), _remarks(begun))
@@ -95,12 +95,12 @@ def _free_code(data: Path, own: tuple[str, ...]) -> str:
 
 
 def _by_number(each: _Begun) -> tuple[float, str]:
-    """Numbers are given in turn; when a withdrawn session began is erased."""
+    """Ordered by number, because the start of a withdrawn session is erased."""
     return (float("inf") if each.number is None else each.number, each.folder.name)
 
 
 def _participant(code: str, sessions: Sequence[_Begun]) -> Participant:
-    """By the session that is furthest."""
+    """Status of the session that is furthest."""
     standings = [each.line.standing for each in sessions]
     numbers = [each.number for each in sessions if each.number is not None]
     best = next((standing for standing in BEST_FIRST if standing in standings), standings[-1])
@@ -127,7 +127,7 @@ def _latest_protocol(name: str, begun: Sequence[_Begun]) -> StudyProtocol:
 
 
 def _remarks(begun: Sequence[_Begun]) -> tuple[str, ...]:
-    """Texts that differ: orders of one protocol would then be counted with those of another."""
+    """Protocol texts that differ: orders of one would otherwise be counted with those of another."""
     texts = {each.protocol_text for each in begun if each.protocol_text is not None}
     if len(texts) < 2:
         return ()
@@ -135,7 +135,7 @@ def _remarks(begun: Sequence[_Begun]) -> tuple[str, ...]:
 
 
 def document(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
-    """For programs."""
+    """Values for a program."""
     return {
         "studies": [
             {
@@ -172,7 +172,7 @@ def _next_order(cell: Cell | None) -> dict[str, Any]:
 
 
 def lines(study: PlannedStudy) -> list[str]:
-    """For the terminal: sentences, and rows of cells below `orders`."""
+    """Output for the terminal: sentences, and rows of cells below `orders`."""
     plan = study.plan
     done, begun, out = (plan.count(each) for each in ("done", "begun", "left out"))
     size = f" of {plan.planned} planned" if plan.planned else ""

@@ -75,7 +75,7 @@ def unreadable(folder: SessionFolder, why: str) -> SessionLine:
 
 
 def _withdrawn_line(folder: SessionFolder) -> SessionLine:
-    left = read_tombstone(folder)  # that there is one says enough
+    left = read_tombstone(folder)  # its existence is information enough
     intent = read_intent(folder.path.parent, folder.subject)
     when = str(left.get("withdrawn_utc", intent.withdrawn_utc if intent else ""))
     begun = left.get("begun")

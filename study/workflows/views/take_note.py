@@ -11,7 +11,7 @@ from study.store.sessions.log_seal import seal_log
 from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.results.fold_session import fold_session
-from study.workflows.views.ask_session import ask_session
+from study.workflows.views.send_request import send_request
 
 
 def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
@@ -29,7 +29,7 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
             saved="Nothing was changed.",
         )
     if is_log_locked(folder.log):
-        return ask_session(folder, note, clock)
+        return send_request(folder, note, clock)
     with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
         try:

@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.text import Annotation
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
+from analysis.diagnosis.result.residual_spectrum import remainder_spectra
 from analysis.figures.diagnosis.held_out import draw_held_out, find_excerpt
 from analysis.figures.diagnosis.mismatch_map import draw_mismatch_map, mismatch_map_picture
 from analysis.figures.diagnosis.remainder import draw_remainder
@@ -143,20 +143,20 @@ def test_a_signature_without_samples_says_so(friction_found):
 
 
 def test_the_excerpt_lies_in_held_out_data_where_the_named_effect_changes_the_prediction(friction_found):
-    found = find_excerpt(friction_found.courses, friction_found.noise_rms)
-    course = friction_found.courses[0]
-    (tested,) = course.tested
+    found = find_excerpt(friction_found.time_series, friction_found.noise_rms)
+    series = friction_found.time_series[0]
+    (tested,) = series.tested
     assert tested[0] <= found.start < found.stop <= tested[1]
     part = slice(found.start, found.stop)
-    change = (course.retuned - course.after)[:, found.channel] / friction_found.noise_rms[
-        course.channels[found.channel]
+    change = (series.retuned - series.after)[:, found.channel] / friction_found.noise_rms[
+        series.channels[found.channel]
     ]
     assert np.std(change[part]) > np.std(change[slice(*tested)])
 
 
 def test_without_a_change_there_is_no_excerpt(friction_found):
-    course = friction_found.courses[0]
-    same = replace(course, before=course.after, retuned=course.after)
+    series = friction_found.time_series[0]
+    same = replace(series, before=series.after, retuned=series.after)
     assert find_excerpt((same,), friction_found.noise_rms) is None
     assert find_excerpt((), {}) is None
 
@@ -170,24 +170,24 @@ def test_errors_of_every_channel_stand_beside_the_noise_line(friction_found):
 
 
 def test_the_remainder_lies_on_the_noise_where_all_is_explained(friction_found):
-    for each in remainder_spectra(friction_found.courses, friction_found.floor):
+    for each in remainder_spectra(friction_found.time_series, friction_found.floor):
         over = each.after / each.noise
         assert np.median(over) == pytest.approx(1.0, abs=0.15)
         assert np.max(each.retuned / each.noise) > 10
 
 
 def test_a_spectrum_of_white_noise_has_the_density_of_its_rms(friction_found):
-    course = friction_found.courses[0]
-    noise = np.random.default_rng(1).standard_normal(course.measured.shape)
-    white = replace(course, measured=course.after + noise)
+    series = friction_found.time_series[0]
+    noise = np.random.default_rng(1).standard_normal(series.measured.shape)
+    white = replace(series, measured=series.after + noise)
     spectrum = remainder_spectra((white,), None)[0]
-    assert spectrum.after[-10:].mean() == pytest.approx(np.sqrt(2 / course.sample_rate_hz), rel=0.05)
+    assert spectrum.after[-10:].mean() == pytest.approx(np.sqrt(2 / series.sample_rate_hz), rel=0.05)
     assert np.isnan(spectrum.noise).all()
 
 
 def test_without_held_out_data_nothing_is_drawn(friction_found):
-    course = replace(friction_found.courses[0], tested=())
-    assert remainder_spectra((course,), friction_found.floor) == ()
+    series = replace(friction_found.time_series[0], tested=())
+    assert remainder_spectra((series,), friction_found.floor) == ()
     sentence = "There are no held-out data to draw."
     assert [text.get_text() for text in draw_remainder(()).texts] == [sentence]
     assert [text.get_text() for text in draw_held_out(None, {}, {}).texts] == [sentence]

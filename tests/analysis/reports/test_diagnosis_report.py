@@ -140,7 +140,7 @@ def test_channels_stand_in_their_units_with_the_noise_beside(friction_found):
     assert "µm (" in table.rows[1][3]
     ratio = friction_found.channel_errors["after"]["x"]
     assert f"({ratio:.2f}×)" in table.rows[1][3]
-    assert channel_table(replace(friction_found, courses=()), "fit") is None
+    assert channel_table(replace(friction_found, time_series=()), "fit") is None
 
 
 def test_rivals_that_cannot_be_told_apart_stand_above_those_passed_over(friction_found):

@@ -1,6 +1,6 @@
-"""What is missing, drawn over what it may depend on, with the laws that were fitted.
+"""Curves of missing physics against the variables that it may depend on, with the fitted laws.
 
 `signature_curves` gives the curve of a named effect, `law_curves` that of a discovered law, over bins of
-`signature_bins`; `state_maps` gives the missing force over position, velocity, command and time, where nothing is named
-too.
+`signature_bins`; `state_maps` gives the missing force over position, velocity, command and time, also where nothing is
+named.
 """

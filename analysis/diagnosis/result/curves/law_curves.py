@@ -1,5 +1,5 @@
-"""Curve of a discovered law of the force: what is missing without it, against the variable that carries most of it, or,
-where no variable alone does, against the law's own value."""
+"""Curve of a discovered law of the force: the missing force without it, against the variable that explains most of it,
+or, where no single variable does, against the law's own value."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ _LINE_POINTS = 400
 @dataclass(frozen=True, slots=True, eq=False)
 class _Variable:
     name: str
-    """With unit: "velocity of x (m/s)"."""
+    """Label of the abscissa with unit: "velocity of x (m/s)"."""
     values: FloatArray
     """(n,)"""
 
@@ -33,7 +33,7 @@ def law_signature(
     evidence: Evidence, placed: PlacedEffect, axes: tuple[str, ...], system: UnitSystem
 ) -> Signature | None:
     """The curve of a discovered law along the measured motion; of a law of the command, by what it changes there. None
-    where it acts on a response, or asks for a signal that is neither time nor an axis's motion or command. axes: name
+    where it acts on a response, or depends on a signal that is neither time nor an axis's motion or command. axes: name
     of each driven axis."""
     if placed.effect.law is None or placed.effect.law.acts_on == "response":
         return None
@@ -50,7 +50,7 @@ def law_signature(
     shares = {name: correlation_ratio(variables[name].values[used], force[used]) for name in law.variables}
     main = variables[max(shares, key=lambda name: shares[name])]
     along, visited = main.name, None
-    if max(shares.values()) < 0.5:  # the variables tell most of it only together
+    if max(shares.values()) < 0.5:  # only the variables together explain most of it
         main = _Variable(f"force of the law ({system.force})", force)
         along, law_at, values = main.name, *_identity(force[used])
     elif len(law.variables) == 1 and not has_memory(law):
@@ -73,7 +73,7 @@ def law_signature(
 
 
 def _variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) -> Mapping[str, _Variable]:
-    """By their names in a formula."""
+    """Signals by their names in a formula."""
     rate_hz, length = evidence.sample_rate_hz, system.length
     found = {"t": _Variable("time (s)", np.arange(len(evidence.command)) / rate_hz)}
     for number, (axis, letter) in enumerate(zip(axes, axis_names(axes), strict=True)):
@@ -87,7 +87,7 @@ def _variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) ->
 
 
 def _evaluate_beyond(law: Law, seen: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
-    """The formula of one variable over what was visited and beyond, and the visited range."""
+    """The formula of one variable over the visited range and somewhat beyond, and that range."""
     low, high = float(seen.min()), float(seen.max())
     margin = _BEYOND * (high - low)
     at = np.linspace(low - margin, high + margin, _LINE_POINTS)

@@ -8,7 +8,7 @@ from equalizer.signals.signal import FloatArray
 
 _BINS, _LAW_BINS = 30, 120
 _BLOCK_S = 0.5
-"""Samples so far apart count as independent."""
+"""Time between samples that count as independent."""
 _FEWEST = 20
 _RESTING = 0.01
 """Share of the range about the median that counts as rest when bins are chosen."""
@@ -17,8 +17,8 @@ _RESTING = 0.01
 def bin_means(
     at: FloatArray, values: FloatArray, used: Mask, rate_hz: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Abscissa, mean and its standard error per bin; half the bins hold as many samples each, half are as wide, so that
-    both the middle and the ends are seen. at, values, used: (n,)"""
+    """Abscissa, mean and its standard error per bin. Half of the bins have equal counts, half equal widths, so that
+    both the middle and the ends are covered. at, values, used: (n,)"""
     blocks = (np.flatnonzero(used) / (_BLOCK_S * rate_hz)).astype(int)
     x, y = at[used], values[used]
     bin_of = np.digitize(x, _edges(x, _BINS)[1:-1])
@@ -32,7 +32,8 @@ def bin_means(
 
 
 def bin_law_means(at: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Bin means of a law over finer bins, without standard errors; none where its model runs away. at, values: (n,)"""
+    """Bin means of a law over finer bins, without standard errors; none where its simulation diverges. at, values:
+    (n,)"""
     known = np.isfinite(at) & np.isfinite(values)
     at, values = at[known], values[known]
     if not len(at):
@@ -45,7 +46,7 @@ def bin_law_means(at: FloatArray, values: FloatArray) -> tuple[FloatArray, Float
 
 
 def correlation_ratio(at: FloatArray, values: FloatArray) -> float:
-    """Share of the values' variance that their mean per bin of `at` takes (eta squared). at, values: (n,)"""
+    """Share of the values' variance explained by their mean per bin of `at` (eta squared). at, values: (n,)"""
     bin_of = np.digitize(at, _edges(at, _BINS)[1:-1])
     count = np.maximum(np.bincount(bin_of), 1)
     means = np.bincount(bin_of, weights=values) / count
@@ -62,7 +63,7 @@ def running_rms(seconds: FloatArray, values: FloatArray, used: Mask) -> tuple[Fl
 
 def _edges(x: FloatArray, bins: int) -> FloatArray:
     low, high = np.quantile(x, [0.001, 0.999])
-    # A channel that rests for most of the time would have all its bins there.
+    # A channel that rests most of the time would have all its bins at rest.
     busy = x[np.abs(x - np.median(x)) > _RESTING * (high - low)]
     shares = np.quantile(busy if len(busy) else x, np.linspace(0, 1, bins // 2))
     return np.unique(np.concatenate([shares, np.linspace(low, high, bins // 2)]))

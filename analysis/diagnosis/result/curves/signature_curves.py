@@ -1,4 +1,4 @@
-"""Signature curve of a named effect: what is missing without it against the variable that it depends on, and the fitted
+"""Signature curve of a named effect: the residual without it against the variable that it depends on, and the fitted
 law, simulated and averaged over the same kind of bins."""
 
 from collections.abc import Mapping
@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.diagnosis.errors.unexplained_motion import EXPECTED
+from analysis.diagnosis.errors.evidence_from_residuals import EXPECTED
 from analysis.diagnosis.forces.missing_force import missing_force
 from analysis.diagnosis.result.curves.law_curves import law_signature
 from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, running_rms
@@ -50,7 +50,7 @@ ALONG: Mapping[str, Along] = {
     "sensor_drift": "time",
     "clock_drift": "growth",
 }
-"""Variable of each effect's curve; for all other effects the spectrum of what is missing is shown."""
+"""Variable of each effect's curve; for all other effects the spectrum of the residual is shown."""
 _FREQUENCY_LINES = 1024
 
 
@@ -60,9 +60,9 @@ class Names:
 
     axes: tuple[str, ...]
     channels: tuple[str, ...]
-    """Of the response."""
+    """Names of the response's channels."""
     unit: str
-    """Of the response."""
+    """Unit of the response."""
     system: UnitSystem = LINEAR
 
 
@@ -143,7 +143,8 @@ def _of_command(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signa
 def _of_reading(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names) -> Signature:
     used = evidence.used > 0
     drives = evidence.predicted[used]
-    # The pair of channels in which the effect shows most: how much of what it changes here goes with what is there.
+    # The pair of channels with the strongest effect: regression of the change in one channel on the signal of the
+    # other.
     together = np.abs(change[used].T @ drives) / np.maximum(np.sqrt(np.sum(drives**2, axis=0)), 1e-300)
     here, there = np.unravel_index(int(np.argmax(together)), together.shape)
     errors = (evidence.response - evidence.predicted)[:, here]
@@ -187,13 +188,13 @@ def _spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArra
     """Amplitude density in twelfths of an octave, with its standard error."""
     length = min(2 * _FREQUENCY_LINES, len(signal))
     lines_hz, power = spectral_density(signal, rate_hz, length)
-    looks = max(1.0, 1.5 * len(signal) / length)
+    stretches = max(1.0, 1.5 * len(signal) / length)
     edges = np.geomspace(lines_hz[1], lines_hz[-1], int(12 * np.log2(lines_hz[-1] / lines_hz[1])) + 1)
     which = np.digitize(lines_hz[1:], edges)
     groups = [power[1:][which == k] for k in np.unique(which)]
     at = np.array([float(np.exp(np.mean(np.log(lines_hz[1:][which == k])))) for k in np.unique(which)])
     mean = np.array([float(np.sqrt(group.mean())) for group in groups])
-    return at, mean, mean / 2 / np.sqrt(looks * np.array([len(group) for group in groups]))
+    return at, mean, mean / 2 / np.sqrt(stretches * np.array([len(group) for group in groups]))
 
 
 def _strongest(sites: tuple[int, ...], force: FloatArray) -> int:

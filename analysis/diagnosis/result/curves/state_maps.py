@@ -1,4 +1,4 @@
-"""The missing force along each axis against position, velocity, command and time, and the loops that it makes."""
+"""The missing force along each axis against position, velocity, command and time, and its hysteresis loops."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import system_of
 
 CLOUD = 600
-"""Single samples that are drawn."""
+"""Number of single samples that are drawn."""
 LOOP_SAMPLES = 2000
-"""Samples of a loop at most."""
+"""Most samples of a loop."""
 LOOP_PERIODS = 1.1
 """Length of a loop in periods of the motion's strongest line, so that it closes."""
 NAMED, NOT_CONFIRMED = "with what is named", "with the best candidates, not confirmed"
@@ -30,7 +30,7 @@ NAMED, NOT_CONFIRMED = "with what is named", "with the best candidates, not conf
 @dataclass(frozen=True, slots=True, eq=False)
 class StateView:
     along: str
-    """What the abscissa is: "position"."""
+    """Name of the abscissa: "position"."""
     unit: str
     """Unit of the abscissa, SI."""
     cloud_at: FloatArray
@@ -42,7 +42,7 @@ class StateView:
     error: FloatArray
     """Standard error of the mean."""
     left: FloatArray
-    """Mean of what the completed model leaves per bin; empty where there is none."""
+    """Mean residual of the completed model per bin; empty without one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +69,7 @@ class StateMaps:
     model: str
     """The model that lacks the force, in words."""
     completed: str
-    """What the model was completed by: NAMED, NOT_CONFIRMED; empty = nothing."""
+    """Kind of the laws that complete the model: NAMED, NOT_CONFIRMED; empty = none."""
     share: float
     """Missing force over force, rms."""
     views: tuple[StateView, ...]
@@ -77,7 +77,7 @@ class StateMaps:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Course:
+class _AxisSeries:
     """One axis's samples (n,), parts one after another."""
 
     rate_hz: float
@@ -103,19 +103,19 @@ def state_maps(
     found = []
     for axis, letter in enumerate(letters):
         if balances:
-            course, completed = _of_balance(balances[axis], diagnosis, letter)
+            series, completed = _of_balance(balances[axis], diagnosis, letter)
             given = balances[axis].search.regression.prior is not None
             model = "the re-tuned model" if given else "mass, damping and stiffness alone"
         else:
-            course, completed, model = _of_evidence(evidence, axis), "", "the re-tuned model"
-        if course is not None:
+            series, completed, model = _of_evidence(evidence, axis), "", "the re-tuned model"
+        if series is not None:
             said = (letter, units[axis], model, completed)
-            found.append(_maps(course, said, length))
+            found.append(_maps(series, said, length))
     first = diagnosis.effects[0].axis if diagnosis.effects else None
     return tuple(sorted(found, key=lambda each: (each.axis != first, -each.share)))
 
 
-def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_Course | None, str]:
+def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_AxisSeries | None, str]:
     regression = balance.search.regression
     names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
     named = [law.place for law in balance.laws if law.played_as in names]
@@ -123,7 +123,7 @@ def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_C
     linear, whole = (regression.remainder(regression.columns_of(each)) for each in ((), laws))
     axis = min(regression.axis, len(regression.motions[0].channels) - 1)
     motions = regression.motions
-    course = _Course(
+    series = _AxisSeries(
         motions[0].rate_hz / motions[0].step,
         _seconds(motions),
         np.concatenate([motion.position[:: motion.step, axis] for motion in motions]),
@@ -134,7 +134,7 @@ def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_C
         np.concatenate([motion.valid_samples(motion.fit | motion.test) for motion in motions]),
         _slices([len(force) for force in regression.force]),
     )
-    return (course if course.used.any() else None), (NAMED if named else NOT_CONFIRMED if laws else "")
+    return (series if series.used.any() else None), (NAMED if named else NOT_CONFIRMED if laws else "")
 
 
 def _explained_forces(regression: Regression, remainder: Sequence[FloatArray]) -> list[FloatArray]:
@@ -151,7 +151,7 @@ def _slices(counts: Sequence[int]) -> tuple[slice, ...]:
     return tuple(slice(begin, end) for begin, end in pairwise(ends))
 
 
-def _of_evidence(evidence: Sequence[Evidence], axis: int) -> _Course | None:
+def _of_evidence(evidence: Sequence[Evidence], axis: int) -> _AxisSeries | None:
     """The samples of one axis from the evidence; None where its motion is not known."""
     if not evidence or any(axis >= each.axis_force.shape[1] for each in evidence):
         return None
@@ -166,54 +166,54 @@ def _of_evidence(evidence: Sequence[Evidence], axis: int) -> _Course | None:
         return None
     seconds = np.arange(len(force)) / rate_hz
     parts = _slices([len(each.command) for each in evidence])
-    return _Course(rate_hz, seconds, position, velocity, force, force + missing, None, used, parts)
+    return _AxisSeries(rate_hz, seconds, position, velocity, force, force + missing, None, used, parts)
 
 
-def _maps(course: _Course, said: tuple[str, str, str, str], length: str) -> StateMaps:
+def _maps(series: _AxisSeries, said: tuple[str, str, str, str], length: str) -> StateMaps:
     axis, unit, model, completed = said
-    # As a force on the device that the model lacks: what friction does points against the motion.
-    missing = course.before - course.force
-    left = None if course.after is None else course.after - course.force
+    # As the missing force on the device: friction then points against the motion.
+    missing = series.before - series.force
+    left = None if series.after is None else series.after - series.force
     views = tuple(
-        _view(course, (along, its_unit), at, (missing, left))
+        _view(series, (along, its_unit), at, (missing, left))
         for along, its_unit, at in (
-            ("position", length, course.position),
-            ("velocity", f"{length}/s", course.velocity),
-            ("command", unit, course.force),
-            ("time", "s", course.seconds),
+            ("position", length, series.position),
+            ("velocity", f"{length}/s", series.velocity),
+            ("command", unit, series.force),
+            ("time", "s", series.seconds),
         )
     )
-    signal = course.force[course.used] - course.force[course.used].mean()
+    signal = series.force[series.used] - series.force[series.used].mean()
     size = max(float(np.sqrt(np.mean(signal**2))), 1e-300)
-    share = float(np.sqrt(np.mean(missing[course.used] ** 2))) / size
-    return StateMaps(axis, unit, model, completed, share, views, _loops(course, length))
+    share = float(np.sqrt(np.mean(missing[series.used] ** 2))) / size
+    return StateMaps(axis, unit, model, completed, share, views, _loops(series, length))
 
 
 def _view(
-    course: _Course, said: tuple[str, str], at: FloatArray, missing: tuple[FloatArray, FloatArray | None]
+    series: _AxisSeries, said: tuple[str, str], at: FloatArray, missing: tuple[FloatArray, FloatArray | None]
 ) -> StateView:
     before, after = missing
-    places = np.flatnonzero(course.used)
+    places = np.flatnonzero(series.used)
     shown = places[:: max(len(places) // CLOUD, 1)]
-    where, mean, error = bin_means(at, before, course.used, course.rate_hz)
-    left = np.zeros(0) if after is None else bin_means(at, after, course.used, course.rate_hz)[1]
+    where, mean, error = bin_means(at, before, series.used, series.rate_hz)
+    left = np.zeros(0) if after is None else bin_means(at, after, series.used, series.rate_hz)[1]
     return StateView(*said, at[shown], before[shown], where, mean, error, left)
 
 
-def _loops(course: _Course, length: str) -> tuple[Loop, ...]:
-    part = _stretch(course)
-    after = np.zeros(0) if course.after is None else course.after[part]
-    forces = course.force[part], course.before[part], after
+def _loops(series: _AxisSeries, length: str) -> tuple[Loop, ...]:
+    part = _stretch(series)
+    after = np.zeros(0) if series.after is None else series.after[part]
+    forces = series.force[part], series.before[part], after
     return tuple(
         Loop(along, unit, at[part], *forces)
-        for along, unit, at in (("position", length, course.position), ("velocity", f"{length}/s", course.velocity))
+        for along, unit, at in (("position", length, series.position), ("velocity", f"{length}/s", series.velocity))
     )
 
 
-def _stretch(course: _Course) -> slice:
-    """About a period of the motion where it travels furthest."""
-    part = max(course.parts, key=lambda each: float(np.ptp(course.position[each])) if each.stop > each.start else 0.0)
-    position = course.position[part]
+def _stretch(series: _AxisSeries) -> slice:
+    """About one period of the motion, where its travel is largest."""
+    part = max(series.parts, key=lambda each: float(np.ptp(series.position[each])) if each.stop > each.start else 0.0)
+    position = series.position[part]
     power = np.abs(np.fft.rfft(position - position.mean()))
     line = int(np.argmax(power[1:])) + 1 if len(power) > 1 else 1
     count = int(np.clip(LOOP_PERIODS * len(position) / line, min(40, len(position)), LOOP_SAMPLES))

@@ -24,7 +24,7 @@ class LawProof:
     folder: ProofFolder
     plan: BankPlan
     seal: str
-    """SHA-256 of labels.sha256 before anything was diagnosed."""
+    """SHA-256 of labels.sha256, taken before any diagnosis."""
     outcomes: tuple[LawOutcome, ...]
     score: LawScore
     engines: tuple[str, ...]

@@ -45,7 +45,7 @@ class Reading:
 
     rate_hz: float
     rms: float
-    """Of the largest channel."""
+    """Rms of the largest channel."""
     peak: float
     """Largest magnitude in any channel."""
     middle_hz: float
@@ -56,7 +56,7 @@ class Reading:
 Draw = Callable[[Reading, float, np.random.Generator], dict[str, float]]
 """Parameters of a fault from its strength, 0 (weakest) to 1."""
 Spoil = Callable[[FloatArray, float, Mapping[str, float], np.random.Generator], FloatArray]
-"""Response with the fault, from response (n, p), sample rate, parameters, random generator."""
+"""Function from response (n, p), sample rate, parameters and random generator to the response with the fault."""
 
 
 @dataclass(frozen=True, slots=True)

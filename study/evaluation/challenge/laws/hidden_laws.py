@@ -41,7 +41,7 @@ class LawKind:
     code: int = -1
     """Code in `law_kernel`, for forces."""
     acts_on: tuple[ActsOn, ...] = ("force",)
-    """Equivalent places where it can be said to act."""
+    """Equivalent places of action."""
     memory: bool = False
     axes: int = 1
     both: bool = False

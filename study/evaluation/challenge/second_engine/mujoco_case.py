@@ -90,7 +90,8 @@ def _stop(bench: MujocoBench, axis: int, values: Values) -> MujocoBench:
 def _mode(bench: MujocoBench, axis: int, values: Values) -> MujocoBench:
     along = np.roll((1.0, values["tilt_next"], values["tilt_after_next"]), axis)
     along /= np.linalg.norm(along)
-    # It rides along the other directions, too: what it adds to the handle's mass there is taken off where it can be.
+    # An oscillator also moves along the other directions: the mass that it adds to the handle there is subtracted where
+    # possible.
     own = values["mass"] * (1.0 - along**2)
     riders = bench.riders.and_one(values["frequency"], values["mass"], values["damping_ratio"], along)
     return replace(bench, riders=riders, mass_kg=bench.mass_kg - own)

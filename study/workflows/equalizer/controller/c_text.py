@@ -12,13 +12,13 @@ from equalizer.tracking.realtime.realtime_controller import RealtimeController
 
 HEADER, EXAMPLE, CHECK = "hapteq_controller.h", "example_loop.c", "check_controller.c"
 A_LINE = 6
-"""Numbers."""
+"""Numbers per line."""
 GROUP = 4
-"""Rows and columns that a loop takes at once."""
+"""Rows and columns that a loop processes at once."""
 
 
 def header_text(controller: RealtimeController, written_for: tuple[str, ...]) -> str:
-    """written_for: lines that say what model this is of; they become a comment."""
+    """written_for: lines that describe the model; they become a comment."""
     comment = "\n".join(f"/* {line.replace('*/', '* /')} */" for line in written_for)
     return _source("controller.h").replace("@TABLES@", f"{comment}\n\n{_sizes(controller)}\n\n{_tables(controller)}")
 
@@ -94,7 +94,7 @@ def _tables(controller: RealtimeController) -> str:
 
 
 def _pad_to_groups(matrix: FloatArray) -> FloatArray:
-    """Rows and columns to whole groups, with zeros."""
+    """Pad rows and columns with zeros to whole groups."""
     return np.pad(matrix, [(0, -size % GROUP) for size in matrix.shape])
 
 

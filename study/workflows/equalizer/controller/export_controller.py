@@ -21,7 +21,7 @@ from study.workflows.free_name import require_free
 
 TITLE = "The controller was not exported"
 LONGEST_ROWS = 5000
-"""Of a transient: every row is 130 numbers for a model of order 26, and a compiler reads them all."""
+"""Longest transient in rows: every row is 130 numbers for a model of order 26, and a compiler reads them all."""
 LONGEST_PREVIEW_S = 2.0
 TRY = "Such as --preview 200 --cap 3."
 
@@ -31,7 +31,7 @@ class ControllerPlan:
     model: Path
     out: Path
     transient: Path | None = None
-    """A table of wanted accelerations; None = a tap."""
+    """A table of wanted accelerations; None = a tap (a short built-in transient)."""
     settings: RealtimeSettings = field(default_factory=RealtimeSettings)
 
 

@@ -107,7 +107,7 @@ def test_a_body_that_is_not_measured_does_not_hide_friction(two_bodies, recordin
 
 
 def test_what_is_left_of_a_command_drives_one_body(of_both):
-    from analysis.diagnosis.first_model.model_of_balance import first_model
+    from analysis.diagnosis.first_model.model_from_balance import first_model
     from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 
     recording, balances = of_both

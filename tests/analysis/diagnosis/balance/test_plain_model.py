@@ -24,7 +24,7 @@ def rubbing(played, axes):
 
 
 def test_beside_friction_it_is_that_of_the_balance(rubbing):
-    from analysis.diagnosis.first_model.model_of_balance import plain_model
+    from analysis.diagnosis.first_model.model_from_balance import plain_model
 
     model = plain_model(*rubbing, "first")
     assert model is not None
@@ -33,19 +33,19 @@ def test_beside_friction_it_is_that_of_the_balance(rubbing):
 
 
 def test_without_a_named_law_another_fit_is_asked_for(played, axes):
-    from analysis.diagnosis.first_model.model_of_balance import plain_model
+    from analysis.diagnosis.first_model.model_from_balance import plain_model
 
     assert plain_model(*played(axes.Physics()), "first") is None
 
 
 def test_a_second_body_asks_for_another_fit(played, axes):
-    from analysis.diagnosis.first_model.model_of_balance import plain_model
+    from analysis.diagnosis.first_model.model_from_balance import plain_model
 
     assert plain_model(*played(replace(axes.Physics(), coulomb=0.8, second_mass=0.1)), "first") is None
 
 
 def test_a_band_holds_the_friction_of_a_slow_motion_but_no_ripple_above_it(rubbing):
-    from analysis.diagnosis.first_model.model_of_balance import share_within
+    from analysis.diagnosis.first_model.model_from_balance import share_within
 
     balances, _ = rubbing
     shares = [share_within(balances, band_hz) for band_hz in (1e-3, 1.0, 1e3)]

@@ -45,7 +45,7 @@ def test_the_limit_is_named_with_its_speed(offset_m, followed, balance_of):
 
 def test_a_late_command_is_in_the_first_model_beside_the_limit(followed, balance_of):
     """Else the limit would be taken for a slower one, which is late, too."""
-    from analysis.diagnosis.first_model.model_of_balance import plain_model
+    from analysis.diagnosis.first_model.model_from_balance import plain_model
 
     late = 4
     given = followed(SPEED, late, 3000)

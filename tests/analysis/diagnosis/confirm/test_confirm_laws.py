@@ -18,7 +18,7 @@ from analysis.diagnosis.confirm.confirm_laws import (
     unname_doubtful_effects,
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
-from analysis.diagnosis.confirm.laws_to_play import can_be_played, find_special_case, hypothesis_of_judged
+from analysis.diagnosis.confirm.laws_for_simulation import can_be_played, find_special_case, hypothesis_of_judged
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search import SearchResult

@@ -8,7 +8,7 @@ import pytest
 
 from analysis.diagnosis.balance.condition_laws import _formula
 from analysis.diagnosis.balance.motion import Condition
-from analysis.diagnosis.data.as_recorded import under_conditions
+from analysis.diagnosis.data.recorded_conditions import under_conditions
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.prepare_recordings import prepare
 from analysis.diagnosis.result.wording import effect_title

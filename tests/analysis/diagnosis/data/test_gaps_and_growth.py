@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.growth import growth_rate, is_unstable_within
+from analysis.diagnosis.data.growth_rate import growth_rate, is_unstable_within
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NOTHING

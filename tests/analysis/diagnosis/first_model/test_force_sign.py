@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
-from analysis.diagnosis.first_model.plain_form import plain_form
+from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from equalizer.signals.recording import Hold
 from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, of, smooth, speed_of
 
@@ -32,7 +32,7 @@ def test_a_response_of_which_nothing_says_what_it_is_is_taken_for_what_its_cours
     own = "voltage" if unit == "V" else "1"
     recording = of([("u", own, unit, push)], [("y", own, unit, course(push))])
 
-    (found,), said = plain_form((recording,))
+    (found,), said = one_motion_per_force((recording,))
 
     if (quantity, unit) == ("position", "V"):  # a voltage counts as a position already
         assert (found, said) == (recording, ())
@@ -45,7 +45,7 @@ def test_what_an_imposed_motion_meets_is_a_force_where_nothing_says_so():
     place = smooth(2000, 5)
     recording = of([("x", "position", "m", place)], [("y", "1", "1", 3 * place)])
 
-    (found,), _ = plain_form((recording,))
+    (found,), _ = one_motion_per_force((recording,))
 
     assert found.response.quantities == ("force",)
 
@@ -61,8 +61,8 @@ def test_a_command_that_is_counted_against_its_motion_is_turned_round(seed, fric
     speed = speed_of(np.sign(push) * np.maximum(np.abs(push) - friction, 0.0))
     recording = of([("u", "force", "N", push)], [("v", "velocity", "m/s", speed)])
 
-    assert plain_form((recording,)) == ((recording,), ())
-    (found,), (said,) = plain_form((turned(recording),))
+    assert one_motion_per_force((recording,)) == ((recording,), ())
+    (found,), (said,) = one_motion_per_force((turned(recording),))
     np.testing.assert_array_equal(found.command.samples, recording.command.samples)
     assert said.startswith("u is counted against the motion")
 
@@ -75,7 +75,7 @@ def test_what_was_decided_beforehand_is_turned_with_the_command(hold):
     beside = replace(recording.command, samples=decided[:, None])
     recording = replace(turned(recording), hold=hold, excitation=replace(beside, samples=-beside.samples))
 
-    (found,), _ = plain_form((recording,))
+    (found,), _ = one_motion_per_force((recording,))
 
     np.testing.assert_array_equal(found.excitation.samples, beside.samples)
     assert is_in_closed_loop(found)
@@ -89,7 +89,7 @@ def test_what_was_decided_beforehand_is_summed_with_the_commands():
         [("v", "velocity", "m/s", speed_of(first + 0.5 * second))],
     )
 
-    (found,), _ = plain_form((replace(recording, excitation=recording.command),))
+    (found,), _ = one_motion_per_force((replace(recording, excitation=recording.command),))
 
     np.testing.assert_allclose(found.excitation.samples, found.command.samples)
 
@@ -102,8 +102,8 @@ def test_a_loop_without_time_tells_which_way_a_force_is_counted(seed):
     recording = of([("u", "force", "N", pulled)], [("x", "position", "m", way)])
     recording = replace(recording, meta={"time": "unknown"})
 
-    assert plain_form((recording,))[1] == ()
-    (found,), _ = plain_form((turned(recording),))
+    assert one_motion_per_force((recording,))[1] == ()
+    (found,), _ = one_motion_per_force((turned(recording),))
     np.testing.assert_array_equal(found.command.samples, recording.command.samples)
 
 
@@ -112,12 +112,12 @@ def test_a_command_that_moves_nothing_and_a_spring_alone_are_left_as_they_are(se
     push = smooth(2000, seed)
     for moved in (smooth(2000, seed + 100), -push):
         recording = of([("u", "force", "N", push)], [("x", "position", "m", moved)])
-        assert plain_form((recording,)) == ((recording,), ())
+        assert one_motion_per_force((recording,)) == ((recording,), ())
 
 
 def test_of_an_imposed_motion_the_measured_force_is_turned_round():
     push = smooth(2000, 1)
     recording = of([("v", "velocity", "m/s", speed_of(push))], [("f", "force", "N", -push)])
 
-    (found,), _ = plain_form((recording,))
+    (found,), _ = one_motion_per_force((recording,))
     np.testing.assert_array_equal(found.response.samples[:, 0], push)

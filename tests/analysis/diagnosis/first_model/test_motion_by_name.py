@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.first_model.unnamed_motion import name_motion
+from analysis.diagnosis.first_model.infer_quantity import name_motion
 from tests.analysis.diagnosis.first_model.short_recordings import of, smooth, speed_of
 
 PUSH = smooth(4000, 1)

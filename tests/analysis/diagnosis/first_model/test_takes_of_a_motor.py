@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.first_model.model_of_balance import share_within
+from analysis.diagnosis.first_model.model_from_balance import share_within
 
 RATE_HZ, SAMPLES = 100.0, 1000
 

@@ -47,8 +47,8 @@ def test_invented_odd_distortion_is_recovered_with_its_size(device):
 def test_odd_distortion_that_rises_is_distinguished_from_friction_that_falls(device):
     rising = whole(level_trends(found_in(device(cubic=0.02, axes=1).recorded()).cells), "ax", "fx")
     falling = whole(level_trends(found_in(device(coulomb=0.3, axes=1).recorded()).cells), "ax", "fx")
-    assert rising["odd"].course in ("rises", "rises from nothing")
-    assert falling["odd"].course == "falls"
+    assert rising["odd"].level_dependence in ("rises", "rises from nothing")
+    assert falling["odd"].level_dependence == "falls"
     assert falling["odd"].db_per_doubling == pytest.approx(-6, abs=1.5)
     assert not rising["even"].present
     assert not falling["even"].present
@@ -64,7 +64,7 @@ def test_even_distortion_falls_on_even_lines(device):
 def test_a_device_that_sways_varies_between_periods(device):
     found = whole(level_trends(found_in(device(swaying=0.3, axes=1, noise=0.01).recorded()).cells), "ax", "fx")
     assert found["varying"].present
-    assert found["varying"].course == "stays"
+    assert found["varying"].level_dependence == "stays"
 
 
 def test_a_multisine_without_silent_odd_lines_says_so(device):
@@ -115,7 +115,7 @@ def test_images_of_a_held_command_are_no_driven_lines():
 
 
 @pytest.mark.parametrize(
-    ("number", "output", "input", "kind", "course"),
+    ("number", "output", "input", "kind", "level_dependence"),
     [
         (1, "ax", "fx", "odd", "falls"),
         (2, "x", "fx", "odd", "rises"),
@@ -124,13 +124,13 @@ def test_images_of_a_held_command_are_no_driven_lines():
         (10, "az", "fz", "odd", "falls"),
     ],
 )
-def test_the_shared_cases_show_the_signature_of_their_effect(shared, number, output, input, kind, course):
+def test_the_shared_cases_show_the_signature_of_their_effect(shared, number, output, input, kind, level_dependence):
     from study.store.formats.recording_file import read_recording
 
     found = whole(
         level_trends(found_in(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells), output, input
     )
-    assert found[kind].course == course
+    assert found[kind].level_dependence == level_dependence
 
 
 @pytest.mark.parametrize("number", [0, 4, 5, 6, 9])

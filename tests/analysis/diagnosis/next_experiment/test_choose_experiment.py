@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.as_recorded import add_mass
+from analysis.diagnosis.data.recorded_conditions import add_mass
 from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.errors.tuning import tuning_of

@@ -7,7 +7,7 @@ from analysis.diagnosis.effect_words import EFFECT_WORDS, noun_of, numbers_text,
 from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.ceiling_wording import black_box_sentence
 from analysis.diagnosis.result.findings import BlackBox
-from analysis.diagnosis.result.retuned_numbers import MovedNumber, raised_sentence
+from analysis.diagnosis.result.retuned_parameters import MovedNumber, raised_sentence
 from analysis.diagnosis.result.wording import (
     confirmation_sentence,
     effect_sentence,

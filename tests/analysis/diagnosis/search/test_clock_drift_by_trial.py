@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.search.starting_hypotheses import clock_drift_by_trial
 from equalizer.effects.catalogue import CATALOGUE
-from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.simulation.interpolated_response import read_other_times
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits
 

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from equalizer.tracking.lqr.changing_direction import play
 from equalizer.tracking.lqr.contact import causal_start
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.padding import band_error
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
-from equalizer.tracking.lqr.turning import play
 
 NORMALS = [np.eye(3)[0], np.array([1.0, 2.0, -2.0]) / 3, np.array([0.0, 0.6, 0.8])]
 

@@ -5,10 +5,10 @@ import timeit
 import numpy as np
 import pytest
 
+from equalizer.tracking.lqr.changing_direction import play, turning_transient
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.riccati import backward_gains
 from equalizer.tracking.lqr.rotation import rotation_basis
-from equalizer.tracking.lqr.turning import play, turning_transient
 
 SAMPLES, TRIES = 500, 5
 

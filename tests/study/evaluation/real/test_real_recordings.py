@@ -11,7 +11,7 @@ from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, answer_sent_recording, diagnose_folder
 from study.evaluation.real.real_summary import real_lines
 from study.importing.model_library import list_shipped_models, model_for
-from study.store.disk.carried_folder import read_files, write_files
+from study.store.disk.folder_contents import read_files, write_files
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.real_answer_file import read_real_answer
 from study.workflows.files.validate import validate_file

@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.document import Verdict
-from analysis.diagnosis.first_model import fitted_first
+from analysis.diagnosis.first_model import fit_without_model
 from analysis.diagnosis.search.guard import Guard
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -15,7 +15,7 @@ from study.errors import StudyError
 from study.store.formats.recording_file import write_recording
 from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput
-from study.workflows.diagnosis.fitted_first import first_model_of
+from study.workflows.diagnosis.fit_without_model import first_model_of
 
 VERDICTS = set(Verdict.__args__)
 QUANTITIES = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2"), ("angle", "rad"), ("unknown", "1"))
@@ -88,8 +88,8 @@ def test_where_the_force_balance_crashes_a_model_is_fitted_without_it_and_the_cr
     def broken(*arguments):
         raise ValueError("operands could not be broadcast together")
 
-    monkeypatch.setattr(fitted_first, "first_model_of", broken)
-    monkeypatch.setattr(fitted_first, "fit_first_linear_model", lambda *arguments: ("a model", ("how",)))
+    monkeypatch.setattr(fit_without_model, "first_model_of", broken)
+    monkeypatch.setattr(fit_without_model, "fit_first_linear_model", lambda *arguments: ("a model", ("how",)))
     guard, given = Guard(on=True), DiagnosisInput((), (), (), ())
     first = first_model_of(given, (), (lambda: True, guard), quiet)
     assert (first.model, first.remarks, first.balances) == ("a model", ("how",), ())
@@ -103,7 +103,7 @@ def test_a_refusal_in_the_force_balance_is_no_crash(monkeypatch):
     def refused(*arguments):
         raise NothingToDiagnose(("the recordings carry no model",))
 
-    monkeypatch.setattr(fitted_first, "first_model_of", refused)
+    monkeypatch.setattr(fit_without_model, "first_model_of", refused)
     guard = Guard(on=True)
     with pytest.raises(StudyError):
         first_model_of(DiagnosisInput((), (), (), ()), (), (lambda: True, guard), quiet)

@@ -8,7 +8,7 @@ import pytest
 
 from analysis.diagnosis.errors.prediction_error import prediction_error
 from analysis.diagnosis.first_model.choose_structure import choose_structure
-from analysis.diagnosis.first_model.fitted_first import _answers
+from analysis.diagnosis.first_model.fit_without_model import _answers
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment

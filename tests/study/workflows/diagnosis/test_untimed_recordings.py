@@ -8,7 +8,7 @@ from analysis.diagnosis.data.measured_motion import is_quasi_static
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.choose_measure import measure_of
-from analysis.diagnosis.errors.measure_rule import IN_SAMPLES, UNTIMED
+from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES, UNTIMED
 from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.wording import place_of
 from analysis.diagnosis.search.guard import Guard
@@ -16,7 +16,7 @@ from equalizer.plant.effect_vocabulary import matrix_unit
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput
-from study.workflows.diagnosis.fitted_first import first_model_of
+from study.workflows.diagnosis.fit_without_model import first_model_of
 
 STIFFNESS, FRICTION = 500.0, 2.0
 

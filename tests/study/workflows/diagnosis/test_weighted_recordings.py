@@ -8,7 +8,7 @@ import pytest
 from study.errors import StudyError
 from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.diagnosis.diagnosis_input import read_input
-from study.workflows.diagnosis.fitted_first import fit_linear_model
+from study.workflows.diagnosis.fit_without_model import fit_linear_model
 
 
 @pytest.fixture

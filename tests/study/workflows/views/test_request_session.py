@@ -18,7 +18,7 @@ from study.store.sessions.live_file import write_live
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
-from study.workflows.views.ask_session import ask_session
+from study.workflows.views.send_request import send_request
 from study.workflows.views.take_note import take_note
 from study.workflows.views.watch_session import ask, follow
 
@@ -82,20 +82,20 @@ class Session:
 
 @pytest.fixture
 def soon(monkeypatch):
-    monkeypatch.setattr("study.workflows.views.ask_session.HEARD_WITHIN_S", 0.1)
+    monkeypatch.setattr("study.workflows.views.send_request.HEARD_WITHIN_S", 0.1)
 
 
 @pytest.mark.parametrize("request_", [STOP, PAUSE, NOTE])
 def test_a_running_session_hears_what_is_asked(sitter, request_):
     with Session(sitter.interrupted(after=2).folder, hears=True) as session:
-        assert ask_session(session.folder, request_, RealClock())
+        assert send_request(session.folder, request_, RealClock())
         time.sleep(0.02)
     assert session.heard == [request_]
 
 
 def test_where_nothing_runs_nothing_can_be_stopped(whole):
     with pytest.raises(StudyError) as told:
-        ask_session(whole, STOP, RealClock())
+        send_request(whole, STOP, RealClock())
     assert told.value.title == "This session is not running"
     assert "No program has P01_001 open" in told.value.happened
     assert not (whole.path / "requests").exists() or RequestInbox(whole.path).take() == ()
@@ -104,7 +104,7 @@ def test_where_nothing_runs_nothing_can_be_stopped(whole):
 def test_a_stop_that_is_not_heard_stays_and_says_what_to_do(sitter, soon):
     with Session(sitter.interrupted(after=2).folder, hears=False) as session:
         with pytest.raises(StudyError) as told:
-            ask_session(session.folder, STOP, RealClock())
+            send_request(session.folder, STOP, RealClock())
         assert told.value.title == "The stop was not heard"
         assert "took nothing within 0.1 s" in told.value.happened
         assert "switch the device off" in told.value.do_now
@@ -114,7 +114,7 @@ def test_a_stop_that_is_not_heard_stays_and_says_what_to_do(sitter, soon):
 def test_a_pause_that_is_not_heard_is_taken_back(sitter, soon):
     with Session(sitter.interrupted(after=2).folder, hears=False) as session:
         with pytest.raises(StudyError, match="The pause was not heard"):
-            ask_session(session.folder, PAUSE, RealClock())
+            send_request(session.folder, PAUSE, RealClock())
         assert RequestInbox(session.folder.path).take() == ()
 
 

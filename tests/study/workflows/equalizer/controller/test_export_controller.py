@@ -11,7 +11,7 @@ import pytest
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import Trajectory
-from equalizer.tracking.lqr.turning import play
+from equalizer.tracking.lqr.changing_direction import play
 from equalizer.tracking.realtime.realtime_controller import RealtimeSettings
 from study.cli.main import main
 from study.store.formats.identified_model_file import write_identified_model

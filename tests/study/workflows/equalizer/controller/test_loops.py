@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from equalizer.tracking.lqr.turning import play
+from equalizer.tracking.lqr.changing_direction import play
 from equalizer.tracking.realtime.realtime_controller import RealtimeSettings
 from study.workflows.equalizer.controller.export_controller import ControllerPlan, export_controller
 from tests.study.workflows.equalizer.controller.build import build, compiled_cpp, run, write_model

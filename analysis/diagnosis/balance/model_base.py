@@ -1,0 +1,72 @@
+"""A given model as the base of a force balance: the force that it needs, and its sensitivity to the free parameters.
+
+Both are columns: the first has the weight 1, the others a prior of 0 ± 1, because they are counted in standard
+deviations of the calibration. The weight of the data against that prior follows from the residual: its power per degree
+of freedom, of which a residual with a narrow spectrum has few (equivalent degrees of freedom of a power estimate;
+Bendat and Piersol 2010, Random Data, ch. 8).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.motion import Motion
+from analysis.diagnosis.balance.regression import Regression, fit_all_laws, regression_of
+from equalizer.signals.signal import FloatArray
+
+FIXED = 1e6
+"""Precision of the prior of the weight 1, relative to the data's information on it: large enough to fix it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenBase:
+    """A given model's columns along one axis, in place of free mass, damping and stiffness."""
+
+    columns: tuple[FloatArray, ...]
+    """Per motion, (n, 1 + numbers): the force that the model needs along the measured motion, and its change per
+    standard deviation of each free parameter; at the recording's rate."""
+    mass: float
+    """Mass that moves along the axis, kg (kg m^2)."""
+    least: float = 0.0
+    """Least share of the force's rms that all laws together must explain; else none is searched for."""
+
+
+def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: GivenBase) -> Regression:
+    """As `regression_of`, with the model's needed force as the base. Free parameters that hardly change the force are
+    left out."""
+    varying = _sensitive_columns(given)
+    columns = [each[:, varying] for each in given.columns]
+    plain = replace(regression_of(motions, axis, laws, False, None, columns), mass=given.mass)
+    scale = plain.scale[: plain.base - 1]
+    precision, pull = np.zeros(len(scale)), np.zeros(len(scale))
+    precision[0] = FIXED * sum(block.gram[0, 0] for block in plain.fit)
+    pull[0] = precision[0] * scale[0]
+    free = replace(plain, prior=(precision.copy(), pull))
+    precision[1:] = _power_per_freedom(free) / scale[1:] ** 2
+    return replace(plain, prior=(precision, pull))
+
+
+def takes_enough(plain: Regression, least: float) -> bool:
+    """Whether all laws together take so much of the force, over the folds."""
+    alone = float(plain.cross_validated_errors(plain.columns_of(())).sum())
+    whole = fit_all_laws(plain, range(plain.columns[0].shape[1]))[0]
+    return alone - whole > least**2 * sum(block.signal for block in plain.fit)
+
+
+def _sensitive_columns(given: GivenBase) -> list[int]:
+    size = np.sqrt(np.mean(np.vstack(given.columns) ** 2, axis=0))
+    return [0, *(k for k in range(1, len(size)) if size[k] > 1e-9 * size[0])]
+
+
+def _power_per_freedom(plain: Regression) -> float:
+    """Residual sum of squares over its degrees of freedom, with the free parameters fitted without their prior."""
+    left = plain.remainder(plain.columns_of(()))
+    power, freedom = 0.0, 0.0
+    for residual, motion in zip(left, plain.motions, strict=True):
+        seen = np.where(motion.valid_samples(motion.fit), residual, 0.0)
+        lines = np.abs(np.fft.rfft(seen)) ** 2
+        power += float(seen @ seen)
+        freedom += 2 * float(lines.sum()) ** 2 / max(float((lines**2).sum()), 1e-300)
+    return power / max(freedom, 1.0)

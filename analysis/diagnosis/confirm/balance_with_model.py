@@ -1,0 +1,136 @@
+"""The force balance with a given model as its base, whose free parameters are columns with the prior of their
+calibration.
+
+The force that the model needs is computed along the measured motion, with everything that its file names: actuator,
+modes, effects. Laws are then tested as for a fitted model (`balance.judge_laws`), by their gain on held-out data over
+the re-tuned model.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
+from analysis.diagnosis.balance.model_base import GivenBase
+from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
+from analysis.diagnosis.balance.structures import search_structures
+from analysis.diagnosis.data.measured_motion import has_motion
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.forces.inverse_dynamics import band_motion, required_force
+from analysis.diagnosis.settings import LAW_OF_SIGNAL, MOTION_OVERSAMPLED
+from analysis.diagnosis.types import TimeBudget
+from equalizer.effects.effect import PlacedEffect, Structure
+from equalizer.effects.placing import place_recorded_effects
+from equalizer.effects.simulation.along_motion import actuator_force, force_along
+from equalizer.effects.simulation.bodies import bodies_of
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+FINEST = 6.0
+"""Least samples per period of the band's end at which laws are computed, so that their harmonics are not aliased."""
+MOVED = 0.1
+"""Step of the finite differences, in standard deviations of the calibration."""
+
+
+def find_balances_beside_model(
+    recordings: Sequence[Recording], model: MechanicalModel, without: frozenset[str], time_left: TimeBudget
+) -> tuple[Balance, ...]:
+    """One balance per command; empty where not each command drives a measured position or velocity."""
+    records = observed_parts(recordings, model.outputs)
+    if not all(has_motion(record.recording, model) for record in records):
+        return ()
+    try:
+        found = motions_of(records)
+        if len(found[0].channels) < model.inputs or found[0].order == 2 or not np.isfinite(found[0].band_hz):
+            return ()
+        seen = [_balance_data(record, motion, model) for record, motion in zip(records, found, strict=True)]
+        axes = driven_axes(model)
+        mass = np.einsum("nm,nk,km->m", axes, model.mass, axes)
+        return tuple(
+            judge_laws(
+                search_structures(
+                    [_select_axis(each.motion, axis) for each in seen], axis, model.rotational, without, time_left,
+                    GivenBase(tuple(each.columns[axis] for each in seen), float(mass[axis]), LAW_OF_SIGNAL),
+                )
+            )
+            for axis in range(model.inputs)
+        )  # fmt: skip
+    except (NoMotionError, MechanicalModelError, np.linalg.LinAlgError):
+        return ()
+
+
+def _select_axis(motion: Motion, axis: int) -> Motion:
+    """The motion of one axis alone: the catalogue has no laws of another axis's motion."""
+    courses = {name: getattr(motion, name)[:, [axis]] for name in ("position", "velocity", "acceleration")}
+    return replace(motion, channels=motion.channels[axis : axis + 1], **courses)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _BalanceData:
+    motion: Motion
+    """The motion of the driven axes, and the actuator's force there."""
+    columns: tuple[FloatArray, ...]
+    """Per axis, the columns of `GivenBase`."""
+
+
+def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _BalanceData:
+    recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
+    known = under_conditions(place_recorded_effects(model, recording), recording)
+    at = _structure(add_carried_weight(model, recording), known)
+    whole = required_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
+    course = whole.axis_position, whole.axis_velocity, whole.axis_acceleration
+    entered = actuator_force(model, motion.force, rate_hz, known, recording.hold)
+    added = force_along(at, known, course, (motion.force, entered - whole.force), rate_hz)
+    every = max(int(rate_hz / (FINEST * motion.band_hz)), 1)
+    position, velocity, acceleration = (each[::every] for each in course)
+    thin = replace(
+        motion, rate_hz=rate_hz / every, step=max(int(rate_hz / every / (MOTION_OVERSAMPLED * motion.band_hz)), 1),
+        channels=motion.channels[:m], position=position, velocity=velocity, acceleration=acceleration,
+        force=motion.band_pass(entered + added)[::every], condition=motion.condition[::every],
+        fit=motion.fit[::every], test=motion.test[::every],
+    )  # fmt: skip
+    changes = [*_grounded_columns(thin, model, recording), *_mode_columns(thin, model, recording, known)]
+    columns = np.stack([whole.force[::every], *changes], axis=1)
+    return _BalanceData(thin, tuple(columns[:, :, axis] for axis in range(m)))
+
+
+def _grounded_columns(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
+    """(n, m) each: force of one standard deviation of mass, damping and stiffness at the driven axes, in the order of
+    `Tuning`."""
+    tuning, m = tuning_of(model, recording.command.channels), model.inputs
+    pairs = [(i, j) for i in range(m) for j in range(i, m)]
+    length = np.linalg.norm(model.input, axis=0)
+    for part, course in enumerate((motion.acceleration, motion.velocity, motion.position)):
+        for number, (i, j) in enumerate(pairs, part * len(pairs)):
+            added = np.zeros((len(course), m))
+            added[:, i] = course[:, j]
+            added[:, j] = course[:, i]
+            yield tuning.deviation[number] * added / length
+
+
+def _mode_columns(
+    motion: Motion, model: MechanicalModel, recording: Recording, known: Sequence[PlacedEffect]
+) -> Iterator[FloatArray]:
+    """(n, m) each: force of one standard deviation of each number of the modes."""
+    tuning, m = tuning_of(model, recording.command.channels), model.inputs
+    first = 3 * m * (m + 1) // 2
+    if first == len(tuning.names):
+        return
+    seen = motion.position @ (model.output[:m] @ driven_axes(model)).T
+    moved = band_motion(seen, motion.rate_hz, motion.band_hz)
+    steps = MOVED * np.eye(len(tuning.names))[first:]
+    here, *there = (
+        required_force(_structure(add_carried_weight(tuning.tune(step), recording), known), moved).force
+        for step in (0 * steps[0], *steps)
+    )
+    yield from ((each - here) / MOVED for each in there)
+
+
+def _structure(model: MechanicalModel, known: Sequence[PlacedEffect]) -> MechanicalModel:
+    return bodies_of(model, [effect for effect in known if isinstance(effect.effect.acts, Structure)]).structure

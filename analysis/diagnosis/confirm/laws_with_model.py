@@ -1,0 +1,149 @@
+"""Decides by held-out gain what a search with a given model names, where residuals exceed the noise.
+
+Where repeats show that the noise is about as large as the residual, the likelihood decides (`verdict`). Otherwise the
+residual of a real device is far above its noise, and remains so even with a true law. An effect is then confirmed by
+its share of the held-out error power: compared with the re-tuned model, with its best rival, and with the gain of all
+laws together.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.judge_laws import PLAYED_AS, Balance
+from analysis.diagnosis.confirm.balance_with_model import find_balances_beside_model
+from analysis.diagnosis.confirm.confirm_laws import search_by_balance
+from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
+from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, held_out_gain
+from analysis.diagnosis.errors.hypothesis import Claim
+from analysis.diagnosis.search.parsimony import only_refines
+from analysis.diagnosis.search.search import SearchResult, Unconfirmed
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.settings import (
+    AT_RETUNING_BOUND,
+    CANDIDATES_WITH_GAIN,
+    FURTHER_LAW_OF_ALL,
+    NAMED_ERROR,
+    NAMED_OF_CEILING,
+    RETUNING_BOUND,
+)
+from analysis.diagnosis.types import TimeBudget
+from equalizer.signals.recording import Recording
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResultBesideModel:
+    result: SearchResult
+    balances: tuple[Balance, ...] = ()
+    """Empty where nothing is missing, or no motion was measured."""
+
+
+def judge_with_model(
+    recordings: Sequence[Recording], fitting: FittingMeasure, seen: SearchResult, time_left: TimeBudget
+) -> ResultBesideModel:
+    """The result by held-out gain, and the balances beside the model. seen: the result of the search by simulation."""
+    if seen.judgement.verdict not in ("unexplained", "partly_explained") or seen.found.statistic is not None:
+        return ResultBesideModel(seen)
+    known_noise = all(floor.how == "repeats" for floor in fitting.chosen.floors)
+    balances = find_balances_beside_model(recordings, fitting.model, seen.context.barred, time_left)
+    near = float(np.nanmax(seen.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
+    if seen.judgement.named or seen.found.barred:
+        return ResultBesideModel(seen, balances)
+    if known_noise and near:
+        why_not = "the noise is known here, and what it leaves is more than noise"
+        return ResultBesideModel(
+            replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed_candidates(seen, why_not))), balances
+        )
+    why_not = objection(seen, balances)
+    if seen.found.steps and not why_not:
+        return ResultBesideModel(replace(seen, judgement=Judgement("partly_explained", True)), balances)
+    found = search_by_balance(seen.context, balances, known_noise) if balances else None
+    if found is not None and not objection(found, balances):
+        judged = replace(found.judgement, verdict="partly_explained")
+        return ResultBesideModel(replace(found, judgement=judged, remarks=seen.remarks), balances)
+    return ResultBesideModel(
+        replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed_candidates(seen, why_not))), balances
+    )
+
+
+def objection(seen: SearchResult, balances: Sequence[Balance]) -> str:
+    """Why the effects found are not named, as a sentence; empty where they are."""
+    context, found = seen.context, seen.found
+    if not found.steps:
+        return "it takes too little of the error to be added"
+    whole = held_out_gain(context.whole, found.plain, found.after)
+    before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
+    last = held_out_gain(context.whole, before, found.after)
+    if whole is None or last is None:
+        return "too little was held out to confirm it"
+    if min(whole.low, last.low) <= 0:
+        return "its gain on held-out data is not larger than what varies between stretches"
+    if min(whole.gain, last.gain) < FURTHER_LAW_OF_ALL:
+        return f"on held-out data it takes {100 * min(whole.gain, last.gain):.0f} % of the error's power, not a third"
+    if np.any(np.abs(found.after.fitted.deviations) >= AT_RETUNING_BOUND * RETUNING_BOUND):
+        return "beside it, a number of the model stands at the end of its tolerance"
+    rival = _best_rival(context, seen)
+    if rival is not None and _not_better(context, rival, found.after):
+        return f"these data cannot tell it from {rival.newest.replace('_', ' ')}"
+    claims = found.after.fitted.hypothesis.claims
+    if whole.gain < NAMED_OF_CEILING and not all(_is_named_by_balance(claim, balances) for claim in claims):
+        return "it takes less than half of the error's power, and the force balance does not bear it out"
+    return ""
+
+
+def _not_better(context: SearchContext, rival: FittedCandidate, after: FittedCandidate) -> bool:
+    ahead = held_out_gain(context.whole, rival, after)
+    return ahead is None or ahead.low <= 0
+
+
+def _best_rival(context: SearchContext, seen: SearchResult) -> FittedCandidate | None:
+    """The best rival of the last effect that is no refinement of it, scored on held-out samples; None = there is
+    none."""
+    steps = seen.found.steps
+    if len(seen.found.rounds) < len(steps):
+        return None
+    best = steps[-1]
+    others = [
+        other
+        for other in seen.found.rounds[len(steps) - 1]
+        if other.newest != best.newest and not only_refines(other, best)
+    ]
+    return context.with_test_score(others[0]) if others else None
+
+
+def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
+    if claim.spread != "one" or claim.sites[0] >= len(balances):
+        return False
+    names = {
+        name
+        for weighed in balances[claim.sites[0]].named
+        for name in (weighed.law.effect, PLAYED_AS.get(weighed.law.effect, ""), *weighed.alike)
+    }
+    return claim.effect.name in names
+
+
+def _unconfirmed_candidates(seen: SearchResult, why_not: str) -> tuple[Unconfirmed, ...]:
+    """The best candidates of the round in which the search ended, the largest gain first."""
+    rounds = [fitted_candidates for fitted_candidates in seen.found.rounds if fitted_candidates]
+    if not rounds:
+        return ()
+    number = max(min(len(seen.found.steps), len(rounds)) - 1, 0)
+    first: dict[str, FittedCandidate] = {}
+    for candidate in rounds[number]:
+        first.setdefault(candidate.newest, candidate)
+    found = []
+    for place, candidate in enumerate([*first.values()][:CANDIDATES_WITH_GAIN]):
+        gain = held_out_gain(seen.context.whole, seen.found.plain, seen.context.with_test_score(candidate))
+        if gain is not None and gain.gain > 0:
+            found.append(
+                Unconfirmed(candidate.fitted.hypothesis, gain.gain, why_not if place == 0 else _why_behind(gain))
+            )
+    return tuple(sorted(found, key=lambda each: -each.gain))
+
+
+def _why_behind(gain: HeldOutGain) -> str:
+    if gain.low <= 0:
+        return "its gain on held-out data is not larger than what varies between stretches"
+    return "another leaves less of what was fitted to"

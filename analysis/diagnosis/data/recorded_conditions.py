@@ -1,0 +1,71 @@
+"""The model and the effects as they were during one recording: with the weight that the device carried, and under the
+conditions that were recorded."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite
+
+from analysis.diagnosis.data.measured_motion import fill_gaps
+from equalizer.effects.effect import PlacedEffect
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+
+ADDED_MASS, ADDED_INERTIA = "added_mass_kg", "added_inertia_kg_m2"
+"""Keys of a recording's `meta`: mass or inertia that the device carried along every driven axis, beside the model's."""
+
+
+def add_carried_weight(model: MechanicalModel, recording: Recording) -> MechanicalModel:
+    added = recording.meta.get(_key(model), 0.0)
+    return add_mass(model, float(added)) if added else model
+
+
+def add_mass(model: MechanicalModel, added: float) -> MechanicalModel:
+    """The model with `added` kg (kg m^2) more mass (inertia) along every driven axis."""
+    axes = driven_axes(model)
+    return replace(model, mass=model.mass + added * axes @ axes.T)
+
+
+def under_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> tuple[PlacedEffect, ...]:
+    """The effects with the recording's conditions, for those that depend on conditions; missing samples of these are
+    interpolated. Without recorded conditions such effects are not changed, and cannot be simulated."""
+    signal = recording.condition
+    if signal is None or all(placed.effect.with_conditions is None for placed in effects):
+        return tuple(effects)
+    samples, found = fill_gaps(signal.samples), []
+    for placed in effects:
+        acting = placed.effect.with_conditions
+        if acting is not None:
+            placed = replace(placed, effect=replace(placed.effect, acts=acting(samples, recording.sample_rate_hz)))
+        found.append(placed)
+    return tuple(found)
+
+
+def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
+    """What is wrong with the recordings' stated weights, as sentences without a full stop; empty where nothing is."""
+    key = _key(model)
+    other = ADDED_MASS if key == ADDED_INERTIA else ADDED_INERTIA
+    problems = [
+        f"{name} says {other}, and the model's device {'turns' if model.rotational else 'moves straight'}: say {key}"
+        for recording, name in zip(recordings, names, strict=True)
+        if other in recording.meta
+    ]
+    problems += [
+        f"{name} says {key} = {recording.meta[key]!r}, which must be a number from 0 on"
+        for recording, name in zip(recordings, names, strict=True)
+        if key in recording.meta and not _is_weight(recording.meta[key])
+    ]
+    return tuple(problems)
+
+
+def has_carried_weight(recordings: Sequence[Recording]) -> bool:
+    """Whether any recording was made with a carried weight."""
+    return any(key in recording.meta for recording in recordings for key in (ADDED_MASS, ADDED_INERTIA))
+
+
+def _key(model: MechanicalModel) -> str:
+    return ADDED_INERTIA if model.rotational else ADDED_MASS
+
+
+def _is_weight(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value) and value >= 0

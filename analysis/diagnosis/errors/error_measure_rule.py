@@ -1,0 +1,139 @@
+"""The rule by which the error measure of recordings and a model is chosen.
+
+Free simulation, from rest by the commands alone, is the strictest test, because no measurement corrects it. It is not
+suitable for
+
+* a plant in closed loop that is not stable by itself: its command contains the controller's reaction to the missing
+physics. Where positions or velocities were measured, the force that entered is compared with the force that the model
+needs along the measured motion; with accelerations only, windows are used;
+
+* a plant that is unstable within a window, such as a levitated body or an inverted pendulum: it was recorded under
+control, whether the data show it or not, and is compared likewise;
+
+* a plant without restoring force (integrator), whose slowest motion takes longer to decay than a third of the
+recording: any small error grows without bound. It is simulated in windows of 1 s or longer, each from a state estimated
+from the measured motion, or, where no state can be estimated, compared by forces;
+
+* a recording that does not begin at rest: the initial motion decays, so its first seconds are left out; where that
+would be more than a quarter of the recording, windows are used.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from analysis.diagnosis.data.closed_loop import is_in_closed_loop
+from analysis.diagnosis.data.growth_rate import is_unstable_within
+from analysis.diagnosis.data.measured_motion import has_motion, is_quasi_static
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.windows import WINDOW_S
+from analysis.diagnosis.settings import DIES_OUT_SHARE, MOST_LEFT_OUT, REST_S, REST_SHARE, SETTLED_CONSTANTS
+from equalizer.plant.mechanical_model import MechanicalModel
+
+Measure = Literal["free simulation", "windows", "predicted force"]
+UNTIMED = (
+    "No time is known: forces are compared as they stand beside the positions, sample by sample; nothing that hangs on "
+    "speed, acceleration or frequency is known."
+)
+IN_SAMPLES = (
+    "No time is known: each sample is counted as one second, so that every time, speed and frequency is per sample."
+)
+IMPOSED = (
+    "The motion was imposed and the force measured, so the force that the model needs along the motion is compared "
+    "with the measured one."
+)
+CLOSED_LOOP = (
+    "The command hangs on the response and the model does not hold itself, so a simulation by the command alone would "
+    "drift; the force that the model needs along the measured motion is compared with the one that entered."
+)
+UNSTABLE = (
+    "By itself the model grows without end, so the device was held by a controller, and simulations say nothing; the "
+    "force that the model needs along the measured motion is compared with the one that entered."
+)
+CLOSED_LOOP_WINDOWS = (
+    "The command hangs on the response and the model does not hold itself; it is simulated in short windows, each "
+    "from a state estimated from the measured motion."
+)
+DRIFTS = (
+    "The model integrates freely, so that small errors would grow without end; it is simulated in short windows, each "
+    "from a state estimated from the measured motion."
+)
+NOT_AT_REST = (
+    "The recording does not begin at rest; the model is simulated in short windows, each from a state estimated from "
+    "the measured motion."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    measure: Measure
+    why: str
+    """A sentence for the user; empty for a free simulation."""
+
+
+def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choice:
+    """Select the measure by the rule in the module's docstring."""
+    longest_s = max(len(record.command) / record.recording.sample_rate_hz for record in records)
+    holds, motion = is_self_stable(model, longest_s), all(has_motion(record.recording, model) for record in records)
+    if motion and any(is_quasi_static(record.recording) for record in records):
+        return Choice("predicted force", UNTIMED)
+    if any(record.recording.meta.get("imposed") for record in records):
+        return Choice("predicted force", IMPOSED)
+    if not holds and any(is_in_closed_loop(record.recording) for record in records):
+        return Choice("predicted force", CLOSED_LOOP) if motion else Choice("windows", CLOSED_LOOP_WINDOWS)
+    if motion and is_unstable_within(model, WINDOW_S):
+        return Choice("predicted force", UNSTABLE)
+    if not holds:
+        return Choice("windows", DRIFTS)
+    if any(
+        _begins_moving(record) and _settling_samples(record, model) > MOST_LEFT_OUT * len(record.command)
+        for record in records
+    ):
+        return Choice("windows", NOT_AT_REST)
+    return Choice("free simulation", "")
+
+
+def is_self_stable(model: MechanicalModel, longest_s: float) -> bool:
+    """Whether all free motion decays well within a recording (no pole at or near the stability limit)."""
+    return _slowest_decay_rate(model) * DIES_OUT_SHARE * longest_s > 1
+
+
+def samples_to_settle(record: Observed, model: MechanicalModel) -> int:
+    """Samples to leave out at the beginning, where the recording begins in motion and that takes a short time; 0 =
+    none."""
+    after = _settling_samples(record, model)
+    if after > MOST_LEFT_OUT * len(record.command) or not _begins_moving(record):
+        return 0
+    return int(np.ceil(after))
+
+
+def _settling_samples(record: Observed, model: MechanicalModel) -> float:
+    """Samples until the initial motion has decayed."""
+    slowest = _slowest_decay_rate(model)
+    return SETTLED_CONSTANTS / slowest * record.recording.sample_rate_hz if slowest > 0 else np.inf
+
+
+def _slowest_decay_rate(model: MechanicalModel) -> float:
+    """Decay rate of the slowest free motion, 1/s; negative for one that grows."""
+    n = model.coordinates
+    motion = np.block(
+        [
+            [np.zeros((n, n)), np.eye(n)],
+            [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
+        ]
+    )
+    return -float(np.linalg.eigvals(motion).real.max())
+
+
+def _begins_moving(record: Observed) -> bool:
+    first = max(int(REST_S * record.recording.sample_rate_hz), 4)
+    known = record.measured[np.isfinite(record.measured).all(axis=1)]
+    if len(known) < 4 * first:
+        return False
+    means = known[: len(known) // first * first].reshape(-1, first, known.shape[1]).mean(axis=1)
+    changes = np.diff(means, axis=0)
+    away = np.abs(means[0]) > REST_SHARE * known.std(axis=0)
+    moves = np.abs(changes[0]) > REST_SHARE * np.sqrt(np.mean(changes**2, axis=0))
+    return bool(np.any(away & moves))

@@ -1,0 +1,57 @@
+"""Converts the residuals of a simulation to evidence for starting values: the missing force along each axis."""
+
+import numpy as np
+
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.forces.missing_force import missing_force
+from equalizer.effects.simulation.simulator import SimulationResult
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+EXPECTED = 0.1
+"""Expected rms of a missing force, relative to the command's."""
+
+
+def evidence_of(
+    model: MechanicalModel,
+    record: Observed,
+    played: SimulationResult,
+    left: FloatArray,
+    scales: tuple[FloatArray, FloatArray],
+) -> Evidence:
+    """The evidence of one record. left: (n, c), residuals of the simulation. scales: the error measure's unit and
+    noise, (c,) each."""
+    unit, noise = scales
+    residuals = np.where(np.isfinite(left), left, 0.0)
+    rate_hz, p = record.recording.sample_rate_hz, model.outputs
+    expected = EXPECTED * np.maximum(np.sqrt(np.mean(record.command**2, axis=0)), 1e-12)
+    missing = missing_force(model, residuals, unit, rate_hz, expected)
+    measured, predicted = without_gaps(record.measured, left * unit, played)
+    seen = measured.shape[1] > p
+    return Evidence(
+        model=model,
+        sample_rate_hz=rate_hz,
+        command=record.command,
+        axis_position=played.axis_position + missing.position,
+        axis_velocity=played.axis_velocity + missing.velocity,
+        axis_force=missing.force,
+        response=measured[:, :p],
+        predicted=predicted[:, :p],
+        noise=noise[:p],
+        used=(record.fit | record.choose).astype(np.float64),
+        position=measured[:, p:] if seen else None,
+        predicted_position=predicted[:, p:] if seen else None,
+        position_noise=noise[p:] if seen else None,
+    )
+
+
+def without_gaps(
+    measured: FloatArray, residuals: FloatArray, played: SimulationResult
+) -> tuple[FloatArray, FloatArray]:
+    """Measured and predicted signals, (n, c) each, without gaps: missing samples are replaced by the simulation in
+    both, so that their difference is zero."""
+    known = np.isfinite(measured)
+    simulated = np.hstack([played.response, played.position])[:, : measured.shape[1]]
+    predicted = np.where(known, measured - residuals, simulated)
+    return np.where(known, measured, predicted), predicted

@@ -1,0 +1,152 @@
+"""Fits the model that a diagnosis starts from where none was given."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.balances import find_balances
+from analysis.diagnosis.balance.motion import NoMotionError
+from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, is_read_as_free
+from analysis.diagnosis.data.recorded_conditions import has_carried_weight
+from analysis.diagnosis.first_model.model_from_balance import FirstModel, plain_model
+from analysis.diagnosis.first_model.model_structures import (
+    HELD_FIXED,
+    Kind,
+    StructureRefused,
+    balance_recordings,
+    fit_structure,
+)
+from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
+from analysis.diagnosis.settings import LEAST_MODEL_ANSWER
+from analysis.diagnosis.types import Mapper, Progress, TimeBudget
+from equalizer.effects.simulation.simulator import simulate_response
+from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
+from equalizer.identification.mechanical.open_tolerance import widen_tolerance
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.recording import Recording
+
+RIGID_SAID = (
+    "No model was given. One body per axis, with damping and, where that shows, a spring, was fitted first to the "
+    "forces along the measured motion; its damping is left open by a quarter, for friction hides in it."
+)
+BALANCE_SAID = (
+    "No model was given. One body per axis, with damping and a spring, was fitted first to the forces along the "
+    "measured motion; its numbers are left open by a tenth, and by half of what the named laws change in them."
+)
+UNTIMED_SAID = (
+    "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "
+    "The mass in the file is a floor that no force shows; damping and mass are not known."
+)
+
+FREE_SAID = (
+    "No model was given. A damper and a spring per axis were fitted first to the force per unit mass that the free "
+    "motion shows; the mass in the file is a floor."
+)
+
+
+def first_model_of(
+    recordings: Sequence[Recording],
+    without: Sequence[str],
+    time_left: TimeBudget,
+    on_progress: Progress,
+    map_: Mapper = map,
+) -> FirstModel:
+    """The first model, from the force balance where that names laws along the motion of one body per command; else by a
+    fit to spectra, which takes longer. recordings: in the form of `one_motion_per_force`. Raises NothingToDiagnose
+    where no model can be fitted."""
+    _require_no_weight(recordings)
+    on_progress("weighing laws in the force balance", 0.0)
+    balances = find_balances(recordings, frozenset(without), time_left, map_)
+    free = is_read_as_free(recordings[0])
+    if (
+        not free
+        and any(map(is_quasi_static, recordings))
+        and (still := _plain_structure(recordings, "massless")) is not None
+    ):
+        return FirstModel(still, (UNTIMED_SAID,), balances)
+    model = plain_model(balances, recordings[0], "fitted to these recordings")
+    if free and (held := model or _free_model(recordings)) is not None:
+        return FirstModel(_hold_mass(held), (FREE_SAID,), balances)
+    if model is not None:
+        return FirstModel(model, (BALANCE_SAID,), balances)
+    on_progress("fitting a linear model, as none was given", 0.5)
+    model, remarks = fit_first_linear_model(
+        recordings, lambda share: on_progress("fitting a linear model, as none was given", 0.5 + share / 2)
+    )
+    return FirstModel(model, remarks, balances)
+
+
+def _hold_mass(model: MechanicalModel) -> MechanicalModel:
+    """The model with a mass that re-tuning does not change."""
+    assert model.tolerance is not None
+    return replace(model, tolerance=replace(model.tolerance, mass_kg=HELD_FIXED * float(np.abs(model.mass).max())))
+
+
+def _free_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
+    return _plain_structure(recordings, "mass-spring") or _plain_structure(recordings, "motor")
+
+
+def _plain_structure(recordings: Sequence[Recording], kind: Kind) -> MechanicalModel | None:
+    """None where no motion was measured along the commands, or that does not carry the structure."""
+    try:
+        return fit_structure(balance_recordings(recordings), kind).model
+    except (StructureRefused, NoMotionError):
+        return None
+
+
+def fit_first_linear_model(
+    recordings: Sequence[Recording], on_progress: Callable[[float], None], whose: str = "these recordings"
+) -> tuple[MechanicalModel, tuple[str, ...]]:
+    """A linear model fitted by forces or spectra, with remarks. Raises NothingToDiagnose where none can be fitted."""
+    _require_no_weight(recordings)
+    if wants_rigid_model(recordings) and (rigid := _rigid_model(recordings, whose)) is not None:
+        return rigid, (RIGID_SAID,)
+    try:
+        fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {whose}")
+        if not any(_answers(fit.model, recording) for recording in recordings):
+            raise MechanicalFitRefused("the model that fits best hardly answers to the commands")
+    except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
+        if (rigid := _rigid_model(recordings, whose)) is not None:
+            return rigid, (RIGID_SAID,)
+        raise NothingToDiagnose((f"no model was given, and none can be fitted: {refusal}",)) from refusal
+    tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on what was kept for a test"
+    said = (
+        f"No model was given. A linear one was fitted to {whose} first, with an error of "
+        f"{100 * fit.error:.1f} %{tested}, and its masses, dampers and springs were left open by much more than that; "
+        "what it could take on itself, such as friction at one level as damping, is not missing from it any more, and "
+        "is not named."
+    )
+    return widen_tolerance(fit.model), (
+        said,
+        *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks),
+    )
+
+
+def _answers(model: MechanicalModel, recording: Recording) -> bool:
+    """Whether the commands move the model at all. Where the response depends on them less than on the initial state, as
+    on an axis that friction holds, the fitted masses and springs grow without bound."""
+    played = simulate_response(
+        model, fill_gaps(recording.command.samples), recording.sample_rate_hz, (), recording.hold
+    )
+    measured = np.nanstd(recording.response.samples, axis=0)
+    return bool((np.std(played.response, axis=0) >= LEAST_MODEL_ANSWER * measured).any())
+
+
+def _require_no_weight(recordings: Sequence[Recording]) -> None:
+    if has_carried_weight(recordings):
+        raise NothingToDiagnose(
+            ("a recording was made with a weight on, and a model that is fitted to it would hold the weight",)
+        )
+
+
+def _rigid_model(recordings: Sequence[Recording], whose: str) -> MechanicalModel | None:
+    """None where the recordings do not carry one."""
+    if not can_be_rigid(recordings):
+        return None
+    try:
+        return rigid_model(recordings, f"fitted to {whose}")
+    except (MechanicalModelError, np.linalg.LinAlgError):
+        return None

@@ -1,0 +1,106 @@
+"""Inverse dynamics: the force that a model needs for a measured motion, computed in the frequency domain."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.forces.inverse_lines import inverse_lines, inverse_of
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.band_limited import end_to_end_line, filter_by_gain, low_pass_gain
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_NEARLY_STILL_HZ = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RequiredForce:
+    """Required force and axis motion within a band; each (n, m)."""
+
+    force: FloatArray
+    axis_position: FloatArray
+    axis_velocity: FloatArray
+    axis_acceleration: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BandMotion:
+    """A measured motion and its derivatives within a band, from which every model's force is computed."""
+
+    position: FloatArray
+    """(n, m): positions of the model's first m outputs, as measured, finite."""
+    sample_rate_hz: float
+    band_hz: float
+    at: tuple[FloatArray, FloatArray, FloatArray]
+    """(n, m) each: position, velocity and acceleration at each instant."""
+    around: tuple[FloatArray, FloatArray, FloatArray]
+    """(n, m) each: their means over one sample period around each instant."""
+
+
+def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> BandMotion:
+    m = position.shape[1]
+
+    def gain(frequency_hz: FloatArray) -> ComplexArray:
+        wave = 2j * np.pi * frequency_hz
+        mean = np.sinc(frequency_hz / sample_rate_hz)
+        rows = [shape * wave**order for shape in (1.0, mean) for order in range(3)]
+        within = low_pass_gain(frequency_hz, band_hz) * np.array(rows)
+        return np.asarray(np.einsum("rl,ij->lrij", within, np.eye(m)).reshape(len(frequency_hz), 6 * m, m))
+
+    found = filter_by_gain(position, sample_rate_hz, gain).reshape(len(position), 6, m)
+    slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
+    found[:, [0, 3]] += end_to_end_line(position)[:, None]
+    found[:, [1, 4]] += slope
+    x, v, a, mean_x, mean_v, mean_a = (np.ascontiguousarray(found[:, k]) for k in range(6))
+    return BandMotion(position, sample_rate_hz, band_hz, (x, v, a), (mean_x, mean_v, mean_a))
+
+
+def required_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
+    """Mean of the required force over one sample period around each instant, without actuator, sensor and effects.
+
+    Raises numpy.linalg.LinAlgError where the first m outputs do not determine the model's motion."""
+    if model.coordinates == model.inputs:
+        return _force_of_square_model(model, motion)
+    position, sample_rate_hz = motion.position, motion.sample_rate_hz
+    m, inverse_at = model.inputs, inverse_of(model, len(position), sample_rate_hz / 2)
+
+    def gain(frequency_hz: FloatArray) -> ComplexArray:
+        within = low_pass_gain(frequency_hz, motion.band_hz)[:, None, None]
+        inverse = inverse_at(frequency_hz)
+        inverse[:, :m] *= np.sinc(frequency_hz / sample_rate_hz)[:, None, None]
+        wave = 2j * np.pi * frequency_hz[:, None, None]
+        axes = inverse[:, m:]
+        return np.asarray(within * np.concatenate([inverse[:, :m], axes, wave * axes, wave**2 * axes], axis=1))
+
+    found = filter_by_gain(position, sample_rate_hz, gain) + _force_along_line(model, position, sample_rate_hz)
+    return RequiredForce(*(found[:, part * m : (part + 1) * m] for part in range(4)))
+
+
+def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
+    """For a model whose every coordinate is measured: the derivatives suffice, without another Fourier transform."""
+    to_coordinates = np.linalg.inv(model.output[: model.inputs])
+    to_commands = np.linalg.inv(model.input)
+    matrices = model.stiffness, model.damping, model.mass
+    force = sum(
+        (
+            derivative @ (to_commands @ matrix @ to_coordinates).T
+            for derivative, matrix in zip(motion.around, matrices, strict=True)
+        ),
+        np.zeros_like(motion.position),
+    )
+    to_axes = (driven_axes(model).T @ to_coordinates).T
+    return RequiredForce(force, *(derivative @ to_axes for derivative in motion.at))
+
+
+def _force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
+    """(n, 4 m): required force and motion for the straight line between first and last position, in steady
+    state. The Fourier transform is applied to the rest only."""
+    m = model.inputs
+    line = end_to_end_line(position)
+    slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
+    still = inverse_lines(model, np.array([0.0, _NEARLY_STILL_HZ]))
+    static, rate = still[0].real, still[1].imag / (2 * np.pi * _NEARLY_STILL_HZ)
+    force_and_position = line @ static.T + slope @ rate.T
+    velocity = np.broadcast_to(slope @ static[m:].T, (len(line), m))
+    return np.hstack([force_and_position, velocity, np.zeros((len(line), m))])

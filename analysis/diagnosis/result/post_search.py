@@ -1,0 +1,100 @@
+"""Examination of the fits after a search, in parallel pieces: localisation, curves, and a black box."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.hypothesis import without_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
+from analysis.diagnosis.localisation.distortion import Distortions, find_distortions
+from analysis.diagnosis.localisation.localisation import Localisation, find_entry_point, find_tied_states
+from analysis.diagnosis.localisation.mismatch_maps import Maps
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
+from analysis.diagnosis.result.black_box import black_box
+from analysis.diagnosis.result.curves.signature_curves import Names, signature_of
+from analysis.diagnosis.result.error_table import errors_of
+from analysis.diagnosis.result.findings import BlackBox, Signature
+from analysis.diagnosis.result.named_effects import labels_of
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.guard import Part
+from analysis.diagnosis.search.search import SearchResult
+from analysis.diagnosis.search.search_context import SearchContext
+from equalizer.effects.effect import Values
+from equalizer.effects.placing import axis_letter
+from equalizer.effects.starts.evidence import Evidence
+
+WHERE = "the look at where it sits"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Examination:
+    evidence: tuple[Evidence, ...]
+    """Evidence of the re-tuned model."""
+    local: Localisation
+    signatures: tuple[Signature, ...]
+    black_box: BlackBox | None
+
+
+def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examination:
+    """floor: of the first recording."""
+    context, found = result.context, result.found
+    measure, tuning, stages = context.whole, context.tuning, found.stages
+    evidence = gather_evidence(measure, tuning, stages["retuned"])
+    entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])
+    entry = context.guard.part(WHERE, "its work", entry_search, None)
+    # Stages with the same fit are examined once.
+    fits = {id(fitted): stage for stage, fitted in stages.items()}
+    tied = [
+        partial(find_tied_states, measure, tuning, stages[stage], maps.cells[stage], entry, known)
+        for stage in fits.values()
+        for known in [evidence if stages[stage] is stages["retuned"] else ()]
+    ]
+    pieces = [
+        *(Part(WHERE, "its work", work, ()) for work in tied),
+        Part("the curves of effects", "their making", partial(_signatures, context, found), ()),
+        Part("the black box", "its fit", partial(_black_box, context, found), None),
+        Part(WHERE, "its work", partial(find_distortions, measure.records[0].recording, floor), Distortions((), ())),
+    ]
+    *each, signatures, box, distortions = context.guard.parts(context.map_, pieces)
+    by_fit = dict(zip(fits, each, strict=True))
+    states = {stage: by_fit[id(fitted)] for stage, fitted in stages.items()}
+    return Examination(evidence, Localisation(states, entry, distortions), signatures, box)
+
+
+def _black_box(context: SearchContext, found: Explanation) -> BlackBox | None:
+    if found.statistic is not None:
+        return None
+    numbers = max(len(found.after.fitted.hypothesis.point), 1)
+    return black_box(context.whole, found.retuned, numbers, errors_of(context.whole, found).test.after)
+
+
+def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, ...]:
+    """Curves of the named effects, each against the final model without that effect, in one record."""
+    measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
+    if not fitted.hypothesis.claims:
+        return ()
+    shown = _most_fitted(measure)
+    recording = measure.records[shown].recording
+    said, drawn = labels_of(recording, tuning.model), []
+    names = Names(
+        tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.system
+    )
+    complete = gather_evidence(measure, tuning, fitted)[shown].predicted
+    for number in range(len(fitted.hypothesis.claims)):
+        others = without_claim(fitted.hypothesis, number)
+        bare = gather_evidence(measure, tuning, evaluate_fit(measure, tuning, fitted.deviations, others))
+        main = max(fitted.hypothesis.of_claim(number), key=lambda placed: _strength(placed.values))
+        drawn.append(signature_of(bare[shown], complete, main, names, recording.hold))
+    return tuple(drawn)
+
+
+def _most_fitted(measure: ErrorMeasure) -> int:
+    """Index of the first record with the most samples to fit or choose by: another one may be held out completely."""
+    return int(np.argmax([np.sum(record.fit | record.choose) for record in measure.records]))
+
+
+def _strength(values: Values) -> float:
+    """Size of the main parameter, which comes first."""
+    return abs(next(iter(values.values())))

@@ -1,0 +1,115 @@
+"""Lists the model's own parameters that a fit moved beyond their calibration, with sentences about doubtful ones."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from analysis.diagnosis.document import Errors
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.settings import RETUNING_BOUND, RETUNING_DOUBTED, RETUNING_NAMED, SAME_TO_READERS
+from analysis.diagnosis.unit_wording import error_text, value_text
+from analysis.wording import conjoin, typeset
+from equalizer.signals.signal import FloatArray
+
+_LISTED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class MovedNumber:
+    name: str
+    change: float
+    """Change of the parameter, in `unit`."""
+    unit: str
+    """SI; "1" for a relative change."""
+    deviations: float
+    """The same in standard deviations of the calibration."""
+
+    @property
+    def text(self) -> str:
+        """ "damping fx +0.35 N s/m (2.1 standard deviations)"."""
+        return f"{self.name} {self.size} ({abs(self.deviations):.2g} standard deviations)"
+
+    @property
+    def size(self) -> str:
+        """The change, with its sign."""
+        sign = "+" if self.change >= 0 else ""
+        size = f"{typeset(f'{100 * self.change:.2g}')} %" if self.unit == "1" else value_text(self.change, self.unit)
+        return f"{sign}{size}"
+
+
+def all_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
+    """deviations: (parameters,)"""
+    return tuple(
+        MovedNumber(name, float(change), unit, float(deviation))
+        for name, change, unit, deviation in zip(
+            tuning.names, tuning.values(deviations), tuning.units, deviations, strict=True
+        )
+    )
+
+
+def moved_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
+    """Parameters that moved by a standard deviation or more, the largest first. deviations: (parameters,)"""
+    moved = [number for number in all_numbers(tuning, deviations) if abs(number.deviations) >= RETUNING_NAMED]
+    return tuple(sorted(moved, key=lambda number: -abs(number.deviations)))
+
+
+def retuned_sentence(moved: Sequence[MovedNumber], fitted: bool = False) -> str:
+    """Beside named physics: what else was turned. fitted: the model was fitted to the same recordings first, so that no
+    calibration holds its numbers."""
+    if not moved:
+        return ""
+    texts = [f"{number.name} {number.size}" if fitted else number.text for number in moved[:_LISTED]]
+    more = len(moved) - _LISTED
+    said = conjoin([*texts, f"{more} more"] if more > 0 else texts)
+    if fitted:
+        return f"Fitted once more, these numbers of the first model moved by more than was left open at first: {said}."
+    return f"Re-tuned beyond the calibration's standard deviation: {said}."
+
+
+def doubtful_sentences(moved: Sequence[MovedNumber], fitted: bool = False) -> tuple[str, ...]:
+    """Sentence on parameters that left the likely range of their calibration: they may compensate for physics that was
+    not named. Many are only counted, because the table of parameters lists all. fitted: as in `retuned_sentence`."""
+    far = [number for number in moved if abs(number.deviations) >= RETUNING_DOUBTED]
+    at_end = [number for number in far if abs(number.deviations) >= RETUNING_BOUND - 1e-6]
+    if fitted:
+        names = conjoin([number.name for number in at_end])
+        return (f"As far as they may, these numbers of the first model moved: {names}.{_OPEN}",) if at_end else ()
+    if len(far) > _LISTED:
+        return (
+            f"{len(far)} numbers were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration or more"
+            f"{f', {len(at_end)} of them as far as they may' if at_end else ''}: "
+            "either the calibration is wrong, or they stand for physics that was not named.",
+        )
+    return tuple(
+        f"The {number.name} was moved by {abs(number.deviations):.2g} standard deviations of its calibration"
+        f"{_AS_FAR if number in at_end else ''}: "
+        "either the calibration is wrong, or it stands for physics that was not named."
+        for number in far
+    )
+
+
+_OPEN = " The fit has found no best value for them, or they stand for physics that was not named."
+_AS_FAR = ", as far as it may"
+
+
+def _retuning_raises_error(errors: Errors) -> bool:
+    """Re-tuning raises the error on held-out data."""
+    return errors.before is not None and errors.retuned is not None and errors.retuned > SAME_TO_READERS * errors.before
+
+
+def better_model(errors: Errors) -> tuple[str, str]:
+    """Field and words of the better of the given and the re-tuned model, with which named effects are compared."""
+    return ("before", "as given") if _retuning_raises_error(errors) else ("retuned", "re-tuned without it")
+
+
+def better_alone(errors: Errors) -> tuple[str, float | None]:
+    return ("as given", errors.before) if _retuning_raises_error(errors) else ("re-tuned", errors.retuned)
+
+
+def raised_sentence(errors: Errors) -> str:
+    """errors: on held-out data. Empty where re-tuning does not raise them."""
+    if not _retuning_raises_error(errors) or errors.before is None or errors.retuned is None:
+        return ""
+    return (
+        f"Re-tuning raises the error on held-out data from {error_text(errors.before)} to {error_text(errors.retuned)} "
+        "of the signal: what was fitted to differs from what was kept for the test, and re-tuned numbers are doubtful."
+    )

@@ -1,0 +1,32 @@
+"""Reads a sampled response at other times, by windowed-sinc or linear interpolation."""
+
+from functools import cache
+
+import numpy as np
+
+from equalizer.effects.simulation.reading_kernel import read_at
+from equalizer.signals.signal import FloatArray
+
+TAPS, PHASES = 32, 256
+BETA = 8.0
+"""Shape parameter of the Kaiser window: ripple of 1e-4 up to 0.42 of the sample rate."""
+
+
+def read_other_times(response: FloatArray, per_sample: float, offset: float, straight: float = 0.0) -> FloatArray:
+    """(n, p) from (n, p): sample k is read at k per_sample + offset, in samples. straight: share (0 to 1) of linear
+    interpolation, the rest is band-limited."""
+    read = np.empty(response.shape)
+    read_at(np.ascontiguousarray(response, dtype=np.float64), per_sample, offset, _sinc_weights(), straight, read)
+    return read
+
+
+@cache
+def _sinc_weights() -> FloatArray:
+    """(phases + 1, taps): windowed sinc."""
+    part = np.arange(PHASES + 1) / PHASES
+    away = part[:, None] - np.arange(1 - TAPS // 2, TAPS // 2 + 1)
+    window = np.i0(BETA * np.sqrt(np.maximum(1 - (away / (TAPS / 2)) ** 2, 0))) / np.i0(BETA)
+    weights = np.sinc(away) * window
+    weights /= weights.sum(axis=1, keepdims=True)
+    weights.flags.writeable = False
+    return np.asarray(weights)

@@ -1,0 +1,186 @@
+"""Banded feedforward from two models of the same place: an accurate narrow one and a wide one.
+
+Below the narrow model's band, a rigid model fitted to its lowest lines is used; in its band, the narrow model; above
+it, the wide model's response along one direction. The outer bands' run-in and run-out are no rows of the table and are
+cut off; the middle band is solved for the rows alone, for the acceleration that the cut forces leave.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.bands.banded_equalizer import BandedEqualizer, HighBand, LowBand
+from equalizer.tracking.bands.banded_forces import BandedForces
+from equalizer.tracking.bands.high_band import ModelledResponse, predict_acceleration
+from equalizer.tracking.bands.rigid_model import RigidModel, fit_rigid_model
+from equalizer.tracking.feedforward.band_split import BandEdges, LinearPhaseSplit
+from equalizer.tracking.feedforward.feedforward import (
+    EDGE_ROOM_HZ,
+    LEAKED,
+    Feedforward,
+    FeedforwardSettings,
+    extract_band,
+    solve_causally,
+)
+from equalizer.tracking.feedforward.periodic_inverse import check_wanted
+from equalizer.tracking.lqr.limits import require_under_cap
+from equalizer.tracking.lqr.padding import band_error, simulate_from_rest
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
+
+RIGID_OCTAVES = 0.6
+"""Width in octaves of the lowest part of the narrow band to which the rigid model is fitted: below the first
+resonance."""
+RIGID_LINES = 30
+LEAST_REACH = 2.0
+"""Least ratio of the two bands' upper ends: a high band with a single direction needs an octave."""
+BINS_PER_OCTAVE = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwoModels:
+    """A narrow and a wide model. Raises ValueError unless the bands overlap and leave room for a band above."""
+
+    narrow: IdentifiedModel
+    wide: IdentifiedModel
+
+    def __post_init__(self) -> None:
+        (low, high), (lowest, highest) = self.narrow.band_hz, self.wide.band_hz
+        if not (lowest <= high and highest >= LEAST_REACH * high and low > 2 * EDGE_ROOM_HZ):
+            raise ValueError(
+                f"bands of {low:g} to {high:g} Hz and {lowest:g} to {highest:g} Hz do not add up: the wider one must "
+                f"begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one begin "
+                "above 2 Hz"
+            )
+        told = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
+        if told[0] != told[1] and None not in told[0] + told[1]:
+            raise ValueError(
+                f"the narrower one was made {_describe_conditions(self.narrow)}, the wider one "
+                f"{_describe_conditions(self.wide)}: two bands must be of one device, held and driven alike"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BandFacts:
+    edges_hz: tuple[float, float]
+    cut_error: float
+    """Error in the middle band if the run-in and run-out were only cut off."""
+    whole_error: float
+    """Error in the middle band if the run-in and run-out were played."""
+    level_error: float | None
+    """Error of the high band's level by sixths of an octave, of the table's rows; None where nothing is wanted in this
+    band."""
+    direction: tuple[float, ...]
+    """Unit vector of the high band's force."""
+    travel_m: float
+    """Largest displacement of the handle by the low band."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BandedFeedforward:
+    feedforward: Feedforward
+    """Forces of all bands; their `error` is that in the middle band, by the narrow model."""
+    facts: BandFacts
+
+
+def banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardSettings) -> BandedFeedforward:
+    """Solve for the forces of all bands. Raises ForceLimitError above the cap, TrackingError where nothing is wanted in
+    the middle band or the cap leaves no solution, ValueError for an unsuitable signal or weight."""
+    check_wanted(models.narrow, wanted)
+    check_wanted(models.wide, wanted)
+    equalizer, rate_hz = banded_equalizer(models, settings.weight), wanted.sample_rate_hz
+    below = _remove_above_band(wanted.samples, models.wide)
+    played = equalizer.play(below)
+    rows = played.rows_of_wanted(len(wanted))
+    if not np.linalg.norm(played.bands.middle[rows]) > LEAKED * np.linalg.norm(wanted.samples):
+        low, high = models.narrow.band_hz
+        raise TrackingError(f"nothing is wanted between {low:g} and {high:g} Hz, the narrower model's band")
+    problem = make_tracking_problem(models.narrow, TrackingWeights(settings.weight))
+    others = (played.by_band[0] + played.by_band[2])[rows]
+    left = extract_band(models.narrow, below - simulate_from_rest(problem, others))
+    middle, loss = solve_causally(problem, left, settings, others)
+    forces = middle + others
+    predicted = simulate_from_rest(problem, forces)
+    slow = np.zeros_like(below) if played.motion is None else played.motion.acceleration[rows]
+    inside = slow + (played.bands.middle + played.bands.high)[rows]
+    found = Feedforward(
+        forces=Signal(forces, rate_hz, "force", "N", models.narrow.input_channels),
+        wanted=inside,
+        predicted=predicted,
+        error=band_error(below, predicted, rate_hz, models.narrow.band_hz),
+        left_out=float(np.linalg.norm(wanted.samples - inside) / np.linalg.norm(wanted.samples)),
+        peaks=require_under_cap(forces, settings.cap_n, rate_hz),
+        loss=loss,
+    )
+    return BandedFeedforward(found, _collect_facts(models, equalizer, played, below, forces))
+
+
+def banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
+    low, high = models.narrow.band_hz
+    edges = BandEdges(low - EDGE_ROOM_HZ, high + EDGE_ROOM_HZ)
+    return BandedEqualizer(
+        models.narrow,
+        LinearPhaseSplit(edges, models.narrow.sample_rate_hz),
+        LowBand(rigid_part(models.narrow)),
+        HighBand(ModelledResponse(models.wide)),
+        TrackingWeights(weight),
+    )
+
+
+def rigid_part(model: IdentifiedModel) -> RigidModel:
+    low, high = model.band_hz
+    lines_hz = np.geomspace(low, min(high, low * 2**RIGID_OCTAVES), RIGID_LINES)
+    return fit_rigid_model(lines_hz, model_response(model, lines_hz), model.sample_rate_hz)
+
+
+def level_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> float | None:
+    """Relative error of the level of all axes together, by sixths of an octave: above the limit of direction perception
+    nothing else is felt. None where nothing is wanted in the band."""
+    length = 2 * len(wanted)
+    lines_hz = np.fft.rfftfreq(length, 1 / rate_hz)
+    count = max(1, round(BINS_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
+    bins = np.digitize(lines_hz, np.geomspace(*band_hz, count + 1))
+    levels = []
+    for samples in (wanted, played):
+        power = (np.abs(np.fft.rfft(samples, length, axis=0)) ** 2).sum(axis=1)
+        levels.append(np.sqrt(np.bincount(bins, power, minlength=count + 2)))
+    size = float(np.linalg.norm(levels[0][1:-1]))
+    if size <= LEAKED * float(np.linalg.norm(levels[0])):
+        return None
+    return float(np.linalg.norm((levels[1] - levels[0])[1:-1]) / size)
+
+
+def _remove_above_band(wanted: FloatArray, wide: IdentifiedModel) -> FloatArray:
+    """The wanted acceleration without frequencies above the wide band."""
+    edge_hz = wide.band_hz[1] + EDGE_ROOM_HZ
+    if edge_hz + EDGE_ROOM_HZ >= wide.sample_rate_hz / 2:
+        return wanted
+    bands = LinearPhaseSplit(BandEdges(None, edge_hz), wide.sample_rate_hz).split(wanted)
+    return bands.middle[bands.latency_samples : bands.latency_samples + len(wanted)]
+
+
+def _collect_facts(
+    models: TwoModels, equalizer: BandedEqualizer, played: BandedForces, wanted: FloatArray, forces: FloatArray
+) -> BandFacts:
+    edges, rows, band_hz = equalizer.split.edges, played.rows_of_wanted(len(wanted)), models.narrow.band_hz
+    rate_hz, problem = models.narrow.sample_rate_hz, make_tracking_problem(models.narrow, equalizer.weights)
+    whole, cut = simulate_from_rest(problem, played.entering)[rows], simulate_from_rest(problem, played.entering[rows])
+    upper_hz = band_hz[1] + 2 * EDGE_ROOM_HZ, models.wide.band_hz[1]
+    above = predict_acceleration(forces, rate_hz, ModelledResponse(models.wide))
+    return BandFacts(
+        edges_hz=(edges.low_hz or 0.0, edges.high_hz or 0.0),
+        cut_error=band_error(wanted, cut, rate_hz, band_hz),
+        whole_error=band_error(wanted, whole, rate_hz, band_hz),
+        level_error=level_error(wanted, above, rate_hz, upper_hz),
+        direction=() if played.high is None else tuple(float(part) for part in played.high.direction),
+        travel_m=0.0 if played.motion is None else played.motion.travel_m,
+    )
+
+
+def _describe_conditions(model: IdentifiedModel) -> str:
+    """Conditions of the identification in words, from the model's provenance."""
+    held = "in a hand" if "held" in str(model.provenance.get("hand")) else "without a hand"
+    spring = "with" if model.provenance.get("input") == "excitation" else "without"
+    return f"{held} and {spring} the spring in it"

@@ -1,0 +1,46 @@
+"""First model for a diagnosis without a given one; refusals become errors for a person."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.diagnosis_settings import BALANCE
+from analysis.diagnosis.first_model import fit_without_model
+from analysis.diagnosis.first_model.model_from_balance import FirstModel
+from analysis.diagnosis.search.guard import Guard
+from analysis.diagnosis.types import Progress, TimeBudget
+from equalizer.plant.mechanical_model import MechanicalModel
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error
+from study.workflows.forked_map import map_forked
+
+GIVE_ONE = "Give a model of the device alone with --model, or a recording that carries one."
+
+
+def first_model_of(
+    found: DiagnosisInput, without: Sequence[str], bounds: tuple[TimeBudget, Guard], on_progress: Progress
+) -> FirstModel:
+    """As in `analysis`; if the force balance crashes, by a fit to spectra. Raises StudyError."""
+    time_left, guard = bounds
+
+    def weighed() -> FirstModel | None:
+        return fit_without_model.first_model_of(found.recordings, without, time_left, on_progress, map_forked)
+
+    with _translate_refusals():
+        first = guard.part(BALANCE, "the first model", weighed, None, (NothingToDiagnose,))
+    return first or FirstModel(*fit_linear_model(found, lambda share: on_progress("fitting a linear model", share)), ())
+
+
+def fit_linear_model(
+    found: DiagnosisInput, on_progress: Callable[[float], None], whose: str = "these recordings"
+) -> tuple[MechanicalModel, tuple[str, ...]]:
+    """A linear model fitted to the spectra, and remarks, as in `analysis`. Raises StudyError."""
+    with _translate_refusals():
+        return fit_without_model.fit_first_linear_model(found.recordings, on_progress, whose)
+
+
+@contextmanager
+def _translate_refusals() -> Iterator[None]:
+    try:
+        yield
+    except NothingToDiagnose as refusal:
+        raise not_diagnosable_error(refusal.problems, GIVE_ONE) from refusal

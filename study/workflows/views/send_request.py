@@ -1,0 +1,52 @@
+"""Send a request to a running session and wait until it is received."""
+
+from study.devices.clock import Clock
+from study.errors import StudyError
+from study.session.watching.requests import NoteAsked, Request, StopAsked
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.log_writer import is_log_locked
+from study.store.sessions.request_inbox import RequestInbox
+
+HEARD_WITHIN_S = 3.0
+"""A session checks about twenty times a second, except while a form or notice is shown."""
+LOOK_EVERY_S = 0.02
+
+
+def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
+    """Returns whether the session received it; a note that is not received yet stays in the inbox.
+
+    Raises StudyError where nothing runs, or where a stop or pause was not received.
+    """
+    if is_log_locked(folder.log) is False:
+        raise StudyError(
+            "This session is not running",
+            f"No program has {folder.name} open, so there is nothing to stop or to pause.",
+            "Look at it with: hapteq watch " + str(folder.path),
+        )
+    inbox = RequestInbox(folder.path)
+    name = inbox.send(request)
+    until_s = clock.now_s() + HEARD_WITHIN_S
+    while inbox.unread(name):
+        if clock.now_s() >= until_s:
+            return _unheard(folder, request, inbox, name)
+        clock.sleep(LOOK_EVERY_S)
+    return True
+
+
+def _unheard(folder: SessionFolder, request: Request, inbox: RequestInbox, name: str) -> bool:
+    if isinstance(request, NoteAsked):
+        return False
+    waits = f"{folder.name} took nothing within {HEARD_WITHIN_S:g} s: a form or a notice is being read, or it hangs."
+    if isinstance(request, StopAsked):
+        raise StudyError(
+            "The stop was not heard",
+            waits,
+            "If the handle moves: hand off, and switch the device off.",
+            saved="The stop waits for the session and is the first thing that it will hear.",
+        )
+    # A pause that comes minutes later would surprise participant and experimenter.
+    if not inbox.take_back(name):
+        return True
+    raise StudyError(
+        "The pause was not heard", waits, "Ask again when trials are running.", saved="Nothing is pending."
+    )

@@ -1,0 +1,182 @@
+"""Recordings of other forms than one motion per force are brought into one, and what was done is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.balance.motion import motion_signal
+from analysis.diagnosis.data.driven_response import response_significance
+from analysis.diagnosis.data.force_driven import all_as_force_driven
+from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
+from analysis.diagnosis.settings import ANSWER_DEVIATIONS
+from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, of, smooth, speed_of
+
+
+def test_a_plain_recording_stays_as_it_is():
+    push = smooth(2000, 1)
+    recording = of([("u", "force", "N", push)], [("v", "velocity", "m/s", speed_of(push))])
+
+    assert one_motion_per_force((recording,)) == ((recording,), ())
+
+
+def test_a_temperature_among_the_commands_is_a_condition():
+    push, heat = smooth(2000, 1), np.linspace(20, 50, 2000)
+    recording = of(
+        [("u", "torque", "N m", push), ("T", "temperature", "degC", heat)],
+        [("w", "angular velocity", "rad/s", speed_of(push))],
+    )
+
+    (found,), (said,) = one_motion_per_force((recording,))
+
+    assert found.command.channels == ("u",)
+    assert found.condition is not None
+    assert found.condition.channels == ("T",)
+    assert "T among the commands" in said
+
+
+def test_two_commands_of_one_motion_become_one():
+    first, second = smooth(4000, 1), smooth(4000, 2)
+    recording = of(
+        [("u1", "voltage", "V", first), ("u2", "voltage", "V", second)],
+        [("w", "angular velocity", "rad/s", speed_of(first + 0.4 * second))],
+    )
+
+    (found,), (said,) = one_motion_per_force((recording,))
+
+    assert found.command.channels == ("u1",)
+    assert found.command.samples[:, 0] == pytest.approx(first + 0.4 * second, abs=0.02 * first.std())
+    assert "one command was made of them" in said
+
+
+@pytest.mark.parametrize("level", [0.0, 0.5, 50.0])
+def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(level):
+    first, second = smooth(4000, 1), smooth(4000, 2)
+    recording = of(
+        [("u1", "force", "N", first), ("u2", "force", "N", second), ("u3", "force", "N", np.full(4000, level))],
+        [("v", "velocity", "m/s", speed_of(first + 0.4 * second))],
+    )
+
+    command = recording.command.samples.copy()
+    command[2000:2010] = np.nan
+
+    (found,), (left_out, summed) = one_motion_per_force(
+        (replace(recording, command=replace(recording.command, samples=command)),)
+    )
+
+    known = np.isfinite(command).all(axis=1)
+    assert found.command.channels == ("u1",)
+    assert np.array_equal(np.isfinite(found.command.samples[:, 0]), known)
+    assert found.command.samples[known, 0] == pytest.approx((first + 0.4 * second)[known], abs=0.02 * first.std())
+    assert left_out == "u3 among the commands never changes, and was left out."
+    assert summed.startswith("u2 drives the same motion as u1")
+
+
+@pytest.mark.parametrize("share", [0.0, 1e-4])
+def test_of_two_commands_with_a_constant_sum_the_difference_drives(share):
+    """share: of the drive, that both have in common by chance, as by rounding."""
+    push = smooth(4000, 1)
+    hum = share * push.std() * np.random.default_rng(4).standard_normal(4000)
+    recording = of(
+        [("left", "force", "N", 50 + push + hum), ("right", "force", "N", 50 - push + hum)],
+        [("v", "velocity", "m/s", speed_of(push + 40 * push.std()))],
+    )
+
+    (found,), _ = one_motion_per_force((recording,))
+
+    drive = found.command.samples[:, 0] - found.command.samples[:, 0].mean()
+    assert np.abs(drive) == pytest.approx(np.abs(2 * (push - push.mean())), abs=0.02 * push.std())
+
+
+def test_a_command_that_never_changes_is_left_out_with_the_motion_of_its_axis():
+    """A device of two axes of which only the first was driven."""
+    push = smooth(2000, 1)
+    recording = of(
+        [("fx", "force", "N", push), ("fy", "force", "N", np.zeros(2000))],
+        [("x", "velocity", "m/s", speed_of(push)), ("y", "velocity", "m/s", 1e-3 * smooth(2000, 3))],
+    )
+
+    (found,), said = one_motion_per_force((recording,))
+
+    assert (found.command.channels, found.response.channels) == (("fx",), ("x",))
+    assert said == ("fy among the commands never changes, and was left out with y, which no command moves.",)
+    in_turn = replace(recording, command=replace(recording.command, samples=recording.command.samples[:, ::-1]))
+    assert one_motion_per_force((recording, in_turn)) == ((recording, in_turn), ())
+
+
+def test_of_motions_of_several_kinds_the_lowest_is_kept():
+    push = smooth(2000, 1)
+    speed = speed_of(push)
+    angle = np.cumsum(speed) / RATE_HZ
+    recording = of(
+        [("u", "torque", "N m", push)],
+        [("q", "angle", "rad", angle), ("w", "angular velocity", "rad/s", speed), ("i", "current", "A", push)],
+    )
+
+    (found,), (said,) = one_motion_per_force((recording,))
+
+    assert found.response.channels == ("q",)
+    assert "w and i" in said
+
+
+def test_of_several_forces_along_one_motion_the_strongest_is_balanced():
+    way = smooth(2000, 1)
+    recording = of([("q", "displacement", "m", way)], [("a", "force", "N", 2 * way), ("b", "force", "N", 5 * way)])
+
+    formed, (said,) = one_motion_per_force((recording,))
+    (driven,) = all_as_force_driven(formed)
+
+    assert (driven.command.channels, driven.response.channels) == (("b",), ("q",))
+    assert "for a, import the recording" in said
+
+
+def test_a_channel_without_a_single_number_is_no_motion_and_no_force():
+    """Without a warning, which would be an error here."""
+    push, none = smooth(2000, 1), np.full(2000, np.nan)
+    moved = of([("f", "force", "N", push)], [("x", "position", "m", none), ("y", "position", "m", push)])
+    assert (moving := motion_signal(moved)) is not None
+    assert moving.channels == ("y",)
+    pushed = of([("x", "position", "m", push)], [("f1", "force", "N", none), ("f2", "force", "N", push)])
+    assert one_motion_per_force((pushed,))[0][0].response.channels == ("f2",)
+
+
+def test_one_force_along_two_imposed_motions_keeps_both():
+    way, far = smooth(2000, 1), smooth(2000, 2)
+    recording = of([("q", "displacement", "m", way), ("r", "displacement", "m", far)], [("f", "force", "N", way - far)])
+
+    (driven,) = all_as_force_driven(one_motion_per_force((recording,))[0])
+
+    assert (driven.command.channels, driven.response.channels) == (("f",), ("q", "r"))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_sign_of_an_absolute_speed_is_restored(seed):
+    rng = np.random.default_rng(seed)
+    push = np.repeat(rng.uniform(-2, 2, 25), 20)
+    speed = speed_of(push, mass=0.1)
+    seen = np.abs(speed) + 0.005 * speed.std() * rng.standard_normal(len(speed))
+
+    (found,), (said,) = one_motion_per_force((of([("u", "voltage", "V", push)], [("w", "speed", "m/s", seen)]),))
+
+    assert np.linalg.norm(found.response.samples[:, 0] - speed) < 0.1 * np.linalg.norm(speed)
+    assert "sensor tells the amount alone" in said
+
+
+def test_a_speed_in_one_direction_is_not_taken_for_an_absolute_speed():
+    push = 3.0 + np.abs(smooth(1000, 3))
+    recording = of([("u", "voltage", "V", push)], [("w", "speed", "m/s", speed_of(push))])
+
+    assert one_motion_per_force((recording,)) == ((recording,), ())
+
+
+def test_a_device_whose_memory_is_longer_than_a_stretch_answers_its_command():
+    rng = np.random.default_rng(5)
+    push = np.repeat(rng.uniform(-2, 2, 25), 20)
+    moved = of([("u", "voltage", "V", push)], [("w", "speed", "m/s", speed_of(push, mass=0.3))])
+    other = replace(moved, response=replace(moved.response, samples=rng.standard_normal((len(push), 1))))
+
+    sure, unsure = response_significance([moved]), response_significance([other])
+
+    assert sure is None or sure >= ANSWER_DEVIATIONS
+    assert unsure is not None
+    assert unsure < ANSWER_DEVIATIONS
