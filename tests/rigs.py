@@ -107,7 +107,7 @@ class HeldForceRig:
     def __init__(self) -> None:
         self.drops_force_after_s = 0.1
         self.last_n = np.zeros(3)
-        self.sensed = 0
+        self.sense_calls = 0
         self.written_n: list[FloatArray] = []
         self.closed = 0
         self.before_sensing: Callable[[], None] | None = None
@@ -120,9 +120,9 @@ class HeldForceRig:
     def sense(self) -> FloatArray:
         if self.before_sensing is not None:
             self.before_sensing()
-        self.sensed += 1
+        self.sense_calls += 1
         reading = np.zeros(READING_SIZE)
-        reading[1] = 1e-5 * (self.sensed % 2)
+        reading[1] = 1e-5 * (self.sense_calls % 2)
         return reading
 
     def buttons(self) -> frozenset[int]:

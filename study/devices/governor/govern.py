@@ -206,13 +206,9 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
 
     @njit(TICK_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def tick(
-        state: FloatArray,
-        settings: FloatArray,
-        loop: FloatArray,
-        buffer: FloatArray,
-        reading: FloatArray,
+        state: FloatArray, settings: FloatArray, loop: FloatArray, buffer: FloatArray, reading: FloatArray,
         force: FloatArray,
-    ) -> bool:
+    ) -> bool:  # fmt: skip
         """Decide the force of one tick. Whether all is over and the force off.
 
         state (STATE_SIZE,), settings (SETTINGS_SIZE,), loop (n, 3) in N, buffer (rows, ROW_SIZE): changed in place with

@@ -152,7 +152,7 @@ def test_what_is_asked_of_the_device_meanwhile_is_asked_by_the_caller(rigs, sett
 def test_the_lateness_of_a_real_device_is_that_of_its_own_loop(rigs, settings):
     """Every fourth reading lasts 3 ms; the program that asks is on time."""
     rig = rigs.HeldForceRig()
-    rig.before_sensing = lambda: time.sleep(0.003 if rig.sensed % 4 == 0 else 0.0)
+    rig.before_sensing = lambda: time.sleep(0.003 if rig.sense_calls % 4 == 0 else 0.0)
     with contextlib.closing(SafeDevice(rig, settings, RealClock(), Ring())) as device:
         timing = check_timing(device, RealClock(), 0.5, lambda done: None)
     assert timing.lateness.too_late and timing.lateness.missing_a_tick > 0.1
