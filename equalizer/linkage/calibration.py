@@ -1,0 +1,131 @@
+"""What a device says of its linkage over a grid of positions, and what of it is refused.
+
+J is of the forward kinematics: handle velocity = J joint speeds, joint torques = J^T handle force (Spong, Hutchinson,
+Vidyasagar, Robot Modeling and Control, chapter 4).
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+
+MOST_CONDITION = 50.0
+"""Of J. Usable places of a delta device have some units; the simulated omega.3 stays below 2.2."""
+MOST_SKEW = 1e-3
+"""|M - M^T| over |M|: more than rounding."""
+MASSES_KG = (1e-3, 20.0)
+"""Of handles on a desk, along any direction."""
+MOST_DIFFERENCE = 0.05
+"""J against finite differences. Another unit or convention gives at least 40 %, a forgotten arm's length some 10 %."""
+
+
+class CalibrationError(ValueError):
+    """Readings that cannot be those of a linkage. `problems`: one sentence each."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinkageReading:
+    """At one position of the handle."""
+
+    position_m: FloatArray
+    """(3,)"""
+    joint_angle_rad: FloatArray
+    """(3,)"""
+    jacobian: FloatArray
+    """(3, 3), m/rad"""
+    inertia_kg: FloatArray
+    """(3, 3), at the handle"""
+    gravity_n: FloatArray
+    """(3,), the force at the handle that holds it against gravity"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinkageCalibration:
+    """n positions. Raises CalibrationError."""
+
+    device: str
+    details: str
+    """Serial number, firmware, SDK."""
+    read_on: str
+    """ISO 8601 date."""
+    position_m: FloatArray
+    """(n, 3)"""
+    joint_angle_rad: FloatArray
+    """(n, 3)"""
+    jacobian: FloatArray
+    """(n, 3, 3), m/rad"""
+    inertia_kg: FloatArray
+    """(n, 3, 3)"""
+    gravity_n: FloatArray
+    """(n, 3); NaN where no reading and no mirror line tells it."""
+    filled: FloatArray
+    """(n,), 1 where a mirror line gave what could not be read, else 0."""
+    line_deg: FloatArray
+    """(3,), azimuth of the mirror lines from y towards z, in the order of the arms."""
+    asymmetry: FloatArray
+    """(3,), largest relative difference between inertia and mirrored inertia, by line."""
+    difference: float
+    """Largest relative difference between J and finite differences of the positions."""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if problems := tuple(calibration_problems(self)):
+            raise CalibrationError(problems)
+
+
+def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
+    """One sentence each; none for a calibration that can be used."""
+    count = len(calibration.position_m)
+    shapes = {"position_m": (3,), "joint_angle_rad": (3,), "jacobian": (3, 3), "inertia_kg": (3, 3), "gravity_n": (3,)}
+    wrong = [name for name, shape in shapes.items() if getattr(calibration, name).shape != (count, *shape)]
+    if wrong or calibration.filled.shape != (count,) or count == 0:
+        yield f"{', '.join(wrong) or 'filled'} does not have one entry for each of the {count} positions"
+        return
+    for number, position in enumerate(calibration.position_m):
+        where = "(" + ", ".join(f"{1000 * each:.0f}" for each in position) + ") mm"
+        told = position, calibration.joint_angle_rad[number]
+        yield from _problems_at(where, told, calibration.jacobian[number], calibration.inertia_kg[number])
+        gravity = calibration.gravity_n[number]
+        if np.isinf(gravity).any() or (np.isnan(gravity).any() and not calibration.filled[number]):
+            yield f"at {where} the gravity force is no number"
+    told_once = calibration.line_deg, calibration.asymmetry, np.atleast_1d(calibration.difference)
+    if any(each.shape not in ((3,), (1,)) or not np.isfinite(each).all() for each in told_once):
+        yield "mirror lines, asymmetries or differences are not finite numbers"
+    elif not 0 <= calibration.difference <= MOST_DIFFERENCE:
+        yield (
+            f"the Jacobian differs from finite differences of its own positions by {calibration.difference:.0%}; "
+            f"{MOST_DIFFERENCE:.0%} is the most"
+        )
+
+
+def _problems_at(
+    where: str, told: tuple[FloatArray, FloatArray], jacobian: FloatArray, inertia: FloatArray
+) -> Iterator[str]:
+    for name, values in (
+        ("position", told[0]),
+        ("joint angles", told[1]),
+        ("Jacobian", jacobian),
+        ("inertia", inertia),
+    ):
+        if not np.isfinite(values).all():
+            yield f"at {where} the {name} holds what is no number"
+    if not (np.isfinite(jacobian).all() and np.isfinite(inertia).all()):
+        return
+    condition = float(np.linalg.cond(jacobian))
+    if not condition <= MOST_CONDITION:
+        yield f"at {where} the Jacobian is singular, or nearly so (condition {condition:.3g})"
+    if np.abs(inertia - inertia.T).max() > MOST_SKEW * np.abs(inertia).max():
+        yield f"at {where} the inertia is not symmetric"
+        return
+    masses = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
+    if masses[0] <= 0:
+        yield f"at {where} the inertia is not positive definite: {masses[0]:.3g} kg along a direction"
+    elif not MASSES_KG[0] <= masses[0] <= masses[-1] <= MASSES_KG[1]:
+        yield f"at {where} the inertia is {masses[0]:.3g} to {masses[-1]:.3g} kg; no handle weighs that"
