@@ -88,36 +88,37 @@ def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
     if wrong or calibration.filled.shape != (count,) or count == 0:
         yield f"{', '.join(wrong) or 'filled'} does not have one entry for each of the {count} positions"
         return
-    for number, position in enumerate(calibration.position_m):
-        where = "(" + ", ".join(f"{1000 * each:.0f}" for each in position) + ") mm"
-        told = position, calibration.joint_angle_rad[number]
-        yield from _problems_at(where, told, calibration.jacobian[number], calibration.inertia_kg[number])
-        gravity = calibration.gravity_n[number]
-        if np.isinf(gravity).any() or (np.isnan(gravity).any() and not calibration.filled[number]):
-            yield f"at {where} the gravity force is no number"
+    for number, filled in enumerate(calibration.filled):
+        reading = LinkageReading(*(getattr(calibration, name)[number] for name in shapes))
+        yield from reading_problems(reading, gravity_known=not filled)
     told_once = calibration.line_deg, calibration.asymmetry, np.atleast_1d(calibration.difference)
     if any(each.shape not in ((3,), (1,)) or not np.isfinite(each).all() for each in told_once):
         yield "mirror lines, asymmetries or differences are not finite numbers"
-    elif not 0 <= calibration.difference <= MOST_DIFFERENCE:
+    else:
+        yield from difference_problems(calibration.difference)
+
+
+def difference_problems(difference: float) -> Iterator[str]:
+    """difference: relative, of J from finite differences."""
+    if not 0 <= difference <= MOST_DIFFERENCE:
         yield (
-            f"the Jacobian differs from finite differences of its own positions by {calibration.difference:.0%}; "
+            f"the Jacobian differs from finite differences of its own positions by {difference:.0%}; "
             f"{MOST_DIFFERENCE:.0%} is the most"
         )
 
 
-def _problems_at(
-    where: str, told: tuple[FloatArray, FloatArray], jacobian: FloatArray, inertia: FloatArray
-) -> Iterator[str]:
-    for name, values in (
-        ("position", told[0]),
-        ("joint angles", told[1]),
-        ("Jacobian", jacobian),
-        ("inertia", inertia),
-    ):
+def reading_problems(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
+    """One sentence each."""
+    where = "(" + ", ".join(f"{1000 * each:.0f}" for each in reading.position_m) + ") mm"
+    jacobian, inertia = reading.jacobian, reading.inertia_kg
+    told = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
+    for name, values in (told | {"Jacobian": jacobian, "inertia": inertia}).items():
         if not np.isfinite(values).all():
             yield f"at {where} the {name} holds what is no number"
     if not (np.isfinite(jacobian).all() and np.isfinite(inertia).all()):
         return
+    if np.isinf(reading.gravity_n).any() or (gravity_known and np.isnan(reading.gravity_n).any()):
+        yield f"at {where} the gravity force is no number"
     condition = float(np.linalg.cond(jacobian))
     if not condition <= MOST_CONDITION:
         yield f"at {where} the Jacobian is singular, or nearly so (condition {condition:.3g})"

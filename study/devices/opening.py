@@ -65,6 +65,10 @@ class LinkageSource(Protocol):
         """At any position of the handle (3,), wherever it is; None out of reach. Raises `DeviceError`."""
         ...
 
+    def angles_at(self, position_m: "FloatArray") -> "FloatArray | None":
+        """As `at`, the joint angles (3,) alone, rad."""
+        ...
+
     def check_frame(self) -> None:
         """Raises `DeviceError` where the positions above are not in the axes of the device's readings."""
         ...

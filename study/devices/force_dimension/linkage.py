@@ -5,8 +5,9 @@ library. The device gets no force and stays braked; where its handle is does not
 """
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from ctypes import byref, c_double, c_int
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from study.devices.force_dimension.library import GEOMETRY_ERROR, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rigs import info_of
 from study.errors import DeviceError
+
+Told = TypeVar("Told")
 
 JOINTS = 8
 """DHD_MAX_DOF: joints of base, wrist and gripper."""
@@ -40,12 +43,11 @@ class VendorLinkage:
 
     def at(self, position_m: FloatArray) -> LinkageReading | None:
         """None out of reach. Raises `DeviceError`."""
-        try:
-            return self._at(position_m)
-        except LibraryError as error:
-            if error.code == GEOMETRY_ERROR:
-                return None
-            raise device_error(self._model.name, error) from error
+        return self._asked(self._at, position_m)
+
+    def angles_at(self, position_m: FloatArray) -> FloatArray | None:
+        """As `at`, the joint angles alone."""
+        return self._asked(lambda place: self._angles(self._counts(place)), position_m)
 
     def check_frame(self) -> None:
         """Raises `DeviceError` where the library's delta functions and its positions do not mean the same axes."""
@@ -67,17 +69,35 @@ class VendorLinkage:
         )
 
     def _moves_by(self, reading: LinkageReading, angles: FloatArray) -> float:
-        """How far the handle is from the reading's position, from its joint angles, m."""
-        return float(np.linalg.norm(reading.jacobian @ (angles - reading.joint_angle_rad)))
+        """How far the handle is from the reading's position, by its joint angles, m. A Jacobian that is no number is
+        refused later, by that name."""
+        jacobian = np.nan_to_num(reading.jacobian)
+        return float(np.linalg.norm(jacobian @ (angles - reading.joint_angle_rad)))
 
-    def _at(self, position_m: FloatArray) -> LinkageReading | None:
+    def _asked(self, ask: Callable[[FloatArray], Told | None], position_m: FloatArray) -> Told | None:
+        """None out of reach. Raises `DeviceError`."""
+        try:
+            return ask(position_m)
+        except LibraryError as error:
+            if error.code == GEOMETRY_ERROR:
+                return None
+            raise device_error(self._model.name, error) from error
+
+    def _counts(self, position_m: FloatArray) -> list[c_int]:
         counts = [c_int() for _ in range(3)]
         x, y, z = (float(each) for each in position_m)
         self._library.call("dhdDeltaPositionToEncoder", x, y, z, *map(byref, counts), self._number)
+        return counts
+
+    def _angles(self, counts: list[c_int]) -> FloatArray:
+        return self._three("dhdDeltaEncodersToJointAngles", *counts)
+
+    def _at(self, position_m: FloatArray) -> LinkageReading | None:
+        counts = self._counts(position_m)
         back = self._three("dhdDeltaEncoderToPosition", *counts)
         if not float(np.linalg.norm(back - position_m)) <= NEAR_M:
             return None
-        angles = self._three("dhdDeltaEncodersToJointAngles", *counts)
+        angles = self._angles(counts)
         jacobian, inertia = (c_double * 9)(), (c_double * 36)()
         self._library.call("dhdDeltaJointAnglesToJacobian", *(float(each) for each in angles), jacobian, self._number)
         # A wrist stays where it is: its joints follow the base's three.

@@ -45,6 +45,10 @@ class SimulatedLinkage:
         held = np.array([0.0, 0.0, GRAVITY_M_S2 * carried])
         return LinkageReading(np.array(position_m), angles, np.linalg.inv(rates), inertia, held)
 
+    def angles_at(self, position_m: FloatArray) -> FloatArray | None:
+        """As `at`, the joint angles alone."""
+        return _pose(self._packed, position_m)[0] if float(np.linalg.norm(position_m)) < self._reach_m else None
+
     def check_frame(self) -> None:
         """It has one frame."""
 

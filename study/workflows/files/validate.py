@@ -21,9 +21,9 @@ from study.workflows.files.recognisers import RECOGNISERS, Recogniser, describe_
 from study.workflows.files.session_recognisers import SESSION_RECOGNISERS
 
 KNOWN = (
-    "known are recordings, identified models and calibrations (HDF5), mechanical models, protocols and import maps (TOML), "
-    "trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and version, "
-    "and session folders"
+    "known are recordings, identified models and calibrations (HDF5), mechanical models, protocols and import maps "
+    "(TOML), trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and "
+    "version, and session folders"
 )
 
 

@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from equalizer.linkage.calibration import CalibrationError, LinkageCalibration, LinkageReading
+from equalizer.linkage.calibration import (
+    CalibrationError,
+    LinkageCalibration,
+    LinkageReading,
+    difference_problems,
+    reading_problems,
+)
 from equalizer.linkage.grid import STEP_M, arm_azimuths, beside, difference_error, symmetric_grid
 from equalizer.linkage.mirror_lines import asymmetry_words, fill_in, line_asymmetry
 from equalizer.signals.signal import FloatArray
@@ -53,8 +59,8 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
     if not (STEP_M < plan.radius_m <= LARGEST_M and STEP_M < plan.depth_m <= LARGEST_M):
         raise WrongUseError(
             "There is no such grid",
-            f"--radius is {plan.radius_m:g} m and --depth {plan.depth_m:g} m; each must be above {STEP_M:g} and at most "
-            f"{LARGEST_M:g} m.",
+            f"--radius is {plan.radius_m:g} m and --depth {plan.depth_m:g} m; each must be above {STEP_M:g} m and at "
+            f"most {LARGEST_M:g} m.",
             "Correct --radius or --depth.",
             saved=SAVED,
         )
@@ -119,20 +125,20 @@ def calibration_lines(written: WrittenCalibration) -> tuple[str, ...]:
 
 def _read(linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]) -> WrittenCalibration:
     """Raises CalibrationError, DeviceError."""
-    centre = linkage.at(np.zeros(3))
-    if centre is None or not np.isfinite(centre.jacobian).all() or np.linalg.cond(centre.jacobian) > 1e6:
-        raise CalibrationError(("at the centre of the workspace the Jacobian is missing, no number or singular",))
-    azimuths = arm_azimuths(centre.jacobian)
+    azimuths = arm_azimuths(_centre_jacobian(linkage))
+    readings, unread, problems, worst = [], [], [], 0.0
     grid = symmetric_grid(azimuths, plan.radius_m, plan.depth_m)
-    readings, unread, worst = [], [], 0.0
     for number, position in enumerate(grid):
         reading = linkage.at(position)
         if reading is None:
             unread.append(position)
         else:
             readings.append(reading)
+            problems += reading_problems(reading)
             worst = max(worst, _difference_error(linkage, reading))
         on_progress(number / len(grid))
+    if problems:
+        raise CalibrationError(tuple(problems))
     filled, unknown = fill_in(readings, azimuths, np.array(unread).reshape(-1, 3))
     asymmetry, where_m = line_asymmetry(readings, azimuths)
     line_deg = np.degrees(azimuths)
@@ -150,14 +156,25 @@ def _read(linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable
     return WrittenCalibration(plan, calibration, asymmetry_words(asymmetry, where_m, line_deg), len(unknown))
 
 
+def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
+    """Raises CalibrationError, DeviceError."""
+    centre = linkage.at(np.zeros(3))
+    if centre is None:
+        raise CalibrationError(("the centre of the workspace is out of its reach",))
+    problems = tuple(reading_problems(centre)) or tuple(difference_problems(_difference_error(linkage, centre)))
+    if problems:
+        raise CalibrationError(problems)
+    return centre.jacobian
+
+
 def _difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
     """Zero where a neighbour is out of reach, or where there is no number to compare: that is refused by itself."""
-    neighbours = [linkage.at(position) for position in beside(reading.position_m)]
-    told = [each for each in neighbours if each is not None]
-    angles = np.array([each.joint_angle_rad for each in told])
-    if len(told) < len(neighbours) or not np.isfinite(angles).all() or not np.isfinite(reading.jacobian).all():
+    positions = beside(reading.position_m)
+    told = [each for position in positions if (each := linkage.angles_at(position)) is not None]
+    angles = np.array(told)
+    if len(told) < len(positions) or not np.isfinite(angles).all() or not np.isfinite(reading.jacobian).all():
         return 0.0
-    return difference_error(reading.jacobian, np.array([each.position_m for each in told]), angles)
+    return difference_error(reading.jacobian, positions, angles)
 
 
 def _arrays(readings: list[LinkageReading]) -> dict[str, Any]:
@@ -178,7 +195,7 @@ def _refused(name: str, problems: tuple[str, ...]) -> DeviceError:
     return DeviceError(
         TITLE,
         f"What the {name} says of its linkage cannot be: {'; '.join(problems[:SHOWN])}{more}.",
-        "Calibrate its handle anew (`hapteq doctor --device NAME --calibrate`), try a smaller grid with --radius and "
-        "--depth, and install the vendor's newest SDK; if it says the same then, do without: no other command needs it.",
+        "Calibrate its handle anew (`hapteq doctor --device NAME --calibrate`), try a smaller grid (--radius, --depth) "
+        "and the vendor's newest SDK; if it says the same then, do without: no other command needs it.",
         saved=SAVED,
     )
