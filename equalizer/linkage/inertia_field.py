@@ -17,7 +17,7 @@ SPARE = 2
 @dataclass(frozen=True, slots=True, eq=False)
 class InertiaField:
     scale_m: float
-    powers: tuple[tuple[int, int, int], ...]
+    powers: tuple[tuple[int, ...], ...]
     coefficients: FloatArray
     """(terms, 3, 3), kg, of powers of position over scale"""
     misfit: float
@@ -53,11 +53,12 @@ def fit_inertia_field(calibration: LinkageCalibration) -> InertiaField:
         if len(positions) >= SPARE * len(powers) and np.linalg.matrix_rank(terms) == len(powers):
             found = np.linalg.lstsq(terms, inertia.reshape(len(inertia), 9), rcond=None)[0]
             misfit = float(np.abs(terms @ found - inertia.reshape(len(inertia), 9)).max() / np.abs(inertia).max())
-            return InertiaField(scale_m, powers, found.reshape(-1, 3, 3), misfit)
+            coefficients: FloatArray = np.asarray(found, dtype=np.float64).reshape(-1, 3, 3)
+            return InertiaField(scale_m, powers, coefficients, misfit)
     raise ValueError(f"{len(positions)} positions do not tell how the inertia changes: it takes eight in space")
 
 
-def _terms(places: FloatArray, powers: tuple[tuple[int, int, int], ...]) -> FloatArray:
+def _terms(places: FloatArray, powers: tuple[tuple[int, ...], ...]) -> FloatArray:
     """(places, terms)"""
     columns = [np.prod(places ** np.array(power), axis=1) for power in powers]
     terms: FloatArray = np.stack(columns, axis=1)

@@ -43,7 +43,8 @@ class SimulatedLinkage:
         turning = self._packed[layout.ARM_INERTIA] + self._packed[layout.DRIVE_INERTIA]
         inertia = carried * np.eye(3) + turning * rates.T @ rates
         held = np.array([0.0, 0.0, GRAVITY_M_S2 * carried])
-        return LinkageReading(np.array(position_m), angles, np.linalg.inv(rates), inertia, held)
+        jacobian: FloatArray = np.asarray(np.linalg.inv(rates), dtype=np.float64)
+        return LinkageReading(np.array(position_m), angles, jacobian, inertia, held)
 
     def angles_at(self, position_m: FloatArray) -> FloatArray | None:
         """As `at`, the joint angles alone."""

@@ -77,12 +77,13 @@ def _parts(file: Any, problems: Problems) -> dict[str, Any]:
     def numbers(name: str, count: int) -> FloatArray:
         return np.array(problems.attempt(lambda: numbers_attribute(file, name, count), (0.0,) * count))
 
+    provenance: dict[str, Any] = problems.attempt(lambda: _provenance(file), {})
     return {
         **{name: text(name) for name in ("device", "details", "read_on")},
         **{name: array(name) for name in ARRAYS},
         **{name: numbers(name, 3) for name in ("line_deg", "asymmetry")},
         "difference": float(numbers("difference", 1)[0]),
-        "provenance": problems.attempt(lambda: _provenance(file), {}),
+        "provenance": provenance,
     }
 
 

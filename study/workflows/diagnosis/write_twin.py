@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFit,
@@ -15,12 +17,17 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFitSettings,
 )
 from equalizer.identification.mechanical.mechanical_level import RigidBody, fit_rigid_body, remove_friction_damping
-from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
+from equalizer.linkage.calibration import LinkageCalibration
+from equalizer.linkage.inertia_field import fit_inertia_field
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, ModelEffect, SensorLimits
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
+from study.devices.opening import CALIBRATED, SIMULATED
 from study.errors import StudyError, WrongUseError
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.disk.provenance import gather_provenance
+from study.store.formats.calibration_file import read_calibration
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
@@ -33,6 +40,8 @@ SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY)
 """ADXL335 by its data sheet, with the capacitors of its board."""
 ACTUATOR = ActuatorLimits(bandwidth_hz=600.0)
 """Typical bandwidth of current loops."""
+LEAST_PER_M = 0.05
+"""1/m: over the 20 mm that the spring lets the handle go this changes the mass by 0.1 %, which no recording shows."""
 LOWER_LEVEL = 0.6
 """Second level relative to the protocol's: damping that grows at lower force is friction."""
 
@@ -46,6 +55,15 @@ class TwinPlan:
     """Multisines along every axis: a shipped recording protocol's name, or a file."""
     band_hz: tuple[float, float] = (3.0, 60.0)
     """The study's frequencies with a margin; higher modes would cost time in each simulation."""
+    calibration: Path | None = None
+    """Of the device's linkage. The simulated device takes its linkage and masses; the model says how the inertia
+    changes along each axis."""
+
+    @property
+    def recorded(self) -> str:
+        """The name under which the device is opened."""
+        as_calibrated = self.calibration is not None and self.device == SIMULATED
+        return f"{CALIBRATED}{self.calibration}" if as_calibrated else self.device
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,14 +85,16 @@ def write_twin(
     """Record, fit and write. `on_progress(share)`; before_moving as for `record_device`. Raises StudyError; no model
     is written then."""
     check_free(plan)
+    calibration = None if plan.calibration is None else read_calibration(plan.calibration)
     protocol = read_recording_protocol(plan.protocol).protocol
     _check_protocol(plan, protocol)
     with tempfile.TemporaryDirectory() as folder:
         ways = [
-            RecordingPlan(level, plan.device, (0.0, 0.0, 0.0), plan.seed, Path(folder) / f"{name}.h5")
+            RecordingPlan(level, plan.recorded, (0.0, 0.0, 0.0), plan.seed, Path(folder) / f"{name}.h5")
             for name, level in (("strong", protocol), ("weaker", _reduce_amplitudes(protocol)))
         ]
         strong = _record(ways[0], lambda share: on_progress(0.15 * share), before_moving)
+        _check_calibration(plan, calibration, strong.device)
         weaker = _record(ways[1], lambda share: on_progress(0.15 + 0.15 * share), before_moving)
     settings = MechanicalFitSettings(
         band_hz=plan.band_hz, sensor=SENSOR, actuator=ACTUATOR, joint=True, fit_delay=False
@@ -89,15 +109,18 @@ def write_twin(
             "Record more strongly or for longer, or choose another band with --band.",
             saved="Nothing was written.",
         ) from refusal
+    linear = remove_friction_damping(fit.model, piece.of_friction)
     model = replace(
-        remove_friction_damping(fit.model, piece.of_friction),
-        name=f"{plan.device} omega.3, as identified" if plan.device == "simulated" else f"{plan.device}, as identified",
+        linear,
+        name=f"{strong.device}, as identified",
+        effects=() if calibration is None else _inertia_effects(linear, calibration),
         tolerance=piece.tolerance,
         provenance=_provenance(plan, protocol, strong, fit),
     )
     write_mechanical_model(plan.out, model)
     on_progress(1.0)
-    return WrittenTwin(plan, model, fit, piece, _notes(strong, fit, piece))
+    notes = _notes(strong, fit, piece)
+    return WrittenTwin(plan, model, fit, piece, notes + _calibration_notes(model, piece, calibration))
 
 
 def check_free(plan: TwinPlan) -> None:
@@ -111,6 +134,48 @@ def check_free(plan: TwinPlan) -> None:
             "Correct --band.",
             saved="Nothing moved and nothing was written.",
         )
+
+
+def _check_calibration(plan: TwinPlan, calibration: LinkageCalibration | None, device: str) -> None:
+    """Raises StudyError where it is another device's. The simulated device takes any."""
+    if calibration is None:
+        return
+    if plan.recorded == plan.device and calibration.device != device:
+        raise StudyError(
+            TITLE,
+            f"{plan.calibration} is of the {calibration.device}; this is the {device}.",
+            "Give the calibration of this device (`hapteq calibrate`), or none.",
+            saved="Nothing was written.",
+        )
+
+
+def _inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> tuple[ModelEffect, ...]:
+    """How the inertia along each axis changes with the position along it, at the centre; none where it does not."""
+    slopes, axes = fit_inertia_field(calibration).slopes(np.zeros(3)), driven_axes(model)
+    masses = np.einsum("na,nm,ma->a", axes, model.mass, axes)
+    per_m = np.diagonal(np.diagonal(slopes, axis1=0, axis2=1)) / masses
+    return tuple(
+        ModelEffect("pose_dependent_inertia", letter, {"per_m": float(each)})
+        for letter, each in zip("xyz", per_m, strict=True)
+        if abs(each) > LEAST_PER_M
+    )
+
+
+def _calibration_notes(
+    model: MechanicalModel, piece: RigidBody, calibration: LinkageCalibration | None
+) -> tuple[str, ...]:
+    if calibration is None:
+        return ()
+    told = np.diag(fit_inertia_field(calibration).at(np.zeros(3)))
+    apart = float(np.abs(piece.mass / told - 1).max())
+    changing = ", ".join(f"{effect.parameters['per_m']:.3g} along {effect.axis}" for effect in model.effects)
+    return (
+        f"The calibration of the {calibration.device} says {', '.join(f'{each:.3g}' for each in told)} kg at the "
+        f"centre; the recordings say {', '.join(f'{each:.3g}' for each in piece.mass)} kg, up to {apart:.0%} apart. "
+        "The model has those of the recordings, with all that moves at the handle.",
+        f"How its inertia changes is the calibration's, as pose_dependent_inertia, per metre: {changing or 'nowhere'}. "
+        "What changes with the position across an axis is not in the model.",
+    )
 
 
 def _check_protocol(plan: TwinPlan, protocol: RecordingProtocol) -> None:
@@ -150,8 +215,9 @@ def _last_realisation_tests(recording: Recording) -> Recording:
 
 
 def _provenance(plan: TwinPlan, protocol: RecordingProtocol, strong: Recording, fit: MechanicalFit) -> dict[str, Any]:
+    parents = () if plan.calibration is None else (plan.calibration,)
     return {
-        **gather_provenance(seeds={"device": plan.seed}, parents=()).as_dict(),
+        **gather_provenance(seeds={"device": plan.seed}, parents=parents).as_dict(),
         "device": plan.device,
         "protocol": protocol.name,
         "from": "command, the virtual spring's force in it",

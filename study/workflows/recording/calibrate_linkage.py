@@ -126,7 +126,8 @@ def calibration_lines(written: WrittenCalibration) -> tuple[str, ...]:
 def _read(linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]) -> WrittenCalibration:
     """Raises CalibrationError, DeviceError."""
     azimuths = arm_azimuths(_centre_jacobian(linkage))
-    readings, unread, problems, worst = [], [], [], 0.0
+    readings, unread, worst = [], [], 0.0
+    problems: list[str] = []
     grid = symmetric_grid(azimuths, plan.radius_m, plan.depth_m)
     for number, position in enumerate(grid):
         reading = linkage.at(position)
