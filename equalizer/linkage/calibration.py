@@ -21,6 +21,9 @@ MASSES_KG = (1e-3, 20.0)
 MOST_DIFFERENCE = 0.05
 """J against finite differences. Another unit or convention gives at least 40 %, a forgotten arm's length some 10 %."""
 
+MOST_TOLD = 10
+"""Problems at positions that are told one by one."""
+
 
 class CalibrationError(ValueError):
     """Readings that cannot be those of a linkage. `problems`: one sentence each."""
@@ -88,9 +91,16 @@ def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
     if wrong or calibration.filled.shape != (count,) or count == 0:
         yield f"{', '.join(wrong) or 'filled'} does not have one entry for each of the {count} positions"
         return
-    for number, filled in enumerate(calibration.filled):
-        reading = LinkageReading(*(getattr(calibration, name)[number] for name in shapes))
-        yield from reading_problems(reading, gravity_known=not filled)
+    at_places = [
+        problem
+        for number, filled in enumerate(calibration.filled)
+        for problem in reading_problems(
+            LinkageReading(*(getattr(calibration, name)[number] for name in shapes)), gravity_known=not filled
+        )
+    ]
+    yield from at_places[:MOST_TOLD]
+    if len(at_places) > MOST_TOLD:
+        yield f"and {len(at_places) - MOST_TOLD} more of this kind at other positions"
     told_once = calibration.line_deg, calibration.asymmetry, np.atleast_1d(calibration.difference)
     if any(each.shape not in ((3,), (1,)) or not np.isfinite(each).all() for each in told_once):
         yield "mirror lines, asymmetries or differences are not finite numbers"

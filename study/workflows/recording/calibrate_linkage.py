@@ -64,15 +64,15 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
             "Correct --radius or --depth.",
             saved=SAVED,
         )
-    with linkage_of(plan.device) as linkage:
-        try:
+    try:
+        with linkage_of(plan.device) as linkage:
             linkage.check_frame()
             written = _read(linkage, plan, on_progress)
-        except CalibrationError as error:
-            raise _refused(linkage.info.name, error.problems) from error
-        except DeviceError as error:
-            error.saved = SAVED
-            raise
+    except CalibrationError as error:
+        raise _refused(plan.device, error.problems) from error
+    except DeviceError as error:
+        error.saved = SAVED
+        raise
     write_calibration(plan.out, written.calibration)
     on_progress(1.0)
     return written
@@ -195,7 +195,7 @@ def _refused(name: str, problems: tuple[str, ...]) -> DeviceError:
     more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
     return DeviceError(
         TITLE,
-        f"What the {name} says of its linkage cannot be: {'; '.join(problems[:SHOWN])}{more}.",
+        f"What {name} says of its linkage cannot be: {'; '.join(problems[:SHOWN])}{more}.",
         "Calibrate its handle anew (`hapteq doctor --device NAME --calibrate`), try a smaller grid (--radius, --depth) "
         "and the vendor's newest SDK; if it says the same then, do without: no other command needs it.",
         saved=SAVED,

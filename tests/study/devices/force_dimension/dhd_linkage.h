@@ -1,6 +1,6 @@
 /* The linkage behind the stub of the vendor's library: a delta of its own numbers, solved by brute force. Elbows at an
- * arm's length from the base's rim, forearms of a fixed length; angles by bisection, positions by Newton's steps, every
- * derivative by differences. No formula is shared with what is fitted to it. Included at the end of dhd_stub.c, whose
+ * arm's length from the base's rim, forearms of a fixed length; angles and positions by Newton's steps, every derivative
+ * by differences. No formula is shared with what is fitted to it. Included at the end of dhd_stub.c, whose
  * one-letter names are macros. */
 #define ARM (1.02 * 0.098)
 #define FOREARM 0.171
@@ -26,12 +26,13 @@ static double joint(int k, const double at[3]) {
   double before = -1.2, step = 0.1;
   while (before < 1.5 && gap(k, before, at) * gap(k, before + step, at) > 0) before += step;
   if (before >= 1.5) return NAN;
-  double low = before, high = before + step;
-  for (int i = 0; i < 46; i++) {
-    double middle = 0.5 * (low + high);
-    if (gap(k, low, at) * gap(k, middle, at) <= 0) high = middle; else low = middle;
+  double q = before + 0.5 * step, h = 1e-6;
+  for (int i = 0; i < 8; i++) {
+    double left = gap(k, q, at), slope = (gap(k, q + h, at) - gap(k, q - h, at)) / (2 * h);
+    q -= left / slope;
+    if (fabs(left) < 1e-16) break;
   }
-  return 0.5 * (low + high);
+  return q > before - step && q < before + 2 * step ? q : NAN;
 }
 
 /* jcb = d position / d joint: the inverse of d joint / d position, itself by differences. 0: singular or no number. */
@@ -54,16 +55,22 @@ static int by_differences(const double at[3], double jcb[3][3]) {
   return isfinite(determinant) && determinant != 0;
 }
 
+/* From the last place on: the next is near. */
 static int place(const double q[3], double at[3]) {
-  at[0] = at[1] = at[2] = 0;
+  static double last[3];
+  memcpy(at, last, sizeof last);
   for (int n = 0; n < 60; n++) {
     double jcb[3][3];
     if (!by_differences(at, jcb)) return 0;
     double off[3];
     for (int k = 0; k < 3; k++) off[k] = q[k] - joint(k, at);
     for (int i = 0; i < 3; i++) at[i] += jcb[i][0] * off[0] + jcb[i][1] * off[1] + jcb[i][2] * off[2];
-    if (fabs(off[0]) + fabs(off[1]) + fabs(off[2]) < 1e-11) return 1;
+    if (fabs(off[0]) + fabs(off[1]) + fabs(off[2]) < 1e-11) {
+      memcpy(last, at, sizeof last);
+      return 1;
+    }
   }
+  memset(last, 0, sizeof last);
   return 0;
 }
 
