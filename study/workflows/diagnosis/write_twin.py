@@ -17,8 +17,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFitSettings,
 )
 from equalizer.identification.mechanical.mechanical_level import RigidBody, fit_rigid_body, remove_friction_damping
-from equalizer.linkage.calibration import LinkageCalibration
-from equalizer.linkage.inertia_field import fit_inertia_field
+from equalizer.linkage.calibration import LinkageCalibration, inertia_about
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, ModelEffect, SensorLimits
 from equalizer.signals.recording import Recording
@@ -151,7 +150,7 @@ def _check_calibration(plan: TwinPlan, calibration: LinkageCalibration | None, d
 
 def _inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> tuple[ModelEffect, ...]:
     """How the inertia along each axis changes with the position along it, at the centre; none where it does not."""
-    slopes, axes = fit_inertia_field(calibration).slopes(np.zeros(3)), driven_axes(model)
+    slopes, axes = inertia_about(calibration, np.zeros(3))[1], driven_axes(model)
     masses = np.einsum("na,nm,ma->a", axes, model.mass, axes)
     per_m = np.diagonal(np.diagonal(slopes, axis1=0, axis2=1)) / masses
     return tuple(
@@ -166,15 +165,20 @@ def _calibration_notes(
 ) -> tuple[str, ...]:
     if calibration is None:
         return ()
-    told = np.diag(fit_inertia_field(calibration).at(np.zeros(3)))
+    inertia, slopes = inertia_about(calibration, np.zeros(3))
+    told = np.diag(inertia)
     apart = float(np.abs(piece.mass / told - 1).max())
-    changing = ", ".join(f"{effect.parameters['per_m']:.3g} along {effect.axis}" for effect in model.effects)
+    changing = ", ".join(
+        f"{slopes[axis, axis, axis]:.3g} kg/m along {letter}"
+        for axis, letter in enumerate("xyz")
+        if letter in {effect.axis for effect in model.effects}
+    )
     return (
         f"The calibration of the {calibration.device} says {', '.join(f'{each:.3g}' for each in told)} kg at the "
         f"centre; the recordings say {', '.join(f'{each:.3g}' for each in piece.mass)} kg, up to {apart:.0%} apart. "
         "The model has those of the recordings, with all that moves at the handle.",
-        f"How its inertia changes is the calibration's, as pose_dependent_inertia, per metre: {changing or 'nowhere'}. "
-        "What changes with the position across an axis is not in the model.",
+        f"How its inertia changes is the calibration's, as pose_dependent_inertia: {changing or 'nowhere'}. What "
+        "changes with the position across an axis is not in the model.",
     )
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.linkage.grid import beside, difference_error
-from equalizer.linkage.inertia_field import fit_inertia_field
+from equalizer.linkage.calibration import inertia_about
+from equalizer.linkage.grid import beside, difference_error, symmetric_grid
 from study.devices.rig import POSITION
 from study.devices.simulated.own_linkage import SimulatedLinkage, fit_linkage, simulated_linkage
 from study.devices.simulated.parameters import Linkage, Masses, Omega3Parameters
@@ -38,6 +38,17 @@ def test_its_inertia_at_the_centre_is_what_it_says_as_a_device():
     np.testing.assert_allclose(
         linkage.at(np.zeros(3)).inertia_kg, linkage.info.effective_mass_kg * np.eye(3), atol=1e-9
     )
+
+
+@pytest.mark.parametrize("place_m", [(0.0, 0.0, 0.0), (0.01, -0.02, 0.01)])
+def test_slopes_of_its_inertia_are_found_from_the_grid(place_m):
+    """Oracle: differences of the linkage's own equations. The grid knows nothing between its positions."""
+    linkage, place, step = simulated_linkage(), np.array(place_m), 1e-4
+    grid = symmetric_grid(np.radians([90.0, 210.0, 330.0]), 0.05, 0.04)
+    slopes = inertia_about(calibration([linkage.at(each) for each in grid]), place)[1]
+    asides = step * np.eye(3)
+    true = [(linkage.at(place + a).inertia_kg - linkage.at(place - a).inertia_kg) / (2 * step) for a in asides]
+    np.testing.assert_allclose(slopes, true, atol=0.02 * np.abs(true).max())
 
 
 def test_in_the_stops_it_tells_nothing():
@@ -72,14 +83,13 @@ def test_a_push_moves_it_as_the_calibrated_inertia_says(bench, place_m, axis):
     ticks, force_n = 60, 0.5
     moved = bench.play(rig, np.tile(force_n * np.eye(3)[axis], (ticks + 1, 1)))[:, POSITION]
     travelled = moved[ticks] - moved[0]
-    mobility = np.linalg.inv(fit_inertia_field(told()).at(np.array(place_m)))[:, axis]
+    mobility = np.linalg.inv(inertia_about(told(), np.array(place_m))[0])[:, axis]
     np.testing.assert_allclose(travelled, 0.5 * force_n * mobility * (ticks / 1000) ** 2, rtol=0.04, atol=1e-4)
 
 
 def test_a_heavier_place_is_told_from_a_lighter_one(bench):
     """What the test above would not see if all places weighed the same."""
-    field = fit_inertia_field(told())
-    masses = [field.at(np.array(place))[2, 2] for place in ([0, 0, 0.04], [0.0, 0, -0.04])]
+    masses = [inertia_about(told(), np.array(place))[0][2, 2] for place in ([0, 0, 0.04], [0.0, 0, -0.04])]
     assert masses[0] > 1.1 * masses[1]
 
 

@@ -43,22 +43,14 @@ def test_the_model_says_how_the_inertia_changes_along_each_axis(folder, capsys):
         aside = step * np.eye(3)[axis]
         before, after = (linkage.at(sign * aside).inertia_kg[axis, axis] for sign in (-1, 1))
         driven_kg = model.mass[axis, axis]
-        assert effect.parameters["per_m"] * driven_kg == pytest.approx((after - before) / (2 * step), rel=0.08)
+        assert effect.parameters["per_m"] * driven_kg == pytest.approx((after - before) / (2 * step), rel=0.02)
     assert any("0.282, 0.282, 0.282 kg at the centre; the recordings say" in note for note in said["notes"])
     assert model.provenance["parents"][0]["file"] == "cal.h5"
     assert main(["validate", str(out)]) == ExitCode.DONE
 
 
-def test_without_one_it_says_nothing_of_that(folder, capsys):
-    out = folder / "plain.toml"
-    asked = ["--protocol", str(folder / "shorter.toml"), "--band", "2", "25", "--seed", "2"]
-    assert main(["twin", "--out", str(out), *asked]) == ExitCode.DONE
-    assert "alibration" not in capsys.readouterr().err
-    assert read_mechanical_model(out).effects == ()
-
-
 def test_the_calibration_of_another_device_is_refused(folder):
-    """A replay stands for a real device here: the calibration must be of the recorded device."""
+    """The device without friction stands for a real one here: the calibration must be of what was recorded."""
     other = folder / "other.h5"
     write_calibration(other, calibration(readings()))
     device = "simulated-frictionless"
