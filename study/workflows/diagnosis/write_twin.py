@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFit,
@@ -17,9 +15,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFitSettings,
 )
 from equalizer.identification.mechanical.mechanical_level import RigidBody, fit_rigid_body, remove_friction_damping
-from equalizer.linkage.calibration import LinkageCalibration, inertia_about
-from equalizer.plant.linear_simulation import driven_axes
-from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, ModelEffect, SensorLimits
+from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
 from study.devices.opening import CALIBRATED, SIMULATED
@@ -30,6 +26,7 @@ from study.store.formats.calibration_file import read_calibration
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
+from study.workflows.diagnosis.twin_calibration import calibration_notes, check_same_device, inertia_effects
 from study.workflows.free_name import require_free
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
@@ -39,8 +36,6 @@ SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY)
 """ADXL335 by its data sheet, with the capacitors of its board."""
 ACTUATOR = ActuatorLimits(bandwidth_hz=600.0)
 """Typical bandwidth of current loops."""
-LEAST_PER_M = 0.05
-"""1/m: over the 20 mm that the spring lets the handle go this changes the mass by 0.1 %, which no recording shows."""
 LOWER_LEVEL = 0.6
 """Second level relative to the protocol's: damping that grows at lower force is friction."""
 
@@ -93,14 +88,36 @@ def write_twin(
             for name, level in (("strong", protocol), ("weaker", _reduce_amplitudes(protocol)))
         ]
         strong = _record(ways[0], lambda share: on_progress(0.15 * share), before_moving)
-        _check_calibration(plan, calibration, strong.device)
+        if calibration is not None and plan.recorded == plan.device:
+            check_same_device(calibration, strong.device, TITLE)
         weaker = _record(ways[1], lambda share: on_progress(0.15 + 0.15 * share), before_moving)
+    fit, piece = _fit(plan, strong, weaker, lambda share: on_progress(0.3 + 0.6 * share))
+    linear = remove_friction_damping(fit.model, piece.of_friction)
+    model = replace(
+        linear,
+        name=f"{strong.device}, as identified",
+        effects=() if calibration is None else inertia_effects(linear, calibration),
+        tolerance=piece.tolerance,
+        provenance=_provenance(plan, protocol, strong, fit),
+    )
+    write_mechanical_model(plan.out, model)
+    on_progress(1.0)
+    notes = _notes(strong, fit, piece)
+    if calibration is not None:
+        notes += calibration_notes(model, piece.mass, calibration)
+    return WrittenTwin(plan, model, fit, piece, notes)
+
+
+def _fit(
+    plan: TwinPlan, strong: Recording, weaker: Recording, on_progress: Callable[[float], None]
+) -> tuple[MechanicalFit, RigidBody]:
+    """Raises StudyError."""
     settings = MechanicalFitSettings(
         band_hz=plan.band_hz, sensor=SENSOR, actuator=ACTUATOR, joint=True, fit_delay=False
     )
     try:
-        fit = fit_mechanical_model([strong], settings, lambda share: on_progress(0.3 + 0.6 * share), plan.device)
-        piece = fit_rigid_body(fit, strong, weaker, settings)
+        fit = fit_mechanical_model([strong], settings, on_progress, plan.device)
+        return fit, fit_rigid_body(fit, strong, weaker, settings)
     except MechanicalFitRefused as refusal:
         raise StudyError(
             TITLE,
@@ -108,18 +125,6 @@ def write_twin(
             "Record more strongly or for longer, or choose another band with --band.",
             saved="Nothing was written.",
         ) from refusal
-    linear = remove_friction_damping(fit.model, piece.of_friction)
-    model = replace(
-        linear,
-        name=f"{strong.device}, as identified",
-        effects=() if calibration is None else _inertia_effects(linear, calibration),
-        tolerance=piece.tolerance,
-        provenance=_provenance(plan, protocol, strong, fit),
-    )
-    write_mechanical_model(plan.out, model)
-    on_progress(1.0)
-    notes = _notes(strong, fit, piece)
-    return WrittenTwin(plan, model, fit, piece, notes + _calibration_notes(model, piece, calibration))
 
 
 def check_free(plan: TwinPlan) -> None:
@@ -133,53 +138,6 @@ def check_free(plan: TwinPlan) -> None:
             "Correct --band.",
             saved="Nothing moved and nothing was written.",
         )
-
-
-def _check_calibration(plan: TwinPlan, calibration: LinkageCalibration | None, device: str) -> None:
-    """Raises StudyError where it is another device's. The simulated device takes any."""
-    if calibration is None:
-        return
-    if plan.recorded == plan.device and calibration.device != device:
-        raise StudyError(
-            TITLE,
-            f"{plan.calibration} is of the {calibration.device}; this is the {device}.",
-            "Give the calibration of this device (`hapteq calibrate`), or none.",
-            saved="Nothing was written.",
-        )
-
-
-def _inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> tuple[ModelEffect, ...]:
-    """How the inertia along each axis changes with the position along it, at the centre; none where it does not."""
-    slopes, axes = inertia_about(calibration, np.zeros(3))[1], driven_axes(model)
-    masses = np.einsum("na,nm,ma->a", axes, model.mass, axes)
-    per_m = np.diagonal(np.diagonal(slopes, axis1=0, axis2=1)) / masses
-    return tuple(
-        ModelEffect("pose_dependent_inertia", letter, {"per_m": float(each)})
-        for letter, each in zip("xyz", per_m, strict=True)
-        if abs(each) > LEAST_PER_M
-    )
-
-
-def _calibration_notes(
-    model: MechanicalModel, piece: RigidBody, calibration: LinkageCalibration | None
-) -> tuple[str, ...]:
-    if calibration is None:
-        return ()
-    inertia, slopes = inertia_about(calibration, np.zeros(3))
-    told = np.diag(inertia)
-    apart = float(np.abs(piece.mass / told - 1).max())
-    changing = ", ".join(
-        f"{slopes[axis, axis, axis]:.3g} kg/m along {letter}"
-        for axis, letter in enumerate("xyz")
-        if letter in {effect.axis for effect in model.effects}
-    )
-    return (
-        f"The calibration of the {calibration.device} says {', '.join(f'{each:.3g}' for each in told)} kg at the "
-        f"centre; the recordings say {', '.join(f'{each:.3g}' for each in piece.mass)} kg, up to {apart:.0%} apart. "
-        "The model has those of the recordings, with all that moves at the handle.",
-        f"How its inertia changes is the calibration's, as pose_dependent_inertia: {changing or 'nowhere'}. What "
-        "changes with the position across an axis is not in the model.",
-    )
 
 
 def _check_protocol(plan: TwinPlan, protocol: RecordingProtocol) -> None:

@@ -30,13 +30,8 @@ from study.session.watching.live import Live
 from study.store.disk.csv_rows import columns, in_words
 from study.store.disk.layout import Entry
 from study.store.disk.text_file import write_text
-from study.store.formats import (
-    calibration_file,
-    identified_model_file,
-    mechanical_model_file,
-    recording_layout,
-    repeats_file,
-)
+from study.store.formats import identified_model_file, mechanical_model_file, recording_layout, repeats_file
+from study.store.formats.calibration_file import LAYOUT as CALIBRATION_LAYOUT
 from study.store.sessions import live_file, log_seal
 from study.store.sessions.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
 from study.workflows.files.importing_docs import importing_markdown
@@ -193,7 +188,7 @@ def formats_markdown() -> str:
         _table(identified_model_file.LAYOUT),
         "## Calibration of a linkage (`.h5`)",
         "What a device says of its linkage over a grid of positions (`hapteq calibrate`); arrays have checksums.",
-        _table(calibration_file.LAYOUT),
+        _table(CALIBRATION_LAYOUT),
         *_mechanical_models(),
         "## Effects",
         "Names of physics that a model may have or lack, with the parameters in order, the main one first; units of "

@@ -55,6 +55,8 @@ def test_the_calibration_of_another_device_is_refused(folder):
     write_calibration(other, calibration(readings()))
     device = "simulated-frictionless"
     plan = TwinPlan(folder / "n.toml", device, protocol=str(folder / "shorter.toml"), calibration=other)
-    with pytest.raises(StudyError, match="other.h5 is of the invented; this is the simulated omega.3 without friction"):
+    with pytest.raises(
+        StudyError, match="The calibration is of the invented; this is the simulated omega.3 without friction"
+    ):
         write_twin(plan, lambda share: None)
     assert not plan.out.exists()
