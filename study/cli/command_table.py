@@ -39,12 +39,13 @@ COMMANDS: dict[str, dict[str, str]] = {
     },
     "Device": {
         "doctor": "Check installation, device, sensor and 1 kHz timing",
+        "calibrate": "Read inertia and Jacobian over the workspace; nothing moves",
         "record": "Record the device's answer to an excitation",
         "identify": "Fit a stable state-space model to a band, and test it",
         "equalize": "Turn wanted accelerations into forces",
         "contact": "A transient at a contact, turned to its normal, played",
         "export-controller": "A model's controller as C11, for loops of your own",
-        "twin": "Write the mechanical model of the simulated omega.3",
+        "twin": "Write the mechanical model of a device, from its answers",
     },
     "Diagnosis": {
         "import": "Write one recording from files of others, units in SI",

@@ -11,7 +11,11 @@ from study.tui.keys.answer_keys import parse_keys
 
 DataOption = Annotated[Path, typer.Option("--data", help="Folder of all sessions.", show_default=True)]
 DeviceOption = Annotated[
-    str, typer.Option("--device", help="simulated, omega3, omega6, omega7, delta3, sigma7, or replay:FILE.h5.")
+    str,
+    typer.Option(
+        "--device",
+        help="simulated, omega3, omega6, omega7, delta3, sigma7, replay:FILE.h5, or simulated:CAL.h5 (as calibrated).",
+    ),
 ]
 HandsOffOption = Annotated[
     bool,

@@ -20,19 +20,27 @@ def twin(
         str, typer.Option(help="Recording protocol with multisines along x, y and z, or a file.")
     ] = "multisine",
     band: Annotated[tuple[float, float], typer.Option(help="Band to fit, low and high in hertz.")] = (3.0, 60.0),
+    calibration: Annotated[
+        Path | None,
+        typer.Option(help="Calibration of the linkage, CAL.h5 of `hapteq calibrate`: how the inertia changes."),
+    ] = None,
     hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Excite the device well above its friction at two levels, fit masses, dampers, cables and modes from the command
     to the acceleration, take off the damping that is friction's, and write the rest with its tolerances. No person may
-    hold the handle; from a script, a real device moves with --hands-off only."""
+    hold the handle; from a script, a real device moves with --hands-off only.
+
+    With --calibration the model also says how the inertia changes with the position, and the simulated device has the
+    linkage and the masses of the calibrated one.
+    """
     from functools import partial
 
     from study.cli.progress import late_bar
     from study.workflows.diagnosis.twin_summary import twin_lines, twin_summary
     from study.workflows.diagnosis.write_twin import TwinPlan, check_free, write_twin
 
-    plan = TwinPlan(out, device, seed, protocol, band)
+    plan = TwinPlan(out, device, seed, protocol, band, calibration)
     check_free(plan)
     with late_bar("Twin (%)", total=100) as show:
         written = write_twin(plan, lambda share: show(round(100 * share)), partial(announce, hands_off=hands_off))

@@ -4,12 +4,12 @@ The heavy parts (numba above all) are imported when a device is opened, so that 
 """
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from study.devices.admission import HAND_STIMULUS_CAP_N as HAND_STIMULUS_CAP_N
 from study.devices.clock import Clock
@@ -19,6 +19,8 @@ from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
 
 if TYPE_CHECKING:
+    from equalizer.linkage.calibration import LinkageReading
+    from equalizer.signals.signal import FloatArray
     from study.devices.masking_sound import MaskingSound, Samples
     from study.devices.onset_line import OnsetLine
     from study.devices.telemetry import TelemetryReader
@@ -45,8 +47,31 @@ REPLAY = "replay:"
 """Before the path of a recording: its handle moves as it once did, independent of the force asked for."""
 
 
+CALIBRATED = "simulated:"
+"""Before the path of a calibration: the simulated device with the linkage and the inertia that it tells."""
+
+
 def needs_real_time(name: str) -> bool:
-    return name not in SIMULATIONS and not name.startswith(REPLAY)
+    return name not in SIMULATIONS and not name.startswith((REPLAY, CALIBRATED))
+
+
+class LinkageSource(Protocol):
+    """A device's own knowledge of its linkage."""
+
+    @property
+    def info(self) -> DeviceInfo: ...
+
+    def at(self, position_m: "FloatArray") -> "LinkageReading | None":
+        """At any position of the handle (3,), wherever it is; None out of reach. Raises `DeviceError`."""
+        ...
+
+    def angles_at(self, position_m: "FloatArray") -> "FloatArray | None":
+        """As `at`, the joint angles (3,) alone, rad."""
+        ...
+
+    def check_frame(self) -> None:
+        """Raises `DeviceError` where the positions above are not in the axes of the device's readings."""
+        ...
 
 
 def open_device(
@@ -55,12 +80,8 @@ def open_device(
     """`seed` drives what is random in a simulated device. own_process: a real device's loop in a process of its own,
     the only one that holds it; False is for that process, and for tests. telemetry: path of the
     caller's ring for it. Raises `DeviceError`."""
-    if name not in SIMULATIONS and name not in REAL and not name.startswith(REPLAY):
-        raise DeviceError(
-            f"There is no device called {name!r}",
-            f"Known are {', '.join(DEVICES)}, and {REPLAY}FILE.h5 for a recording.",
-            f"Use --device {SIMULATED} where no device is at hand.",
-        )
+    if name not in SIMULATIONS and name not in REAL and not name.startswith((REPLAY, CALIBRATED)):
+        raise _unknown_device(name)
     if name in REAL and clock.virtual:
         raise DeviceError(
             "A real device needs real time", f"'{name}' was to be played faster than time passes.", "Use a real clock."
@@ -83,6 +104,38 @@ def open_device(
         if ring is not None:
             ring.remove()
         raise
+
+
+@contextlib.contextmanager
+def linkage_of(name: str) -> "Iterator[LinkageSource]":
+    """What a device knows of its linkage. Nothing moves, and a real device stays braked. Raises `DeviceError`."""
+    if name in REAL:
+        from study.devices.force_dimension.linkage import vendor_linkage
+
+        with vendor_linkage(name) as linkage:
+            yield linkage
+    elif name == SIMULATED:
+        from study.devices.simulated.own_linkage import simulated_linkage
+
+        yield simulated_linkage()
+    else:
+        raise (
+            _unknown_device(name)
+            if ":" not in name
+            else DeviceError(
+                "This device tells nothing of a linkage",
+                f"{name!r} stands on a file, which holds what is known of it.",
+                f"Calibrate {SIMULATED} or a device of {', '.join(REAL)}.",
+            )
+        )
+
+
+def _unknown_device(name: str) -> DeviceError:
+    return DeviceError(
+        f"There is no device called {name!r}",
+        f"Known are {', '.join(DEVICES)}, {REPLAY}FILE.h5 for a recording, and {CALIBRATED}FILE.h5 for a calibration.",
+        f"Use --device {SIMULATED} where no device is at hand.",
+    )
 
 
 def telemetry_of(path: str) -> "TelemetryReader":

@@ -18,8 +18,8 @@ from study.errors import DeviceError
 OLDEST_SDK = (3, 16, 0)
 """From here on all functions are there with the types below; older ones differ in some."""
 
-DEVICE_IN_USE = 20
-"""Of the library's error codes, the one that something is decided by."""
+GEOMETRY_ERROR, DEVICE_IN_USE = 8, 20
+"""Of the library's error codes, those that something is decided by."""
 
 _ID, _NUMBER, _NUMBERS = c_byte, c_double, POINTER(c_double)
 _THREE = (_NUMBERS, _NUMBERS, _NUMBERS, _ID)
@@ -56,6 +56,19 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
 }
 """Result and arguments of each function; `char ID` is the last argument and has no default in C."""
 
+_ANGLES, _COUNTS = (_NUMBER,) * 3, (c_int,) * 3
+
+LINKAGE_SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "dhdGetJointAngles": (c_int, (_NUMBERS, _ID)),
+    "dhdDeltaPositionToEncoder": (c_int, (*_ANGLES, *(POINTER(c_int),) * 3, _ID)),
+    "dhdDeltaEncoderToPosition": (c_int, (*_COUNTS, *_THREE)),
+    "dhdDeltaEncodersToJointAngles": (c_int, (*_COUNTS, *_THREE)),
+    "dhdDeltaJointAnglesToJacobian": (c_int, (*_ANGLES, _NUMBERS, _ID)),
+    "dhdJointAnglesToInertiaMatrix": (c_int, (_NUMBERS, _NUMBERS, _ID)),
+    "dhdJointAnglesToGravityJointTorques": (c_int, (_NUMBERS, _NUMBERS, c_ubyte, _ID)),
+}
+"""For the calibration of the linkage alone: a library without them drives a device all the same."""
+
 
 class LibraryError(Exception):
     """A function of the library answered that it failed."""
@@ -80,7 +93,10 @@ class Library:
         return _version_words(self.version)
 
     def function(self, name: str) -> Callable[..., Any]:
-        """Unchecked: what it returns is for `check_answer` to judge."""
+        """Unchecked, for calls at every tick: what it returns is for `check_answer` to judge. Raises `DeviceError` where a
+        function that not every use needs is missing."""
+        if name not in self._functions:
+            raise _too_old(f"{self.path} has no {name}")
         return self._functions[name]
 
     def check_answer(self, name: str, answer: int) -> int:
@@ -101,7 +117,7 @@ class Library:
 
     def call(self, name: str, *arguments: Any) -> int:
         """Raises `LibraryError`."""
-        return self.check_answer(name, int(self._functions[name](*arguments)))
+        return self.check_answer(name, int(self.function(name)(*arguments)))
 
     def _version(self) -> tuple[int, int, int, int]:
         parts = [c_int() for _ in range(4)]
@@ -127,7 +143,8 @@ def _bind(loaded: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
     if missing:
         raise _too_old(f"{path} has no {', '.join(missing)}")
     functions: dict[str, Callable[..., Any]] = {}
-    for name, (result, arguments) in SIGNATURES.items():
+    there = {name: types for name, types in LINKAGE_SIGNATURES.items() if hasattr(loaded, name)}
+    for name, (result, arguments) in (SIGNATURES | there).items():
         function = getattr(loaded, name)
         function.restype, function.argtypes = result, list(arguments)
         functions[name] = function

@@ -16,14 +16,23 @@ NAME = "simulated omega.3"
 MAX_FORCE_N = 12.0
 
 
-def build_omega3(seed: int, hand: bool, place_m: Vector = (0.0, 0.0, 0.0), friction: bool = True) -> CompiledRig:
+def build_omega3(
+    seed: int,
+    hand: bool,
+    place_m: Vector = (0.0, 0.0, 0.0),
+    friction: bool = True,
+    parameters: Omega3Parameters | None = None,
+) -> CompiledRig:
     """A device at rest at place_m, gravity compensated. `seed`: of the accelerometer's noise, any integer >= 0.
 
-    Without `friction` it is no stand-in for a device, but a means of telling what friction costs.
+    Without `friction` it is no stand-in for a device, but a means of telling what friction costs. parameters: not the
+    one set of the simulated omega.3, but those fitted to a calibration.
 
     Raises ValueError for a place within the stops.
     """
-    parameters = Omega3Parameters()
+    named = NAME if parameters is None else f"{NAME} as calibrated"
+    set_words = "parameter set 1" if parameters is None else "linkage and masses of a calibration"
+    parameters = parameters or Omega3Parameters()
     if not friction:
         parameters = replace(parameters, drives=replace(parameters.drives, friction_n_m=0.0))
     if not math.dist(place_m, (0.0, 0.0, 0.0)) < parameters.stops.radius_m:
@@ -37,12 +46,12 @@ def build_omega3(seed: int, hand: bool, place_m: Vector = (0.0, 0.0, 0.0), frict
         packed[changed] = (held if on_handle and hand else free)[changed]
 
     info = DeviceInfo(
-        name=NAME if friction else f"{NAME} without friction",
+        name=named if friction else f"{named} without friction",
         simulated=True,
         sample_rate_hz=1.0 / TICK_S,
         max_force_n=MAX_FORCE_N,
         effective_mass_kg=effective_mass_kg(parameters, packed),
-        details=f"parameter set 1, {'with' if hand else 'without'} a hand, sensor noise from seed {seed}",
+        details=f"{set_words}, {'with' if hand else 'without'} a hand, sensor noise from seed {seed}",
     )
     return CompiledRig(
         info=info,

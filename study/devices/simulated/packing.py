@@ -74,7 +74,7 @@ def _pack_linkage(packed: FloatArray, parameters: Omega3Parameters) -> None:
     packed[layout.UPPER_ARM] = linkage.upper_arm_m
     packed[layout.FOREARM] = linkage.forearm_m
     packed[layout.RADIUS] = linkage.radius_m
-    packed[layout.PLATFORM_DEPTH] = isotropic_depth_m(linkage)
+    packed[layout.PLATFORM_DEPTH] = isotropic_depth_m(linkage) if linkage.depth_m is None else linkage.depth_m
     azimuths = np.radians(linkage.azimuths_deg)
     _put(packed, layout.AZIMUTH, np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1))
     masses = parameters.masses

@@ -24,6 +24,8 @@ class Linkage:
     60 mm behind the isotropic point. With this one they stay well away from folding within the stops."""
     azimuths_deg: Vector = (90.0, 210.0, 330.0)
     """From y towards z. First leg upright, as the omega.3 stands: the x-z plane is a mirror plane."""
+    depth_m: float | None = None
+    """Of the origin in front of the base's plane; None: at the isotropic point."""
 
 
 @dataclass(frozen=True, slots=True)

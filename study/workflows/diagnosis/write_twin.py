@@ -18,12 +18,15 @@ from equalizer.identification.mechanical.mechanical_level import RigidBody, fit_
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
+from study.devices.opening import CALIBRATED, SIMULATED
 from study.errors import StudyError, WrongUseError
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.disk.provenance import gather_provenance
+from study.store.formats.calibration_file import read_calibration
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
+from study.workflows.diagnosis.twin_calibration import calibration_notes, check_same_device, inertia_effects
 from study.workflows.free_name import require_free
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
@@ -46,6 +49,15 @@ class TwinPlan:
     """Multisines along every axis: a shipped recording protocol's name, or a file."""
     band_hz: tuple[float, float] = (3.0, 60.0)
     """The study's frequencies with a margin; higher modes would cost time in each simulation."""
+    calibration: Path | None = None
+    """Of the device's linkage. The simulated device takes its linkage and masses; the model says how the inertia
+    changes along each axis."""
+
+    @property
+    def recorded(self) -> str:
+        """The name under which the device is opened."""
+        as_calibrated = self.calibration is not None and self.device == SIMULATED
+        return f"{CALIBRATED}{self.calibration}" if as_calibrated else self.device
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,21 +79,45 @@ def write_twin(
     """Record, fit and write. `on_progress(share)`; before_moving as for `record_device`. Raises StudyError; no model
     is written then."""
     check_free(plan)
+    calibration = None if plan.calibration is None else read_calibration(plan.calibration)
     protocol = read_recording_protocol(plan.protocol).protocol
     _check_protocol(plan, protocol)
     with tempfile.TemporaryDirectory() as folder:
         ways = [
-            RecordingPlan(level, plan.device, (0.0, 0.0, 0.0), plan.seed, Path(folder) / f"{name}.h5")
+            RecordingPlan(level, plan.recorded, (0.0, 0.0, 0.0), plan.seed, Path(folder) / f"{name}.h5")
             for name, level in (("strong", protocol), ("weaker", _reduce_amplitudes(protocol)))
         ]
         strong = _record(ways[0], lambda share: on_progress(0.15 * share), before_moving)
+        if calibration is not None and plan.recorded == plan.device:
+            check_same_device(calibration, strong.device, TITLE)
         weaker = _record(ways[1], lambda share: on_progress(0.15 + 0.15 * share), before_moving)
+    fit, piece = _fit(plan, strong, weaker, lambda share: on_progress(0.3 + 0.6 * share))
+    linear = remove_friction_damping(fit.model, piece.of_friction)
+    model = replace(
+        linear,
+        name=f"{strong.device}, as identified",
+        effects=() if calibration is None else inertia_effects(linear, calibration),
+        tolerance=piece.tolerance,
+        provenance=_provenance(plan, protocol, strong, fit),
+    )
+    write_mechanical_model(plan.out, model)
+    on_progress(1.0)
+    notes = _notes(strong, fit, piece)
+    if calibration is not None:
+        notes += calibration_notes(model, piece.mass, calibration)
+    return WrittenTwin(plan, model, fit, piece, notes)
+
+
+def _fit(
+    plan: TwinPlan, strong: Recording, weaker: Recording, on_progress: Callable[[float], None]
+) -> tuple[MechanicalFit, RigidBody]:
+    """Raises StudyError."""
     settings = MechanicalFitSettings(
         band_hz=plan.band_hz, sensor=SENSOR, actuator=ACTUATOR, joint=True, fit_delay=False
     )
     try:
-        fit = fit_mechanical_model([strong], settings, lambda share: on_progress(0.3 + 0.6 * share), plan.device)
-        piece = fit_rigid_body(fit, strong, weaker, settings)
+        fit = fit_mechanical_model([strong], settings, on_progress, plan.device)
+        return fit, fit_rigid_body(fit, strong, weaker, settings)
     except MechanicalFitRefused as refusal:
         raise StudyError(
             TITLE,
@@ -89,15 +125,6 @@ def write_twin(
             "Record more strongly or for longer, or choose another band with --band.",
             saved="Nothing was written.",
         ) from refusal
-    model = replace(
-        remove_friction_damping(fit.model, piece.of_friction),
-        name=f"{plan.device} omega.3, as identified" if plan.device == "simulated" else f"{plan.device}, as identified",
-        tolerance=piece.tolerance,
-        provenance=_provenance(plan, protocol, strong, fit),
-    )
-    write_mechanical_model(plan.out, model)
-    on_progress(1.0)
-    return WrittenTwin(plan, model, fit, piece, _notes(strong, fit, piece))
 
 
 def check_free(plan: TwinPlan) -> None:
@@ -150,8 +177,9 @@ def _last_realisation_tests(recording: Recording) -> Recording:
 
 
 def _provenance(plan: TwinPlan, protocol: RecordingProtocol, strong: Recording, fit: MechanicalFit) -> dict[str, Any]:
+    parents = () if plan.calibration is None else (plan.calibration,)
     return {
-        **gather_provenance(seeds={"device": plan.seed}, parents=()).as_dict(),
+        **gather_provenance(seeds={"device": plan.seed}, parents=parents).as_dict(),
         "device": plan.device,
         "protocol": protocol.name,
         "from": "command, the virtual spring's force in it",

@@ -31,6 +31,7 @@ from study.store.disk.csv_rows import columns, in_words
 from study.store.disk.layout import Entry
 from study.store.disk.text_file import write_text
 from study.store.formats import identified_model_file, mechanical_model_file, recording_layout, repeats_file
+from study.store.formats.calibration_file import LAYOUT as CALIBRATION_LAYOUT
 from study.store.sessions import live_file, log_seal
 from study.store.sessions.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
 from study.workflows.files.importing_docs import importing_markdown
@@ -185,6 +186,9 @@ def formats_markdown() -> str:
         *_recordings(),
         "## Identified model (`.h5`)",
         _table(identified_model_file.LAYOUT),
+        "## Calibration of a linkage (`.h5`)",
+        "What a device says of its linkage over a grid of positions (`hapteq calibrate`); arrays have checksums.",
+        _table(CALIBRATION_LAYOUT),
         *_mechanical_models(),
         "## Effects",
         "Names of physics that a model may have or lack, with the parameters in order, the main one first; units of "

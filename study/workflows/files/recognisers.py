@@ -18,7 +18,8 @@ from study.importing.map_format.map_toml import KIND as MAP_KIND
 from study.importing.map_format.map_toml import is_map, parse_map
 from study.store.disk.csv_rows import header_problem
 from study.store.disk.file_errors import UnusableFileError
-from study.store.formats import identified_model_file, recording_layout
+from study.store.formats import calibration_file, identified_model_file, recording_layout
+from study.store.formats.calibration_file import read_calibration
 from study.store.formats.daily_check_file import FORMAT as DAILY_CHECK_FORMAT
 from study.store.formats.daily_check_file import read_daily_check
 from study.store.formats.diagnosis_file import read_diagnosis
@@ -73,6 +74,16 @@ def recognise_identified_model(content: FileContent) -> str | None:
         f"identified model of order {found.order}, {found.band_hz[0]:g} to {found.band_hz[1]:g} Hz at "
         f"{found.sample_rate_hz:g} Hz, {_count(len(found.input_channels), 'input')}, "
         f"{_count(len(found.output_channels), 'output')}, {stable}, {quality_brief(found.quality)}"
+    )
+
+
+def recognise_calibration(content: FileContent) -> str | None:
+    if content.hdf5_format != calibration_file.FORMAT:
+        return None
+    found = read_calibration(content.path)
+    return (
+        f"calibration of the linkage of {found.device}, {_count(len(found.position_m), 'position')}, "
+        f"{int(found.filled.sum())} of them filled in, mirrored inertia within {found.asymmetry.max():.1%}"
     )
 
 
@@ -187,6 +198,7 @@ def _count(number: int, what: str) -> str:
 RECOGNISERS: tuple[Recogniser, ...] = (
     recognise_recording,
     recognise_identified_model,
+    recognise_calibration,
     recognise_mechanical_model,
     recognise_diagnosis,
     recognise_real_answer,

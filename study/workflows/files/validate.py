@@ -21,9 +21,9 @@ from study.workflows.files.recognisers import RECOGNISERS, Recogniser, describe_
 from study.workflows.files.session_recognisers import SESSION_RECOGNISERS
 
 KNOWN = (
-    "known are recordings and identified models (HDF5), mechanical models, protocols and import maps (TOML), "
-    "trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and version, "
-    "and session folders"
+    "known are recordings, identified models and calibrations (HDF5), mechanical models, protocols and import maps "
+    "(TOML), trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and "
+    "version, and session folders"
 )
 
 
@@ -115,7 +115,7 @@ def _describe_unknown(content: FileContent) -> tuple[str, str]:
         return "folder", "this folder is not a session: it holds no events.jsonl"
     if content.hdf5_format is not None:
         said = f"calls itself '{content.hdf5_format}'" if content.hdf5_format else "has no attribute 'format'"
-        return "HDF5 file", f"it {said}; known formats are hapteq-recording and hapteq-model"
+        return "HDF5 file", f"it {said}; known formats are hapteq-recording, hapteq-model and hapteq-calibration"
     if not (content.text or "").strip():
         return "empty file", f"it holds nothing; {KNOWN}"
     match content.path.suffix.lower():

@@ -34,6 +34,8 @@
   X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                                                                \
   /* What wears: Coulomb friction in N, amplifiers, a mass that swings on the handle. */                               \
   X(friction, 0) X(gain, 1) X(mode_hz, 0) X(mode_kg, 0.02)                                                             \
+  /* What its linkage says (dhd_linkage.h): a heavier second arm, its share; faults; where its reach ends. */           \
+  X(odd_arm, 0) X(bad_jacobian, 0) X(bad_inertia, 0) X(reach_z_m, 0) X(frame_off_m, 0) X(linkage_turned_deg, 0)        \
   /* What a test may ask for. */                                                                                       \
   X(force_on, 0) X(brake, 1) X(cause, 0) X(fx, 0) X(fy, 0) X(fz, 0) X(peak_n, 0) X(writes, 0) X(opened, 0)             \
   X(stops, 0) X(closes, 0) X(reads, 0) X(watchdog, 0) X(cap_n, -1) X(effector, 0) X(gravity, 1) X(guard, 1)            \
@@ -350,3 +352,5 @@ EXPORT int dhdSetWatchdog(unsigned char units, char id) {
         else { p[watchdog] = units; last_command_s = p[now]; });
 }
 EXPORT int dhdGetWatchdog(unsigned char *units, char id) { (void)id; PLAIN(*units = (unsigned char)p[watchdog]); }
+
+#include "dhd_linkage.h"

@@ -1,0 +1,168 @@
+"""What a device says of its linkage over a grid of positions, and what of it is refused.
+
+J is of the forward kinematics: handle velocity = J joint speeds, joint torques = J^T handle force (Spong, Hutchinson,
+Vidyasagar, Robot Modeling and Control, chapter 4).
+"""
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+
+MOST_CONDITION = 50.0
+"""Of J. Usable places of a delta device have some units; the simulated omega.3 stays below 2.2."""
+MOST_SKEW = 1e-3
+"""|M - M^T| over |M|: more than rounding."""
+MASSES_KG = (1e-3, 20.0)
+"""Of handles on a desk, along any direction."""
+MOST_DIFFERENCE = 0.05
+"""J against finite differences. Another unit or convention gives at least 40 %, a forgotten arm's length some 10 %."""
+
+DEGREES = (4, 3, 2, 1)
+SPARE = 2
+"""Times as many positions as terms: below it a lower degree is taken."""
+NEAR_SHARE = 0.3
+"""Of the calibration's reach: standard deviation of the weight around a place. Without one, far positions bend the
+slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
+MOST_TOLD = 10
+"""Problems at positions that are told one by one."""
+
+
+class CalibrationError(ValueError):
+    """Readings that cannot be those of a linkage. `problems`: one sentence each."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinkageReading:
+    """At one position of the handle."""
+
+    position_m: FloatArray
+    """(3,)"""
+    joint_angle_rad: FloatArray
+    """(3,)"""
+    jacobian: FloatArray
+    """(3, 3), m/rad"""
+    inertia_kg: FloatArray
+    """(3, 3), at the handle"""
+    gravity_n: FloatArray
+    """(3,), the force at the handle that holds it against gravity"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinkageCalibration:
+    """n positions. Raises CalibrationError."""
+
+    device: str
+    details: str
+    """Serial number, firmware, SDK."""
+    read_on: str
+    """ISO 8601 date."""
+    position_m: FloatArray
+    """(n, 3)"""
+    joint_angle_rad: FloatArray
+    """(n, 3)"""
+    jacobian: FloatArray
+    """(n, 3, 3), m/rad"""
+    inertia_kg: FloatArray
+    """(n, 3, 3)"""
+    gravity_n: FloatArray
+    """(n, 3); NaN where no reading and no mirror line tells it."""
+    filled: FloatArray
+    """(n,), 1 where a mirror line gave what could not be read, else 0."""
+    line_deg: FloatArray
+    """(3,), azimuth of the mirror lines from y towards z, in the order of the arms."""
+    asymmetry: FloatArray
+    """(3,), largest relative difference between inertia and mirrored inertia, by line."""
+    difference: float
+    """Largest relative difference between J and finite differences of the positions."""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if problems := tuple(calibration_problems(self)):
+            raise CalibrationError(problems)
+
+
+def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
+    """One sentence each; none for a calibration that can be used."""
+    count = len(calibration.position_m)
+    shapes = {"position_m": (3,), "joint_angle_rad": (3,), "jacobian": (3, 3), "inertia_kg": (3, 3), "gravity_n": (3,)}
+    wrong = [name for name, shape in shapes.items() if getattr(calibration, name).shape != (count, *shape)]
+    if wrong or calibration.filled.shape != (count,) or count == 0:
+        yield f"{', '.join(wrong) or 'filled'} does not have one entry for each of the {count} positions"
+        return
+    at_places = [
+        problem
+        for number, filled in enumerate(calibration.filled)
+        for problem in reading_problems(
+            LinkageReading(*(getattr(calibration, name)[number] for name in shapes)), gravity_known=not filled
+        )
+    ]
+    yield from at_places[:MOST_TOLD]
+    if len(at_places) > MOST_TOLD:
+        yield f"and {len(at_places) - MOST_TOLD} more of this kind at other positions"
+    told_once = calibration.line_deg, calibration.asymmetry, np.atleast_1d(calibration.difference)
+    if any(each.shape not in ((3,), (1,)) or not np.isfinite(each).all() for each in told_once):
+        yield "mirror lines, asymmetries or differences are not finite numbers"
+    else:
+        yield from difference_problems(calibration.difference)
+
+
+def difference_problems(difference: float) -> Iterator[str]:
+    """difference: relative, of J from finite differences."""
+    if not 0 <= difference <= MOST_DIFFERENCE:
+        yield (
+            f"the Jacobian differs from finite differences of its own positions by {difference:.0%}; "
+            f"{MOST_DIFFERENCE:.0%} is the most"
+        )
+
+
+def reading_problems(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
+    """One sentence each."""
+    where = "(" + ", ".join(f"{1000 * each:.0f}" for each in reading.position_m) + ") mm"
+    jacobian, inertia = reading.jacobian, reading.inertia_kg
+    told = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
+    for name, values in (told | {"Jacobian": jacobian, "inertia": inertia}).items():
+        if not np.isfinite(values).all():
+            yield f"at {where} the {name} holds what is no number"
+    if not (np.isfinite(jacobian).all() and np.isfinite(inertia).all()):
+        return
+    if np.isinf(reading.gravity_n).any() or (gravity_known and np.isnan(reading.gravity_n).any()):
+        yield f"at {where} the gravity force is no number"
+    condition = float(np.linalg.cond(jacobian))
+    if not condition <= MOST_CONDITION:
+        yield f"at {where} the Jacobian is singular, or nearly so (condition {condition:.3g})"
+    if np.abs(inertia - inertia.T).max() > MOST_SKEW * np.abs(inertia).max():
+        yield f"at {where} the inertia is not symmetric"
+        return
+    masses = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
+    if masses[0] <= 0:
+        yield f"at {where} the inertia is not positive definite: {masses[0]:.3g} kg along a direction"
+    elif not MASSES_KG[0] <= masses[0] <= masses[-1] <= MASSES_KG[1]:
+        yield f"at {where} the inertia is {masses[0]:.3g} to {masses[-1]:.3g} kg; no handle weighs that"
+
+
+def inertia_about(calibration: LinkageCalibration, place_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Inertia (3, 3) at a place, kg, and its slopes (3, 3, 3), kg/m: entry [a] is the derivative along axis a.
+
+    A polynomial of the position, by least squares with weights that fall with the distance. Raises ValueError for fewer
+    than eight positions, or such that lie in a plane.
+    """
+    reach_m = float(np.linalg.norm(calibration.position_m, axis=1).max())
+    away = (calibration.position_m - place_m) / (reach_m or 1.0)
+    weights = np.exp(-0.5 * np.sum((away / NEAR_SHARE) ** 2, axis=1))[:, None]
+    for degree in DEGREES:
+        powers = [p for p in itertools.product(range(degree + 1), repeat=3) if sum(p) <= degree]
+        terms = weights * np.stack([np.prod(away ** np.array(power), axis=1) for power in powers], axis=1)
+        if len(away) >= SPARE * len(powers) and np.linalg.matrix_rank(terms) == len(powers):
+            found = np.linalg.lstsq(terms, weights * calibration.inertia_kg.reshape(-1, 9), rcond=None)[0]
+            linear = [powers.index((axis == 0, axis == 1, axis == 2)) for axis in range(3)]
+            return found[powers.index((0, 0, 0))].reshape(3, 3), found[linear].reshape(3, 3, 3) / reach_m
+    raise ValueError(f"{len(away)} positions do not tell how the inertia changes: it takes eight in space")

@@ -1,0 +1,70 @@
+"""Positions that the symmetry of a delta linkage maps onto each other, and the derivative of positions by joint angles
+in finite differences.
+
+Axes as everywhere: x from the base towards the operator, y right, z up. Azimuths from y towards z.
+"""
+
+import math
+
+import numpy as np
+
+from equalizer.linkage.calibration import CalibrationError
+from equalizer.signals.signal import FloatArray
+
+STEP_M = 2e-3
+"""Half the distance of a difference: some 200 counts of an encoder, and still a small part of an arm."""
+
+MOST_OFF_DEG = 5.0
+"""Of an arm from its place at a third of a turn."""
+
+
+def arm_azimuths(jacobian: FloatArray) -> FloatArray:
+    """Azimuths (3,) of the arms, rad, in the order of the joints, from J (3, 3) at a place on the base's axis.
+
+    There each row of the inverse of J lies along its forearm, in the plane of its arm; forearms point inwards and
+    towards the operator. Raises CalibrationError where these are no three planes a third of a turn apart.
+    """
+    rows = np.linalg.inv(jacobian)
+    rows = rows * np.sign(rows[:, :1])
+    outwards = np.arctan2(-rows[:, 2], -rows[:, 1])
+    turned = np.angle(np.exp(3j * outwards).mean()) / 3
+    thirds = np.round((outwards - turned) / (2 * math.pi / 3))
+    ideal = turned + thirds * 2 * math.pi / 3
+    off_deg = np.degrees(np.abs(outwards - ideal)).max()
+    if len(set(thirds.astype(int) % 3)) < 3 or off_deg > MOST_OFF_DEG:
+        told = ", ".join(f"{each:.0f}" for each in np.degrees(outwards))
+        raise CalibrationError((f"the arms lie at {told} degrees; those of a delta device are 120 degrees apart",))
+    azimuths: FloatArray = np.angle(np.exp(1j * ideal))
+    return azimuths
+
+
+def symmetric_grid(azimuths: FloatArray, radius_m: float, depth_m: float) -> FloatArray:
+    """Positions (185, 3), m: twelve directions at three radii, and the axis, in five planes.
+
+    Every mirror line maps the grid onto itself. The first is the centre.
+    """
+    points = [(0.0, 0.0, 0.0)]
+    for depth in np.linspace(-depth_m, depth_m, 5):
+        if depth:
+            points.append((float(depth), 0.0, 0.0))
+        for radius in radius_m * np.array([1, 2, 3]) / 3:
+            for twelfth in range(12):
+                azimuth = azimuths[0] + twelfth * math.pi / 6
+                points.append((float(depth), float(radius * math.cos(azimuth)), float(radius * math.sin(azimuth))))
+    return np.array(points)
+
+
+def beside(position_m: FloatArray) -> FloatArray:
+    """Positions (6, 3) a step before and behind along x, y, z: for `jacobian_by_differences`."""
+    steps: FloatArray = STEP_M * np.vstack([np.eye(3), -np.eye(3)])
+    return position_m + steps
+
+
+def difference_error(jacobian: FloatArray, positions_m: FloatArray, angles_rad: FloatArray) -> float:
+    """Largest relative difference between J (3, 3) and the inverse of d angle / d position in central differences.
+
+    positions_m, angles_rad: (6, 3), at the places of `beside`.
+    """
+    moved, turned = positions_m[:3] - positions_m[3:], angles_rad[:3] - angles_rad[3:]
+    by_differences = np.linalg.lstsq(turned, moved, rcond=None)[0].T
+    return float(np.abs(jacobian - by_differences).max() / np.abs(by_differences).max())

@@ -1,0 +1,107 @@
+"""The three mirror lines of a delta linkage: what they say of readings, and what they fill in.
+
+Each arm's plane (through the base's axis x) is a mirror R of the linkage: at the mirrored position the inertia is
+R M R, the Jacobian R J P and the joint angles P q, where P swaps the other two joints. Two directions mirrored about
+such a plane meet the same mass on it, which is why the study's two directions lie so.
+"""
+
+import numpy as np
+
+from equalizer.linkage.calibration import LinkageReading
+from equalizer.signals.signal import FloatArray
+
+WARN_FROM = 0.02
+"""Relative difference of inertia: moves an acceleration by 2 %, a fifth of the staircases' finest step (1 dB)."""
+
+NEAR_M = 1e-6
+ODD_SHARE = 0.5
+"""Below this share of the others' asymmetry a line is one that holds: its own arm is the odd one."""
+UPRIGHT = 1e-3
+"""Of the y component of a line's direction: gravity lies in its plane."""
+
+
+def reflection(azimuth_rad: float) -> FloatArray:
+    """(3, 3), about the plane through x at this azimuth."""
+    across = np.array([0.0, -np.sin(azimuth_rad), np.cos(azimuth_rad)])
+    mirror: FloatArray = np.eye(3) - 2 * np.outer(across, across)
+    return mirror
+
+
+def line_asymmetry(readings: list[LinkageReading], azimuths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """By line, (3,): largest |M(R p) - R M(p) R| over |M(p)| (spectral norms) of all readings with a mirror image,
+    0 without any; and positions (3, 3) where it is largest, m."""
+    worst, where = np.zeros(3), np.zeros((3, 3))
+    positions = np.array([reading.position_m for reading in readings])
+    for line, azimuth in enumerate(azimuths):
+        mirror = reflection(float(azimuth))
+        for reading in readings:
+            other = _nearest(positions, mirror @ reading.position_m)
+            if other is None:
+                continue
+            left = readings[other].inertia_kg - mirror @ reading.inertia_kg @ mirror
+            share = float(np.linalg.norm(left, 2) / np.linalg.norm(reading.inertia_kg, 2))
+            if share > worst[line]:
+                worst[line], where[line] = share, reading.position_m
+    return worst, where
+
+
+def fill_in(
+    readings: list[LinkageReading], azimuths: FloatArray, unread: FloatArray
+) -> tuple[list[LinkageReading], FloatArray]:
+    """Readings for those positions of unread (k, 3) that one or two mirrors bring to a position that was read, and the
+    positions for which there are none. Gravity only by an upright line, NaN else."""
+    filled, left = [], []
+    positions = np.array([reading.position_m for reading in readings])
+    once = [(line,) for line in range(3)]
+    for position in unread:
+        for lines in (*once, *((first, second) for first in range(3) for second in range(3) if first != second)):
+            wanted = position
+            for line in lines:
+                wanted = reflection(float(azimuths[line])) @ wanted
+            found = _nearest(positions, wanted)
+            if found is not None:
+                image = readings[found]
+                for line in reversed(lines):
+                    image = _mirrored(image, line, float(azimuths[line]))
+                filled.append(image)
+                break
+        else:
+            left.append(position)
+    return filled, np.array(left).reshape(-1, 3)
+
+
+def asymmetry_words(asymmetry: FloatArray, where_m: FloatArray, line_deg: FloatArray) -> tuple[str, ...]:
+    """Warnings; none where all lines hold."""
+    warnings = [
+        f"Mirrored about the line at {line_deg[line]:.0f} degrees the inertia differs by up to {asymmetry[line]:.1%}, "
+        f"most at ({', '.join(f'{1000 * each:.0f}' for each in where_m[line])}) mm; up to {WARN_FROM:.0%} is rounding "
+        "and assembly."
+        for line in range(3)
+        if asymmetry[line] > WARN_FROM
+    ]
+    order = np.argsort(asymmetry)
+    if len(warnings) == 2 and asymmetry[order[0]] < ODD_SHARE * asymmetry[order[1]]:
+        warnings.append(
+            f"The line at {line_deg[order[0]]:.0f} degrees holds and the other two do not: the arm in that line is "
+            "unlike the others. Directions mirrored about that line meet the same mass still."
+        )
+    return tuple(warnings)
+
+
+def _nearest(positions: FloatArray, wanted: FloatArray) -> int | None:
+    distances = np.linalg.norm(positions - wanted, axis=1)
+    nearest = int(np.argmin(distances))
+    return nearest if distances[nearest] < NEAR_M else None
+
+
+def _mirrored(reading: LinkageReading, line: int, azimuth_rad: float) -> LinkageReading:
+    mirror = reflection(azimuth_rad)
+    swapped = [line if joint == line else 3 - line - joint for joint in range(3)]
+    upright = abs(np.cos(azimuth_rad)) < UPRIGHT
+    return LinkageReading(
+        position_m=mirror @ reading.position_m,
+        joint_angle_rad=reading.joint_angle_rad[swapped],
+        jacobian=(mirror @ reading.jacobian)[:, swapped],
+        inertia_kg=mirror @ reading.inertia_kg @ mirror,
+        gravity_n=mirror @ reading.gravity_n if upright else np.full(3, np.nan),
+    )

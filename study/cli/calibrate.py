@@ -1,0 +1,40 @@
+"""`hapteq calibrate`: Jacobian, inertia and gravity of a device's linkage over its workspace."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+from study.cli.study import DeviceOption
+
+
+def calibrate(
+    out: Annotated[Path, typer.Option(help="The calibration to write, CAL.h5.")],
+    device: DeviceOption = "simulated",
+    radius: Annotated[float, typer.Option(help="Of the grid around the axis x, in metres.")] = 0.05,
+    depth: Annotated[float, typer.Option(help="Of the grid before and behind the centre, in metres.")] = 0.04,
+    as_json: JsonOption = False,
+) -> None:
+    """Ask the device for Jacobian, inertia and gravity at 185 positions, and compare them about the linkage's three
+    mirror lines. Its library computes them: nothing moves, the device stays braked.
+
+    `hapteq twin --calibration CAL.h5` and `--device simulated:CAL.h5` go on with it. (Another calibration, that of the
+    encoders after each power-up, is `hapteq doctor --calibrate`.)
+    """
+    from study.cli.progress import late_bar
+    from study.workflows.recording.calibrate_linkage import (
+        CalibrationPlan,
+        calibrate_linkage,
+        calibration_lines,
+        calibration_summary,
+    )
+
+    plan = CalibrationPlan(out, device, radius, depth)
+    with late_bar("Calibration (%)", total=100) as show:
+        written = calibrate_linkage(plan, lambda share: show(round(100 * share)))
+    told = json.dumps(calibration_summary(written), indent=2)
+    typer.echo(told if as_json else "\n".join((str(out), *calibration_lines(written))))
+    for warning in written.warnings:
+        typer.echo(f"Note: {warning}", err=True)

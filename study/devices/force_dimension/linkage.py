@@ -1,0 +1,133 @@
+"""What the vendor's library knows of an open device's linkage, at any position: computed, so nothing moves.
+
+A position becomes encoder counts, joint angles, Jacobian, inertia and gravity torques, each by a function of the
+library. The device gets no force and stays braked; where its handle is does not matter, beyond one comparison.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from ctypes import byref, c_double, c_int
+from typing import TypeVar
+
+import numpy as np
+
+from equalizer.linkage.calibration import LinkageReading
+from equalizer.signals.signal import FloatArray
+from study.devices.device import DeviceInfo
+from study.devices.force_dimension.connect import CALIBRATE, device_error, load_library, open_model
+from study.devices.force_dimension.handle import Handle
+from study.devices.force_dimension.lab import read_lab
+from study.devices.force_dimension.library import GEOMETRY_ERROR, LibraryError
+from study.devices.force_dimension.models import MODELS, DeviceModel
+from study.devices.force_dimension.rigs import info_of
+from study.errors import DeviceError
+
+Told = TypeVar("Told")
+
+JOINTS = 8
+"""DHD_MAX_DOF: joints of base, wrist and gripper."""
+DELTA = 0b111
+"""Mask of the base's three joints."""
+
+NEAR_M = 2e-4
+"""A position that comes back from its encoder counts further off is out of reach. Counts are 10 um or so apart."""
+SAME_M = 1e-3
+"""The handle's position against that of its own encoder counts."""
+
+
+class VendorLinkage:
+    def __init__(self, handle: Handle, model: DeviceModel, info: DeviceInfo) -> None:
+        self.info = info
+        self._handle, self._model = handle, model
+        self._library, self._number = handle.library, handle.number
+
+    def at(self, position_m: FloatArray) -> LinkageReading | None:
+        """None out of reach. Raises `DeviceError`."""
+        return self._asked(self._at, position_m)
+
+    def angles_at(self, position_m: FloatArray) -> FloatArray | None:
+        """As `at`, the joint angles alone."""
+        return self._asked(lambda place: self._angles(self._counts(place)), position_m)
+
+    def check_frame(self) -> None:
+        """Raises `DeviceError` where the library's delta functions and its positions do not mean the same axes."""
+        here = np.empty(3)
+        try:
+            self._handle.read_position(here)
+        except LibraryError as error:
+            raise device_error(self._model.name, error) from error
+        reading = self.at(here)
+        told = (c_double * JOINTS)()
+        self._library.call("dhdGetJointAngles", told, self._number)
+        if reading is not None and self._moves_by(reading, np.array(told[:3])) <= SAME_M:
+            return
+        raise DeviceError(
+            f"The linkage of the {self._model.name} was not read",
+            "Its library gives another position for the handle than its joint angles do: the handle was moved just "
+            "then, or the device's base was given an angle (dhdSetDeviceAngle), which turns its axes.",
+            "Leave the handle at rest, and set the base's angle to zero in other programs; then try again.",
+        )
+
+    def _moves_by(self, reading: LinkageReading, angles: FloatArray) -> float:
+        """How far the handle is from the reading's position, by its joint angles, m. A Jacobian that is no number is
+        refused later, by that name."""
+        jacobian = np.nan_to_num(reading.jacobian)
+        return float(np.linalg.norm(jacobian @ (angles - reading.joint_angle_rad)))
+
+    def _asked(self, ask: Callable[[FloatArray], Told | None], position_m: FloatArray) -> Told | None:
+        """None out of reach. Raises `DeviceError`."""
+        try:
+            return ask(position_m)
+        except LibraryError as error:
+            if error.code == GEOMETRY_ERROR:
+                return None
+            raise device_error(self._model.name, error) from error
+
+    def _counts(self, position_m: FloatArray) -> list[c_int]:
+        counts = [c_int() for _ in range(3)]
+        x, y, z = (float(each) for each in position_m)
+        self._library.call("dhdDeltaPositionToEncoder", x, y, z, *map(byref, counts), self._number)
+        return counts
+
+    def _angles(self, counts: list[c_int]) -> FloatArray:
+        return self._three("dhdDeltaEncodersToJointAngles", *counts)
+
+    def _at(self, position_m: FloatArray) -> LinkageReading | None:
+        counts = self._counts(position_m)
+        back = self._three("dhdDeltaEncoderToPosition", *counts)
+        if not float(np.linalg.norm(back - position_m)) <= NEAR_M:
+            return None
+        angles = self._angles(counts)
+        jacobian, inertia = (c_double * 9)(), (c_double * 36)()
+        self._library.call("dhdDeltaJointAnglesToJacobian", *(float(each) for each in angles), jacobian, self._number)
+        # A wrist stays where it is: its joints follow the base's three.
+        joints, torques = (c_double * JOINTS)(), (c_double * JOINTS)()
+        self._library.call("dhdGetJointAngles", joints, self._number)
+        joints[:3] = [float(each) for each in angles]
+        self._library.call("dhdJointAnglesToInertiaMatrix", joints, inertia, self._number)
+        self._library.call("dhdJointAnglesToGravityJointTorques", joints, torques, DELTA, self._number)
+        j = np.array(jacobian).reshape(3, 3)
+        held = np.linalg.pinv(j.T) @ np.array(torques[:3]) if np.isfinite(j).all() else np.full(3, np.nan)
+        return LinkageReading(np.array(position_m), angles, j, np.array(inertia).reshape(6, 6)[:3, :3], held)
+
+    def _three(self, name: str, *counts: c_int) -> FloatArray:
+        values = [c_double() for _ in range(3)]
+        self._library.call(name, *counts, *map(byref, values), self._number)
+        return np.array([value.value for value in values])
+
+
+@contextlib.contextmanager
+def vendor_linkage(name: str) -> Iterator[VendorLinkage]:
+    """An open device, braked. Raises `DeviceError`."""
+    model, library = MODELS[name], load_library()
+    handle = open_model(library, model)
+    try:
+        info = info_of(handle, library, model, read_lab().effective_mass_kg)
+        library.call("dhdEnableExpertMode")
+        if not handle.status().calibrated:
+            raise DeviceError(f"The {model.name} is not calibrated", "It does not know where its handle is.", CALIBRATE)
+        yield VendorLinkage(handle, model, info)
+    except LibraryError as error:
+        raise device_error(model.name, error) from error
+    finally:
+        handle.let_go()

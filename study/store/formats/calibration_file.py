@@ -1,0 +1,94 @@
+"""Calibrations of a linkage as HDF5: the format `hapteq-calibration`, version 1."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from equalizer.linkage.calibration import CalibrationError, LinkageCalibration
+from equalizer.signals.signal import FloatArray
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.hdf5_attributes import numbers_attribute, text_attribute
+from study.store.disk.hdf5_file import Problems, float_dataset, open_hdf5, write_hdf5
+from study.store.disk.layout import Entry
+from study.store.disk.strict_json import load_json
+
+FORMAT, VERSION = "hapteq-calibration", 1
+KIND = "calibration of a linkage"
+
+LAYOUT = (
+    Entry("format", "attribute, text", f"`{FORMAT}`"),
+    Entry("version", "attribute, whole number", f"{VERSION}"),
+    Entry("device", "attribute, text", "its name"),
+    Entry("details", "attribute, text", "serial number, firmware and SDK of a real one"),
+    Entry("read_on", "attribute, text", "date, ISO 8601"),
+    Entry("position_m", "(n, 3) float64", "of the handle: x towards the operator, y right, z up"),
+    Entry("joint_angle_rad", "(n, 3) float64", "the device's own zero and order"),
+    Entry("jacobian", "(n, 3, 3) float64", "m/rad: handle velocity = J joint speeds, joint torques = J^T handle force"),
+    Entry("inertia_kg", "(n, 3, 3) float64", "at the handle, in the axes of position_m"),
+    Entry("gravity_n", "(n, 3) float64", "force at the handle that holds it against gravity; NaN = not known"),
+    Entry("filled", "(n,) float64", "1 = by a mirror line, from another position; 0 = read"),
+    Entry("line_deg", "attribute, 3 numbers", "azimuth of the mirror lines, from y towards z, in the joints' order"),
+    Entry("asymmetry", "attribute, 3 numbers", "by line: largest relative difference from the mirrored inertia"),
+    Entry("difference", "attribute, number", "largest relative difference of J from finite differences"),
+    Entry("provenance", "attribute, JSON text", "versions, command", False),
+)
+
+ARRAYS = ("position_m", "joint_angle_rad", "jacobian", "inertia_kg", "gravity_n", "filled")
+DIMENSIONS = {"jacobian": "(positions, 3, 3)", "inertia_kg": "(positions, 3, 3)", "filled": "(positions)"}
+
+
+def read_calibration(path: Path) -> LinkageCalibration:
+    """Raises CannotReadError, or UnusableFileError with all problems."""
+    problems = Problems()
+    with open_hdf5(path, KIND, FORMAT, VERSION) as file:
+        parts = _parts(file, problems)
+    if problems.found:
+        raise UnusableFileError(path, KIND, tuple(problems.found))
+    try:
+        return LinkageCalibration(**parts)
+    except CalibrationError as error:
+        raise UnusableFileError(path, KIND, error.problems) from error
+
+
+def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
+    """Raises AlreadyThereError, CannotWriteError."""
+
+    def fill(file: Any) -> None:
+        file.attrs.update({"format": FORMAT, "version": VERSION, "difference": calibration.difference})
+        for name in ("device", "details", "read_on", "line_deg", "asymmetry"):
+            file.attrs[name] = getattr(calibration, name)
+        for name in ARRAYS:
+            file.create_dataset(name, data=getattr(calibration, name), fletcher32=True)
+        file.attrs["provenance"] = json.dumps(dict(calibration.provenance), allow_nan=False)
+
+    write_hdf5(path, fill, overwrite=False)
+
+
+def _parts(file: Any, problems: Problems) -> dict[str, Any]:
+    def array(name: str) -> FloatArray:
+        shape = DIMENSIONS.get(name, "(positions, 3)")
+        return problems.attempt(lambda: float_dataset(file, name, shape), np.empty(0))
+
+    def text(name: str) -> str:
+        return problems.attempt(lambda: text_attribute(file, name), "")
+
+    def numbers(name: str, count: int) -> FloatArray:
+        return np.array(problems.attempt(lambda: numbers_attribute(file, name, count), (0.0,) * count))
+
+    provenance: dict[str, Any] = problems.attempt(lambda: _provenance(file), {})
+    return {
+        **{name: text(name) for name in ("device", "details", "read_on")},
+        **{name: array(name) for name in ARRAYS},
+        **{name: numbers(name, 3) for name in ("line_deg", "asymmetry")},
+        "difference": float(numbers("difference", 1)[0]),
+        "provenance": provenance,
+    }
+
+
+def _provenance(file: Any) -> dict[str, Any]:
+    found = load_json(text_attribute(file, "provenance", "{}"))
+    if not isinstance(found, dict):
+        raise ValueError("the attribute 'provenance' must be a JSON object")
+    return found

@@ -1,0 +1,65 @@
+"""What the calibration of a device's linkage adds to its identified model: how the inertia changes along each axis."""
+
+import numpy as np
+
+from equalizer.linkage.calibration import LinkageCalibration, inertia_about
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
+from equalizer.signals.signal import FloatArray
+from study.errors import StudyError
+
+LEAST_PER_M = 0.05
+"""1/m: over the 20 mm that the spring lets the handle go this changes the mass by 0.1 %, which no recording shows."""
+
+
+def check_same_device(calibration: LinkageCalibration, device: str, title: str) -> None:
+    """Raises StudyError where the calibration is of another device than the one that was recorded."""
+    if calibration.device != device:
+        raise StudyError(
+            title,
+            f"The calibration is of the {calibration.device}; this is the {device}.",
+            "Give the calibration of this device (`hapteq calibrate`), or none.",
+            saved="Nothing was written.",
+        )
+
+
+def inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> tuple[ModelEffect, ...]:
+    """At the centre; an axis along which the inertia stays the same has none.
+
+    The effect's `per_m` counts the mass on the drive's side of the cables alone, so it is larger than of the whole.
+    """
+    slopes, axes = inertia_about(calibration, np.zeros(3))[1], driven_axes(model)
+    driven_kg = np.einsum("na,nm,ma->a", axes, model.mass, axes)
+    per_m = _own_slopes(slopes) / driven_kg
+    return tuple(
+        ModelEffect("pose_dependent_inertia", letter, {"per_m": float(each)})
+        for letter, each in zip("xyz", per_m, strict=True)
+        if abs(each) > LEAST_PER_M
+    )
+
+
+def calibration_notes(
+    model: MechanicalModel, identified_kg: FloatArray, calibration: LinkageCalibration
+) -> tuple[str, ...]:
+    """Sentences. identified_kg: (3,), masses along the axes as the recordings say."""
+    inertia, slopes = inertia_about(calibration, np.zeros(3))
+    told = np.diag(inertia)
+    apart = float(np.abs(identified_kg / told - 1).max())
+    named = {effect.axis for effect in model.effects}
+    changing = ", ".join(
+        f"{slope:.3g} kg/m along {letter}"
+        for letter, slope in zip("xyz", _own_slopes(slopes), strict=True)
+        if letter in named
+    )
+    return (
+        f"The calibration of the {calibration.device} says {', '.join(f'{each:.3g}' for each in told)} kg at the "
+        f"centre; the recordings say {', '.join(f'{each:.3g}' for each in identified_kg)} kg, up to {apart:.0%} apart. "
+        "The model has those of the recordings, with all that moves at the handle.",
+        f"How its inertia changes is the calibration's, as pose_dependent_inertia: {changing or 'nowhere'}. What "
+        "changes with the position across an axis is not in the model.",
+    )
+
+
+def _own_slopes(slopes: FloatArray) -> FloatArray:
+    """(3,): of the inertia along each axis with the position along that axis, kg/m."""
+    return np.array([slopes[axis, axis, axis] for axis in range(3)])

@@ -1,0 +1,202 @@
+"""Read a device's linkage over a grid of positions, check it, fill it in by its mirror lines, and write it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from equalizer.linkage.calibration import (
+    CalibrationError,
+    LinkageCalibration,
+    LinkageReading,
+    difference_problems,
+    reading_problems,
+)
+from equalizer.linkage.grid import STEP_M, arm_azimuths, beside, difference_error, symmetric_grid
+from equalizer.linkage.mirror_lines import asymmetry_words, fill_in, line_asymmetry
+from equalizer.signals.signal import FloatArray
+from study.devices.opening import linkage_of
+from study.errors import DeviceError, WrongUseError
+from study.store.disk.provenance import gather_provenance
+from study.store.formats.calibration_file import write_calibration
+from study.workflows.free_name import require_free
+
+if TYPE_CHECKING:
+    from study.devices.opening import LinkageSource
+
+TITLE = "The linkage was not calibrated"
+SAVED = "Nothing moved and nothing was written."
+LARGEST_M = 0.2
+SHOWN = 3
+"""Problems that an error tells; the others are counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationPlan:
+    out: Path
+    device: str = "simulated"
+    radius_m: float = 0.05
+    """Around the axis x."""
+    depth_m: float = 0.04
+    """Before and behind the centre."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WrittenCalibration:
+    plan: CalibrationPlan
+    calibration: LinkageCalibration
+    warnings: tuple[str, ...]
+    unknown: int
+    """Positions of the grid that could be neither read nor filled in."""
+
+
+def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None]) -> WrittenCalibration:
+    """Nothing moves: a device computes all of it. `on_progress(share)`. Raises StudyError; nothing is written then."""
+    require_free(plan.out, title=TITLE, kind="calibrations", saved=SAVED)
+    if not (STEP_M < plan.radius_m <= LARGEST_M and STEP_M < plan.depth_m <= LARGEST_M):
+        raise WrongUseError(
+            "There is no such grid",
+            f"--radius is {plan.radius_m:g} m and --depth {plan.depth_m:g} m; each must be above {STEP_M:g} m and at "
+            f"most {LARGEST_M:g} m.",
+            "Correct --radius or --depth.",
+            saved=SAVED,
+        )
+    try:
+        with linkage_of(plan.device) as linkage:
+            linkage.check_frame()
+            written = _read(linkage, plan, on_progress)
+    except CalibrationError as error:
+        raise _refused(plan.device, error.problems) from error
+    except DeviceError as error:
+        error.saved = SAVED
+        raise
+    write_calibration(plan.out, written.calibration)
+    on_progress(1.0)
+    return written
+
+
+def calibration_summary(written: WrittenCalibration) -> dict[str, Any]:
+    """As one JSON document."""
+    calibration = written.calibration
+    centre = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
+    masses = np.linalg.eigvalsh(calibration.inertia_kg)
+    return {
+        "calibration": str(written.plan.out),
+        "device": calibration.device,
+        "details": calibration.details,
+        "positions": {
+            "read": int((calibration.filled == 0).sum()),
+            "filled": int(calibration.filled.sum()),
+            "unknown": written.unknown,
+        },
+        "centre": {
+            "inertia_kg": calibration.inertia_kg[centre].tolist(),
+            "gravity_n": calibration.gravity_n[centre].tolist(),
+        },
+        "mass_kg": [float(masses.min()), float(masses.max())],
+        "lines": [
+            {"azimuth_deg": float(azimuth), "asymmetry": float(share)}
+            for azimuth, share in zip(calibration.line_deg, calibration.asymmetry, strict=True)
+        ],
+        "difference": calibration.difference,
+        "warnings": list(written.warnings),
+    }
+
+
+def calibration_lines(written: WrittenCalibration) -> tuple[str, ...]:
+    """For a person."""
+    told = calibration_summary(written)
+    positions, (least, most) = told["positions"], told["mass_kg"]
+    along = ", ".join(f"{told['centre']['inertia_kg'][axis][axis]:.3g}" for axis in range(3))
+    held = ", ".join(f"{each:.2g}" for each in told["centre"]["gravity_n"])
+    return (
+        f"{told['device']}, {told['details']}: {positions['read']} positions read, {positions['filled']} filled in by "
+        f"mirror lines, {positions['unknown']} unknown",
+        f"Inertia at the centre along x, y, z: {along} kg; {least:.3g} to {most:.3g} kg over all positions and "
+        f"directions; held against gravity by {held} N",
+        "Mirror lines, largest difference of inertia: "
+        + "; ".join(f"{line['azimuth_deg']:.0f} degrees {line['asymmetry']:.2%}" for line in told["lines"]),
+        f"Jacobian against finite differences of its own positions: {told['difference']:.2%}",
+    )
+
+
+def _read(linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]) -> WrittenCalibration:
+    """Raises CalibrationError, DeviceError."""
+    azimuths = arm_azimuths(_centre_jacobian(linkage))
+    readings, unread, worst = [], [], 0.0
+    problems: list[str] = []
+    grid = symmetric_grid(azimuths, plan.radius_m, plan.depth_m)
+    for number, position in enumerate(grid):
+        reading = linkage.at(position)
+        if reading is None:
+            unread.append(position)
+        else:
+            readings.append(reading)
+            problems += reading_problems(reading)
+            worst = max(worst, _difference_error(linkage, reading))
+        on_progress(number / len(grid))
+    if problems:
+        raise CalibrationError(tuple(problems))
+    filled, unknown = fill_in(readings, azimuths, np.array(unread).reshape(-1, 3))
+    asymmetry, where_m = line_asymmetry(readings, azimuths)
+    line_deg = np.degrees(azimuths)
+    calibration = LinkageCalibration(
+        device=linkage.info.name,
+        details=linkage.info.details,
+        read_on=datetime.now(UTC).date().isoformat(),
+        **_arrays([*readings, *filled]),
+        filled=np.array([0.0] * len(readings) + [1.0] * len(filled)),
+        line_deg=line_deg,
+        asymmetry=asymmetry,
+        difference=worst,
+        provenance=gather_provenance().as_dict(),
+    )
+    return WrittenCalibration(plan, calibration, asymmetry_words(asymmetry, where_m, line_deg), len(unknown))
+
+
+def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
+    """Raises CalibrationError, DeviceError."""
+    centre = linkage.at(np.zeros(3))
+    if centre is None:
+        raise CalibrationError(("the centre of the workspace is out of its reach",))
+    problems = tuple(reading_problems(centre)) or tuple(difference_problems(_difference_error(linkage, centre)))
+    if problems:
+        raise CalibrationError(problems)
+    return centre.jacobian
+
+
+def _difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
+    """Zero where a neighbour is out of reach, or where there is no number to compare: that is refused by itself."""
+    positions = beside(reading.position_m)
+    told = [each for position in positions if (each := linkage.angles_at(position)) is not None]
+    angles = np.array(told)
+    if len(told) < len(positions) or not np.isfinite(angles).all() or not np.isfinite(reading.jacobian).all():
+        return 0.0
+    return difference_error(reading.jacobian, positions, angles)
+
+
+def _arrays(readings: list[LinkageReading]) -> dict[str, Any]:
+    def stacked(values: list[FloatArray]) -> FloatArray:
+        return np.stack(values)
+
+    return {
+        "position_m": stacked([each.position_m for each in readings]),
+        "joint_angle_rad": stacked([each.joint_angle_rad for each in readings]),
+        "jacobian": stacked([each.jacobian for each in readings]),
+        "inertia_kg": stacked([each.inertia_kg for each in readings]),
+        "gravity_n": stacked([each.gravity_n for each in readings]),
+    }
+
+
+def _refused(name: str, problems: tuple[str, ...]) -> DeviceError:
+    more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
+    return DeviceError(
+        TITLE,
+        f"What {name} says of its linkage cannot be: {'; '.join(problems[:SHOWN])}{more}.",
+        "Calibrate its handle anew (`hapteq doctor --device NAME --calibrate`), try a smaller grid (--radius, --depth) "
+        "and the vendor's newest SDK; if it says the same then, do without: no other command needs it.",
+        saved=SAVED,
+    )
