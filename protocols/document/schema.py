@@ -101,8 +101,8 @@ def _below(root: Node, node: Node, part: str | int) -> Node | None:
         reference = node["discriminator"]["mapping"].get(part)
         return {"$ref": reference} if reference else None
     child: Node | None = node.get("properties", {}).get(part)
-    if child is None and isinstance(node.get("additionalProperties"), dict):
-        return node["additionalProperties"]
+    if child is None and isinstance(others := node.get("additionalProperties"), dict):
+        return others
     return child
 
 

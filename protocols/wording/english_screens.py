@@ -1,4 +1,4 @@
-"""English texts of the screens and of line mode. Keys that end in `_1` are for one thing, in `_n` for any other count."""
+"""English texts of the screens and of line mode. Keys in `_1` are for one thing, in `_n` for any other count."""
 
 SCREENS: dict[str, str] = {
     # Footer: what a key does. Short, because all keys of a screen stand in one line of 80 columns.
@@ -77,8 +77,8 @@ SCREENS: dict[str, str] = {
     "hold": "Hold the handle with a constant, comfortable grip. It shakes along 1 or 2:",
     "how": "Feel as long as you like, then press {keys}. Many trials are hard on purpose: if you cannot tell, guess. A "
     "guess can do no harm.",
-    "stop_any_time": "You may stop at any time: let go of the handle, or press p for a pause, which takes the force off "
-    "at once. Ctrl+C takes it off and leaves.",
+    "stop_any_time": "You may stop at any time: let go of the handle, or press p for a pause, which takes the force "
+    "off at once. Ctrl+C takes it off and leaves.",
     "not_felt": "Practice: the device is a simulation ({device}), so nothing moves here. Your answers are marked 'not "
     "felt' and never enter an analysis of people.",
     "enter_begins": "Press Enter to begin.",

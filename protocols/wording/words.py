@@ -16,7 +16,9 @@ def _pattern(text: str) -> re.Pattern[str]:
     """What a fact looks like when its braces are filled in."""
     parts = re.split(r"\{(\w+)\}", text)
     return re.compile(
-        "".join(f"(?P<{part}>.+?)" if odd else re.escape(part) for part, odd in zip(parts, _alternating(), strict=False)),
+        "".join(
+            f"(?P<{part}>.+?)" if odd else re.escape(part) for part, odd in zip(parts, _alternating(), strict=False)
+        ),
         re.DOTALL,
     )
 
@@ -25,7 +27,9 @@ def _alternating() -> list[bool]:
     return [False, True] * 20
 
 
-PATTERNS = {key: _pattern(text) for key, text in sorted(FACTS.items(), key=lambda fact: ("{" in fact[1], -len(fact[1])))}
+PATTERNS = {
+    key: _pattern(text) for key, text in sorted(FACTS.items(), key=lambda fact: ("{" in fact[1], -len(fact[1])))
+}
 """Exact sentences first, then the longest."""
 
 
@@ -37,7 +41,7 @@ class Words:
     def __getitem__(self, key: str) -> str:
         return self.own.get(key) or ENGLISH[key]
 
-    def fill(self, key: str, values: Mapping[str, str | int]) -> str:
+    def fill(self, key: str, values: Mapping[str, object]) -> str:
         """The text with its braces filled in. A text whose braces do not fit (of another version) is shown in English,
         because a participant must not lose a sentence."""
         fitting = placeholders(self[key]) == placeholders(ENGLISH[key])

@@ -33,7 +33,6 @@ CATALOGUES = {
 LONG_FILES = {"analysis/diagnosis/settings.py"}
 SMALL_BESIDE_THEIR_IMPORTER = {
     "study/devices/rigs_by_name.py",
-    "study/tui/app/everywhere.py",
     "study/tui/app/load_screens.py",
     "study/tui/app/outcomes.py",
     "study/workflows/diagnosis/clean_recordings.py",

@@ -37,11 +37,11 @@ class DoseElsewhere:
 
 @dataclass(frozen=True, config=FACT)
 class FormFilled:
-    """Consent, exclusion, set-up or debrief. What a form asks for the moment only (why a person may not take part)
-    is not kept: `answers` holds what the study needs."""
+    """Consent, exclusion, questions before the trials, set-up or debrief. What a form asks for the moment only (why a
+    person may not take part) is not kept: `answers` holds what the study needs."""
 
     utc: UtcTime
-    form: Literal["consent", "exclusion", "setup", "debrief"]
+    form: Literal["consent", "exclusion", "setup", "debrief", "questionnaire"]
     version: str
     """Of the form, as its protocol states it."""
     ethics_id: str

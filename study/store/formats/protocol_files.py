@@ -78,7 +78,7 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
     """A shipped protocol by its name, or any by its path.
 
     A lock beside the file or in `data` must match this protocol. Raises WrongUseError (no such protocol),
-    CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock, or a table of texts).
+    CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock, a table of texts).
     """
     path = None if name in list_shipped_protocols() else _path_of(name)
     text = (
