@@ -155,7 +155,7 @@ SCREENS: dict[str, str] = {
     "end_sitting": "The end of this sitting",
     "end_last_trial": "Thank you! This was the last trial.",
     "end_stops": "Thank you. The session stops here.",
-    "end_stops_because": "Thank you. The session stops here: {reason}",
+    "end_stops_because": "Thank you. The session stops here: {reason}.",
     "end_resume": "It can be resumed at the trial where it stopped.",
     "end_let_go": "You may let go of the handle.",
     "end_close": "Press Enter to close this page.",
@@ -228,7 +228,7 @@ SCREENS: dict[str, str] = {
     "line_over": "This sitting is over.",
     "line_over_because": "This sitting is over: {reason}.",
     "line_thanks": "Thank you.",
-    "line_check": "Device: {device}",
+    "line_check": "Device: {device}.",
     "line_check_look": "Something needs a look before you go on.",
     "line_check_prompt": "Enter goes on, c checks again, q leaves: ",
 }
