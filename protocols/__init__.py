@@ -1,8 +1,8 @@
 """What an experiment is: the numbers and rules that are fixed before a participant takes part. Pure; imports none of
 our other packages.
 
-Rooms: `definition` (what a TOML file may say) -> `document` (text to protocol and back, hash, lock) -> `procedure`
-(order, levels, draws). Read in this order:
+Rooms: `definition` (what a TOML file may say), `wording` (what a participant reads) -> `document` (text to protocol and
+back, hash, lock) -> `procedure` (order, levels, draws). Read in this order:
 
 `staircase_rule` and `staircase` (the rule that decides the next level), `study_protocol` and `recording_protocol` (what
 a TOML file may say), `schedule` (order and draws from keys), `trial` (one row of the results), `loading` (text to
