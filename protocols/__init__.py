@@ -1,8 +1,8 @@
 """The experiment: numbers and rules that are fixed before a participant takes part. Pure; imports none of our other
 packages.
 
-Folders: `definition` (schema of a TOML file) -> `document` (text to protocol and back, hash, lock) -> `procedure`
-(order, levels, random draws). Read in this order:
+Folders: `definition` (schema of a TOML file), `wording` (texts for participants) -> `document` (text to protocol and
+back, hash, lock) -> `procedure` (order, levels, random draws). Read in this order:
 
 `staircase_rule` and `staircase` (the rule that decides the next level), `study_protocol` and `recording_protocol`
 (schemas of TOML files), `schedule` (order and draws from keys), `trial` (one row of the results), `loading` (text to

@@ -138,7 +138,7 @@ def small_text() -> str:
     return SMALL
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def small_protocol() -> StudyProtocol:
     protocol = load_protocol(SMALL, "small.toml")
     assert isinstance(protocol, StudyProtocol)

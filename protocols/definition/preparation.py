@@ -6,10 +6,10 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from protocols.definition.field_types import StimulusFrequency
+from protocols.definition.participant_text import Sentence
 from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT
 
-Sentence = Annotated[str, Field(min_length=1, max_length=500)]
 RoveDb = Annotated[
     float,
     Field(
@@ -21,7 +21,6 @@ RoveDb = Annotated[
         "Default 0: one fixed level, as in protocols of before there was a range.",
     ),
 ]
-Key = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -177,14 +176,3 @@ class PracticeSettings:
             problems.append(Problem("trial_limit", f"is {self.trial_limit}, below of_last", f"at least {self.of_last}"))
         refuse(problems)
         return self
-
-
-@dataclass(frozen=True, config=STRICT)
-class DebriefQuestion:
-    """Asked after the last run."""
-
-    key: Annotated[Key, Field(description="Names the answer in the log.")]
-    question: Annotated[Sentence, Field(description="What is asked.")]
-    choices: Annotated[
-        tuple[Sentence, ...], Field(max_length=9, description="One of these; default: free text, which may stay empty.")
-    ] = ()

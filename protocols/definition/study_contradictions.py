@@ -77,8 +77,9 @@ def _names(protocol: StudyProtocol) -> list[Problem]:
     problems, buttons = [], protocol.trial.device_buttons
     if len(set(buttons)) not in (0, 2):
         problems.append(Problem("trial.device_buttons", f"is {list(buttons)}", "two different button numbers, or none"))
-    if len({question.key for question in protocol.debrief}) < len(protocol.debrief):
-        problems.append(Problem("debrief", "uses a key twice", "a key of its own for every question"))
+    for name, questions in (("before", protocol.before), ("debrief", protocol.debrief)):
+        if len({question.key for question in questions}) < len(questions):
+            problems.append(Problem(name, "uses a key twice", "a key of its own for every question"))
     contrast, played = protocol.analysis.contrast_hz, protocol.stimulus.frequencies_hz
     if contrast and (len(set(contrast)) != 2 or not set(contrast) <= set(played)):
         allowed = "two different ones of stimulus.frequencies_hz, or none"

@@ -10,9 +10,9 @@ from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.definition.field_types import Name, Source, StimulusFrequency, Title
 from protocols.definition.measurement import MeasurementSettings
+from protocols.definition.participant_text import Question, TextSettings
 from protocols.definition.preparation import (
     ConsentSettings,
-    DebriefQuestion,
     DemoSettings,
     MaskingSettings,
     PracticeSettings,
@@ -231,8 +231,13 @@ class StudyProtocol:
     limits: SittingLimits = Field(default_factory=SittingLimits)
     probes: ProbeSettings = Field(default_factory=ProbeSettings)
     analysis: AnalysisSettings = Field(default_factory=AnalysisSettings)
+    text: TextSettings = Field(default_factory=TextSettings)
+    before: Annotated[
+        tuple[Question, ...],
+        Field(max_length=20, description="Asked before the first trial, such as age. Default: nothing."),
+    ] = ()
     debrief: Annotated[
-        tuple[DebriefQuestion, ...], Field(max_length=20, description="Asked after the last run. Default: nothing.")
+        tuple[Question, ...], Field(max_length=20, description="Asked after the last run. Default: nothing.")
     ] = ()
 
     @property

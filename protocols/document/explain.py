@@ -10,7 +10,8 @@ from protocols.document.dumping import protocol_values
 from protocols.document.refusals import key_path
 from protocols.document.schema import Node, Place, describe_allowed, node_at, protocol_schema, resolve_reference
 
-Plain = str | int | float | bool | list[Any]
+Plain = str | int | float | bool | list[Any] | dict[str, str]
+"""A table of texts is a value of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +34,7 @@ def explain(protocol: StudyProtocol | RecordingProtocol) -> tuple[ExplainedField
 
 def _fields(root: Node, value: Any, place: Place) -> Iterator[ExplainedField]:
     node = resolve_reference(root, node_at(root, place) or {})
-    if isinstance(value, dict):
+    if isinstance(value, dict) and ("properties" in node or "oneOf" in node):
         # An entry of a mixed list: its kind picks the schema.
         tag = (value[node["discriminator"]["propertyName"]],) if "oneOf" in node else ()
         for key, inner in value.items():

@@ -6,6 +6,7 @@ from typing import Any
 
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
+from protocols.definition.participant_text import TextSettings
 from protocols.definition.plausibility import UNTOUCHED
 from protocols.definition.preparation import (
     ConsentSettings,
@@ -33,6 +34,8 @@ TABLES_SINCE = {
     "limits": SittingLimits(),
     "probes": ProbeSettings(),
     "analysis": AnalysisSettings(),
+    "text": TextSettings(),
+    "before": (),
     "debrief": (),
 }
 """Tables added after the first locks and sessions, with their default values. A table at its defaults is left out of
@@ -51,6 +54,14 @@ SENSOR_SINCE: dict[str, Untouched] = {
 
 SETUP_SINCE: dict[str, Untouched] = {"setup.daily_check_needed": False}
 
+QUESTIONS_SINCE: dict[str, Untouched] = {
+    "debrief.codes": [],
+    "debrief.number": [],
+    "debrief.unit": "",
+    "debrief.scale": [],
+    "debrief.ends": [],
+}
+
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
     "study": {
         "trial.device_buttons": [],
@@ -60,6 +71,7 @@ FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
         **TIMING_SINCE,
         **SENSOR_SINCE,
         **SETUP_SINCE,
+        **QUESTIONS_SINCE,
     },
     "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
 }

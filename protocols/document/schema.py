@@ -79,6 +79,8 @@ def describe_allowed(root: Node, node: Node, key: str = "") -> str:
             return _text(node)
         case "array":
             return _list(root, node, key)
+        case "object" if "properties" not in node:
+            return "a table of texts in quotes"
         case _:
             return f"a table with the keys {', '.join(keys_of(root, node))}"
 
@@ -99,6 +101,8 @@ def _below(root: Node, node: Node, part: str | int) -> Node | None:
         reference = node["discriminator"]["mapping"].get(part)
         return {"$ref": reference} if reference else None
     child: Node | None = node.get("properties", {}).get(part)
+    if child is None and isinstance(others := node.get("additionalProperties"), dict):
+        return others
     return child
 
 

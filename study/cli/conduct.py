@@ -8,12 +8,14 @@ from pathlib import Path
 
 import typer
 
+from protocols.wording.words import Words
 from study.cli.progress import answer_count
 from study.cli.record import announce
 from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.opening import REAL, needs_real_time
 from study.errors import WrongUseError
+from study.session.views.forms import words_of
 from study.store.disk.privacy import data_folder_warning
 from study.store.sessions.archive import check_subject, find_session
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
@@ -57,7 +59,8 @@ def begin(
     _say_wait(sitter.observer)
     in_real_time = sitter.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock()
-    with _participant(sitter.observer, plan.session.seed, sitter.keys, clock) as participant:
+    words = words_of(plan.session.protocol)
+    with _participant(sitter.observer, plan.session.seed, sitter.keys, clock, words) as participant:
         end = conduct_new(plan.session, device, participant)
     show(end_sitting(end, RealClock().utc()), as_json)
 
@@ -89,13 +92,15 @@ def go_on(
     in_real_time = opened.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock.not_before(state.sitting.last.utc)
     _say_wait(opened.observer)
-    with _participant(opened.observer, opened.seed, keys, clock) as participant:
+    with _participant(opened.observer, opened.seed, keys, clock, words_of(state.protocol)) as participant:
         end = conduct_resumed(folder, device, participant)
     show(end_sitting(end, RealClock().utc()), as_json)
 
 
 @contextmanager
-def _participant(observer: str | None, seed: int, keys: AnswerKeys, clock: Clock) -> Iterator[Participant]:
+def _participant(
+    observer: str | None, seed: int, keys: AnswerKeys, clock: Clock, words: Words
+) -> Iterator[Participant]:
     if observer is None and sys.stdin is None:
         raise WrongUseError(
             "There is nothing to read answers from",
@@ -104,7 +109,7 @@ def _participant(observer: str | None, seed: int, keys: AnswerKeys, clock: Clock
         )
     if observer is None:
         requests = QueuedRequests()
-        display = PlainDisplay(LineInput(), sys.stdout, clock, keys, note=requests.send)
+        display = PlainDisplay(LineInput(), sys.stdout, clock, keys, requests.send, words)
         yield Participant(display=display, hand=PersonsHand(), clock=clock, requests=requests)
         return
     with answer_count(f"simulated participant '{observer}'") as show_question:

@@ -23,13 +23,20 @@ def export(
     protocol: Annotated[
         str | None, typer.Option(help="Which protocol's sessions, where the folder holds several.")
     ] = None,
+    free_text: Annotated[
+        bool,
+        typer.Option(
+            "--free-text",
+            help="Also what participants wrote in their own words; it may be about health, or name a person.",
+        ),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write all trials with their protocol, seeds and versions. `hapteq analyze` takes psych-ds and csv back."""
     from study.workflows.results.collect_sessions import collect_sessions
     from study.workflows.results.export_study import export_study
 
-    done = export_study(collect_sessions(data, protocol), data, out, form)
+    done = export_study(collect_sessions(data, protocol), data, out, form, free_text)
     if as_json:
         typer.echo(json.dumps({"out": str(done.out), "files": done.files, "trials": done.trials}, indent=2))
         return

@@ -12,7 +12,7 @@ from study.cli.study import DataOption
 app = typer.Typer(
     cls=Subcommands,
     add_completion=False,
-    help="List, show and lock protocols.",
+    help="List, show, translate and lock protocols.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -57,6 +57,16 @@ def show(
         typer.echo(f"\n{field.key} = {field.value}")
         typer.echo(f"    {field.description}")
         typer.echo(f"    Allowed: {field.allowed}.")
+
+
+@app.command("texts")
+def texts(
+    language: Annotated[str, typer.Argument(help="en, de, es, or a file, which is checked first.")] = "en",
+) -> None:
+    """All texts that a participant reads, as a TOML file to translate, for [text] language in a protocol."""
+    from study.store.formats.participant_texts import language_template
+
+    typer.echo(language_template(language), nl=False)
 
 
 @app.command("lock")

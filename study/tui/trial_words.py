@@ -3,52 +3,76 @@
 from typing import Literal
 
 from protocols.trial import Phase
-from study.session.views.views import Progress, Question, Task, Welcome
+from protocols.wording.words import ENGLISH_WORDS, Words
+from study.session.facts.void_reasons import ACCELERATION_MISSING, SCREEN_SILENT, computer_too_busy
+from study.session.views.form_views import Form, Limits
+from study.session.views.views import DemoMenu, Progress, Question, Task, Welcome
 
-WITHDRAW = "withdraw"
-"""Must be typed completely: a single key must not erase a session."""
 
-
-def heading(question: Question) -> str:
+def heading(question: Question, words: Words = ENGLISH_WORDS) -> str:
     """Run and trial number."""
-    again = ", once more" if question.repeated else ""
-    return (
-        f"{run_name(question)} {question.run_number} of {question.runs_in_phase}, trial {question.trial_number}{again}"
-    )
+    place = {
+        "run": words[run_key(question)],
+        "number": question.run_number,
+        "runs": question.runs_in_phase,
+        "trial": question.trial_number,
+    }
+    return words.fill("heading_again" if question.repeated else "heading", place)
 
 
-def run_name(question: Question) -> str:
+def run_key(question: Question) -> str:
+    """Of what the kind of run is called."""
     if question.practice:
-        return "Practice"
+        return "run_practice"
     if question.task is Task.INTERVAL:
-        return "Interval run"
-    return "Training" if question.phase is Phase.TRAINING else "Run"
+        return "run_interval"
+    return "run_training" if question.phase is Phase.TRAINING else "run_test"
 
 
-def progress_sentence(progress: Progress) -> str:
-    left = ""
-    if progress.minutes_left is not None:
-        left = f", about {progress.minutes_left} minute{'s' if progress.minutes_left != 1 else ''} left"
-    return f"{progress.share_done:.0%} of the session is done{left}."
+def progress_sentence(progress: Progress, words: Words = ENGLISH_WORDS) -> str:
+    share, minutes = round(100 * progress.share_done), progress.minutes_left
+    if minutes is None:
+        return words.fill("done", {"share": share})
+    return words.fill("done_left_1" if minutes == 1 else "done_left_n", {"share": share, "count": minutes})
 
 
-def runs_left(runs: int) -> str:
-    return "1 run is left." if runs == 1 else f"{runs} runs are left."
+def plan(notice: Welcome, words: Words = ENGLISH_WORDS) -> str:
+    if not notice.runs:
+        return words["plan_training"]
+    return words.counted("plan_training_runs" if notice.training_runs else "plan_runs", notice.runs)
 
 
-def plan(notice: Welcome) -> str:
-    runs = f"{notice.runs} run{'s' if notice.runs != 1 else ''}"
-    if notice.training_runs and notice.runs:
-        return f"There is some training first, then {runs} with rests between them."
-    return f"There {'are' if notice.runs != 1 else 'is'} {runs}." if notice.runs else "This is a training session."
+def felt_so_far(menu: DemoMenu, vibration: int, words: Words = ENGLISH_WORDS) -> str:
+    """Which directions of a vibration were felt in the demonstration."""
+    felt = [str(number) for number in (1, 2) if (vibration, number) in menu.felt]
+    if not felt:
+        return words["demo_none"]
+    both = words.fill("demo_and", {"first": felt[0], "second": felt[-1]})
+    return words.fill("demo_felt", {"numbers": both if len(felt) == 2 else felt[0]})
 
 
-def refusal_words(outcome: Literal["refused", "excluded"]) -> tuple[str, ...]:
+def void_words(reason: str, words: Words = ENGLISH_WORDS) -> str:
+    """After a trial was cut short."""
+    if computer_too_busy(reason):
+        return words["void_busy"]
+    if reason == SCREEN_SILENT:
+        return words["void_screen"]
+    if reason.endswith(ACCELERATION_MISSING):
+        return words["void_sensor"]
+    return words.fill("void_because", {"reason": words.fact(reason)})
+
+
+def refusal_words(outcome: Literal["refused", "excluded"], words: Words = ENGLISH_WORDS) -> tuple[str, ...]:
     """Last words to a person who does not take part."""
-    kept = "Nothing was played, and only this is kept."
-    if outcome == "refused":
-        return ("Thank you for coming. You decided not to take part, and that is fine.", kept)
-    return (
-        "Thank you for coming. With one of your answers you cannot take part in this study.",
-        f"{kept} Which answer it was is not kept. The experimenter can tell you more.",
-    )
+    return words[outcome], words[f"{outcome}_kept"]
+
+
+def origin(form: Form, words: Words = ENGLISH_WORDS) -> str:
+    """Version and ethics approval of a form; empty where it has neither."""
+    version = words.fill("form_version", {"version": form.version}) if form.version else ""
+    ethics = words.fill("form_ethics", {"number": form.ethics_id}) if form.ethics_id else ""
+    return " ".join(filter(None, (version, ethics)))
+
+
+def limits_words(limits: Limits, words: Words = ENGLISH_WORDS) -> str:
+    return words.fill("form_number", {"lowest": f"{limits.lowest:g}", "highest": f"{limits.highest:g}"})

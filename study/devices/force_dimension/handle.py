@@ -57,6 +57,11 @@ class Handle:
         self._set_force = library.function("dhdSetForce")
         self._open = True
 
+    def position_m(self) -> tuple[float, float, float]:
+        x, y, z = c_double(), c_double(), c_double()
+        self.library.call("dhdGetPosition", byref(x), byref(y), byref(z), self.number)
+        return x.value, y.value, z.value
+
     def velocity_mps(self) -> tuple[float, float, float]:
         """Velocity as estimated by the library, over its last 20 ms."""
         x, y, z = c_double(), c_double(), c_double()

@@ -93,8 +93,8 @@ class Library:
         return _version_words(self.version)
 
     def function(self, name: str) -> Callable[..., Any]:
-        """Unchecked, for calls at every tick: what it returns is for `check_answer` to judge. Raises `DeviceError` where a
-        function that not every use needs is missing."""
+        """Unchecked, for calls at every tick: what it returns is for `check_answer` to judge. Raises `DeviceError`
+        where a function that not every use needs is missing."""
         if name not in self._functions:
             raise _too_old(f"{self.path} has no {name}")
         return self._functions[name]

@@ -51,9 +51,8 @@ class VendorLinkage:
 
     def check_frame(self) -> None:
         """Raises `DeviceError` where the library's delta functions and its positions do not mean the same axes."""
-        here = np.empty(3)
         try:
-            self._handle.read_position(here)
+            here = np.array(self._handle.position_m())
         except LibraryError as error:
             raise device_error(self._model.name, error) from error
         reading = self.at(here)

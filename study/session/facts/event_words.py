@@ -189,6 +189,9 @@ def _describe_form(event: FormFilled) -> str:
         case "setup":
             how = "; ".join(f"{key.replace('_', ' ')}: {_one_line(said)}" for key, said in event.answers.items())
             return f"Set-up. {how[:1].upper()}{how[1:]}." if how else "The set-up was gone through."
+        case "questionnaire":
+            asked = _count(len(event.answers), "question")
+            return f"Before the trials: {asked} answered; the answers stay in the log file."
         case "debrief":
             return f"Debrief: {_count(len(event.answers), 'question')} answered; the answers stay in the log file."
 

@@ -37,11 +37,11 @@ class DoseElsewhere:
 
 @dataclass(frozen=True, config=FACT)
 class FormFilled:
-    """Answers to a form: consent, exclusion, set-up or debrief. Answers that matter only at the moment (why a person
-    may not take part) are not kept: `answers` contains what the study needs."""
+    """Answers to a form: consent, exclusion, questions before the trials, set-up or debrief. Answers that matter only
+    at the moment (why a person may not take part) are not kept: `answers` contains what the study needs."""
 
     utc: UtcTime
-    form: Literal["consent", "exclusion", "setup", "debrief"]
+    form: Literal["consent", "exclusion", "setup", "debrief", "questionnaire"]
     version: str
     """Version of the form, as stated by its protocol."""
     ethics_id: str

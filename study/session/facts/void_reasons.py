@@ -18,8 +18,6 @@ LOAD_PER_PROCESSOR = 0.75
 ENGINE_LATE_S = 0.1
 """A delay of the engine's own wake-up (s) that shows a busy computer: more than twice the polling interval."""
 
-_NOT_YOU = "This was not your fault, and the trial is repeated."
-
 
 def why_screen_silent(engine_late_s: float, load_per_processor: float | None) -> str:
     """The reason to log. engine_late_s: how late the engine itself woke up; load_per_processor: None if unknown."""
@@ -30,20 +28,6 @@ def why_screen_silent(engine_late_s: float, load_per_processor: float | None) ->
 def computer_too_busy(reason: str) -> bool:
     """Whether this reason says that the computer was too busy; False also if unknown."""
     return reason in (SCREEN_LATE, PROGRAM_STALLED) or reason.endswith((TICKS_MISSED, TICKS_LATE, TICK_HELD))
-
-
-def void_for_participant(reason: str) -> str:
-    """Text for the participant after a trial was cut short."""
-    if computer_too_busy(reason):
-        return f"The computer was too busy for a moment, so the trial could not be played as it should. {_NOT_YOU}"
-    if reason == SCREEN_SILENT:
-        return (
-            "The screen did not react for a moment: it was stopped, or the computer was too busy. The force was taken "
-            f"away. {_NOT_YOU}"
-        )
-    if reason.endswith(ACCELERATION_MISSING):
-        return f"The sensor at the handle was not heard well enough in this trial. {_NOT_YOU}"
-    return f"It is void: {reason}."
 
 
 TOO_BUSY = "the computer is too busy"

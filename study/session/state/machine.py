@@ -59,6 +59,7 @@ def next_preparation(state: SessionState) -> Preparation | None:
     forms = (
         (FormKind.CONSENT, sitting.consented),
         (FormKind.EXCLUSION, sitting.included),
+        (FormKind.QUESTIONNAIRE, sitting.questioned),
         (FormKind.SETUP, sitting.setup_done),
     )
     for kind, done in forms:

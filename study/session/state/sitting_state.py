@@ -24,7 +24,7 @@ class Night:
 
 @dataclass(frozen=True, slots=True)
 class SittingState:
-    """Consent, inclusion, demonstration and debrief hold for the session; set-up and check for one sitting."""
+    """Consent, inclusion, questions, demonstration, debrief hold for the session; set-up and check for one sitting."""
 
     consented: bool = False
     included: bool = False
@@ -32,6 +32,7 @@ class SittingState:
     """Why nothing may be played: see TURNED_AWAY; empty if allowed."""
     placed: bool = False
     """The place in the balanced order is taken."""
+    questioned: bool = False
     setup_done: bool = False
     device_checked: bool = False
     demo_done: bool = False
@@ -75,6 +76,8 @@ def fill_in(sitting: SittingState, event: FormFilled) -> SittingState:
             return replace(sitting, consented=event.passed, turned_away="" if event.passed else "refused")
         case "exclusion":
             return replace(sitting, included=event.passed, turned_away="" if event.passed else "excluded")
+        case "questionnaire":
+            return replace(sitting, questioned=True)
         case "setup":
             return replace(sitting, setup_done=True)
         case "debrief":

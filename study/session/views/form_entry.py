@@ -125,7 +125,10 @@ def _press_choice(entry: FormEntry, field: FormField, key: str, character: str |
         return _with(entry, marked=move_mark(given.marked, 1 if key == "right" else -1, len(field.choices)))
     if key in ("space", "enter"):
         chosen = entry if given.marked is None else _choose(entry, given.marked)
-        return go_to(chosen, entry.at + 1) if key == "enter" and chosen.given[entry.at].answer else chosen
+        leaves = chosen.given[entry.at].answer or not field.needed
+        return go_to(chosen, entry.at + 1) if key == "enter" and leaves else chosen
+    if key in ("backspace", "delete") and not field.needed:
+        return _with(entry, answer="")
     named = find_choice(field.choices, character) if character else None
     return None if named is None else _choose(entry, named)
 

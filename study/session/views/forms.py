@@ -2,43 +2,63 @@
 
 from dataclasses import dataclass
 
-from protocols.definition.preparation import ConsentSettings, DebriefQuestion, SetupSettings
+from protocols.definition.participant_text import Question
+from protocols.definition.preparation import ConsentSettings, SetupSettings
 from protocols.definition.probes import ProbeSettings
 from protocols.definition.study_protocol import StudyProtocol
-from study.session.views.form_views import Form, FormField, FormKind, FormReply
+from protocols.wording.words import ENGLISH_WORDS, Words
+from study.session.views.form_views import Form, FormField, FormKind, FormReply, Limits, coded
 
 YES_NO = ("yes", "no")
-HEARING = ("ear plugs", "ear muffs", "masking noise", "plugs and noise", "nothing")
+"""As they are kept; what is shown depends on the language."""
+HEARING = {
+    "ear plugs": "hearing_plugs",
+    "ear muffs": "hearing_muffs",
+    "masking noise": "hearing_noise",
+    "plugs and noise": "hearing_both",
+    "nothing": "hearing_nothing",
+}
+GRIPS = {"pen grip": "grip_pen", "whole hand": "grip_hand", "finger tips": "grip_tips", "other": "grip_other"}
+HANDS = {"right": "hand_right", "left": "hand_left"}
+"""What is kept, and the key of its text."""
 
 
 @dataclass(frozen=True, slots=True)
 class FormOutcome:
     passed: bool
     kept: dict[str, str]
-    """Answers that go into the log."""
+    """Answers that go into the log, in codes that do not depend on the language."""
     reminder: str = ""
-    """Where the set-up differs from the protocol; empty if it agrees."""
+    """Where the set-up differs from the protocol, in English, as it is logged; empty if it agrees."""
+
+
+def words_of(protocol: StudyProtocol) -> Words:
+    """Everything that its participants read."""
+    return Words(protocol.text.words)
 
 
 def form_of(protocol: StudyProtocol, kind: FormKind) -> Form | None:
     """The form; None if the protocol asks nothing of that kind."""
+    words = words_of(protocol)
     match kind:
         case FormKind.CONSENT:
-            return _consent(protocol) if protocol.consent.statements or protocol.probes.played else None
+            return _consent(protocol, words) if protocol.consent.statements or protocol.probes.played else None
         case FormKind.EXCLUSION:
-            return _exclusion(protocol.consent) if protocol.consent.exclusions else None
+            return _exclusion(protocol.consent, words) if protocol.consent.exclusions else None
+        case FormKind.QUESTIONNAIRE:
+            return _questions(kind, "questions", protocol.before, words) if protocol.before else None
         case FormKind.SETUP:
-            return _setup(protocol.setup) if protocol.setup.ask else None
+            return _setup(protocol.setup, words) if protocol.setup.ask else None
         case FormKind.DEBRIEF:
-            return _debrief(protocol.debrief) if protocol.debrief else None
+            return _questions(kind, "debrief", protocol.debrief, words) if protocol.debrief else None
         case FormKind.HANDLE:
-            return _let_go(protocol) if protocol.probes.reference_s > 0 else None
+            return _let_go(protocol, words) if protocol.probes.reference_s > 0 else None
 
 
-def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> FormOutcome:
+def judge_form(protocol: StudyProtocol, form: Form, reply: FormReply) -> FormOutcome:
     """Whether the form is passed, and what of it is kept."""
-    answers = {key: answer.strip() for key, answer in reply.answers.items()}
-    match kind:
+    answers = coded(form, reply)
+    match form.kind:
         case FormKind.CONSENT:
             agreed = all(answer == "yes" for answer in answers.values())
             # Of a person who does not take part only that is kept.
@@ -48,120 +68,100 @@ def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> For
             return FormOutcome(all(answer == "no" for answer in answers.values()), {})
         case FormKind.SETUP:
             return FormOutcome(True, answers, _reminder(protocol.setup, answers))
-        case FormKind.DEBRIEF:
+        case FormKind.QUESTIONNAIRE | FormKind.DEBRIEF:
             return FormOutcome(True, {key: answer for key, answer in answers.items() if answer})
         case FormKind.HANDLE:
             return FormOutcome(answers.get("free") == "yes", {})
 
 
-def confirmation_of(form: Form, reply: FormReply) -> Form:
+def confirmation_of(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS) -> Form:
     """Confirmation form before a refused consent or an exclusion becomes final."""
-    consent = form.kind is FormKind.CONSENT
-    given, other = ("no", "yes") if consent else ("yes", "no")
-    told = [f"“{field.label}”" for field in form.fields if reply.answers.get(field.key, "").strip() != other]
-    end = "you do not take part in the study" if consent else "you cannot take part in the study"
+    consent, answers = form.kind is FormKind.CONSENT, coded(form, reply)
+    told = [f"“{field.label}”" for field in form.fields if answers[field.key] != ("yes" if consent else "no")]
     return Form(
         form.kind,
-        "Please check your answer",
-        f"You answered {given} to: {' '.join(told)}",
-        (FormField("right", f"With this answer {end}, and nothing is played. Is that right?", YES_NO),),
+        words["confirm_title"],
+        words.fill("confirm_no" if consent else "confirm_yes", {"questions": " ".join(told)}),
+        (_yes_no("right", words["confirm_refused" if consent else "confirm_excluded"], words),),
         form.version,
         form.ethics_id,
     )
 
 
-def is_confirmed(reply: FormReply) -> bool:
+def is_confirmed(confirmation: Form, reply: FormReply) -> bool:
     """Whether the answers were confirmed; otherwise the form is filled in again."""
-    return reply.answers.get("right", "").strip() == "yes"
+    return coded(confirmation, reply)["right"] == "yes"
 
 
-def _consent(protocol: StudyProtocol) -> Form:
+def _yes_no(key: str, label: str, words: Words) -> FormField:
+    return FormField(key, label, tuple(words[each] for each in YES_NO), codes=YES_NO)
+
+
+def _one_of(key: str, label: str, choices: dict[str, str], words: Words) -> FormField:
+    return FormField(key, label, tuple(words[each] for each in choices.values()), codes=tuple(choices))
+
+
+def _consent(protocol: StudyProtocol, words: Words) -> Form:
     """Probes are consented to by a statement of their own, which no protocol can leave out."""
     settings = protocol.consent
-    statements = (*settings.statements, *probe_statements(protocol.probes))
+    statements = (*settings.statements, *probe_statements(protocol.probes, words))
     fields = tuple(
-        FormField(f"statement_{number}", statement, YES_NO) for number, statement in enumerate(statements, start=1)
+        _yes_no(f"statement_{number}", statement, words) for number, statement in enumerate(statements, start=1)
     )
-    return Form(
-        FormKind.CONSENT,
-        "Consent",
-        "Please read each statement. The study begins only if you agree to all of them.",
-        fields,
-        settings.version,
-        settings.ethics_id,
-    )
+    origin = settings.version, settings.ethics_id
+    return Form(FormKind.CONSENT, words["consent_title"], words["consent_intro"], fields, *origin)
 
 
-def probe_statements(probes: ProbeSettings) -> tuple[str, ...]:
+def probe_statements(probes: ProbeSettings, words: Words = ENGLISH_WORDS) -> tuple[str, ...]:
     """What a participant agrees to beside the trials."""
     if not probes.levels_n:
         return ()
-    often = f"at most once in {probes.interval_s:g} seconds"
-    return (
-        f"Between trials, {often}, the handle may shake weakly for under two seconds (at most {max(probes.levels_n):g} "
-        "newtons), so that the device and my grip can be measured. Nothing is asked about it.",
-    )
+    strongest = {"seconds": f"{probes.interval_s:g}", "newtons": f"{max(probes.levels_n):g}"}
+    return (words.fill("consent_probes", strongest),)
 
 
-def _let_go(protocol: StudyProtocol) -> Form:
+def _let_go(protocol: StudyProtocol, words: Words) -> Form:
     probes = protocol.probes
+    shaken = {"seconds": f"{probes.reference_s + 5:.0f}", "newtons": f"{probes.reference_n:g}"}
+    free = {"yes": "yes", "not now": "let_go_not_now"}
     return Form(
         FormKind.HANDLE,
-        "Let go of the handle",
-        f"Take the hand off the handle and keep it away. It will shake for {probes.reference_s + 5:.0f} seconds, "
-        f"with at most {probes.reference_n:g} newtons.",
-        (FormField("free", "Is the handle free, and does nothing touch it?", ("yes", "not now")),),
+        words["let_go_title"],
+        words.fill("let_go_intro", shaken),
+        (_one_of("free", words["let_go_free"], free, words),),
     )
 
 
-def take_the_handle() -> Form:
+def take_the_handle(words: Words = ENGLISH_WORDS) -> Form:
     """After a reference."""
-    return Form(
-        FormKind.HANDLE,
-        "Take the handle again",
-        "The measurement without a hand is over.",
-        (FormField("held", "Do you hold the handle as before?", ("yes",)),),
-    )
+    held = _one_of("held", words["take_held"], {"yes": "yes"}, words)
+    return Form(FormKind.HANDLE, words["take_title"], words["take_intro"], (held,))
 
 
-def _exclusion(settings: ConsentSettings) -> Form:
+def _exclusion(settings: ConsentSettings, words: Words) -> Form:
     fields = tuple(
-        FormField(f"question_{number}", question, YES_NO)
-        for number, question in enumerate(settings.exclusions, start=1)
+        _yes_no(f"question_{number}", question, words) for number, question in enumerate(settings.exclusions, start=1)
     )
-    return Form(
-        FormKind.EXCLUSION,
-        "Before anything moves",
-        "With one yes you cannot take part today. Your answers are not kept, only whether you can take part.",
-        fields,
-        settings.version,
-        settings.ethics_id,
-    )
+    origin = settings.version, settings.ethics_id
+    return Form(FormKind.EXCLUSION, words["exclusion_title"], words["exclusion_intro"], fields, *origin)
 
 
-def _setup(settings: SetupSettings) -> Form:
-    wanted = "The protocol asks for {}."
+def _setup(settings: SetupSettings, words: Words) -> Form:
+    def asked(key: str, wished: bool) -> str:
+        return f"{words[key]} {words[f'{key}_wanted']}" if wished else words[key]
+
     return Form(
         FormKind.SETUP,
-        "How you sit",
-        "Arrange these with the experimenter; they are kept with the data.",
+        words["setup_title"],
+        words["setup_intro"],
         (
-            FormField("hearing", _add_wish("What covers the sound of the device?", wanted.format(
-                "ear protection or masking noise (hapteq noise makes a file)"), settings.hearing_masked), HEARING),
-            FormField("hand_hidden", _add_wish("Is the hand hidden from your eyes?", wanted.format("a hidden hand"),
-                                            settings.hand_hidden), YES_NO),
-            FormField("arm_supported", _add_wish(
-                "Does your forearm rest on a support?", wanted.format("a supported arm"),
-                settings.arm_supported), YES_NO),
-            FormField("grip", f"How do you hold the handle? Asked for: {settings.grip}.",
-                      ("pen grip", "whole hand", "finger tips", "other")),
-            FormField("hand", "Which hand holds it?", ("right", "left")),
+            _one_of("hearing", asked("setup_hearing", settings.hearing_masked), HEARING, words),
+            _yes_no("hand_hidden", asked("setup_hidden", settings.hand_hidden), words),
+            _yes_no("arm_supported", asked("setup_arm", settings.arm_supported), words),
+            _one_of("grip", words.fill("setup_grip", {"grip": settings.grip}), GRIPS, words),
+            _one_of("hand", words["setup_hand"], HANDS, words),
         ),
-    )  # fmt: skip
-
-
-def _add_wish(question: str, wish: str, wished: bool) -> str:
-    return f"{question} {wish}" if wished else question
+    )
 
 
 def _reminder(setup: SetupSettings, answers: dict[str, str]) -> str:
@@ -174,13 +174,18 @@ def _reminder(setup: SetupSettings, answers: dict[str, str]) -> str:
     return f"The set-up is not the protocol's: {told}." if told else ""
 
 
-def _debrief(questions: tuple[DebriefQuestion, ...]) -> Form:
-    return Form(
-        FormKind.DEBRIEF,
-        "Looking back",
-        "A few questions to end with. Free text may stay empty.",
-        tuple(
-            FormField(question.key, question.question, question.choices, needed=bool(question.choices))
-            for question in questions
-        ),
-    )
+def _questions(kind: FormKind, name: str, questions: tuple[Question, ...], words: Words) -> Form:
+    """None of them needs an answer: taking part does not depend on them."""
+    fields = tuple(_question(question, words) for question in questions)
+    return Form(kind, words[f"{name}_title"], words[f"{name}_intro"], fields)
+
+
+def _question(question: Question, words: Words) -> FormField:
+    label = question.question
+    if question.ends:
+        meaning = {"low_end": question.ends[0], "high_end": question.ends[1]}
+        steps = {"lowest": question.scale[0], "highest": question.scale[1]}
+        label = f"{label} ({words.fill('form_scale', {**steps, **meaning})})"
+    limits = Limits(*question.number) if question.number else None
+    choices = question.choices or question.steps
+    return FormField(question.key, label, choices, needed=False, codes=question.codes, limits=limits)

@@ -154,11 +154,9 @@ class DeviceReport:
         return all(finding.fine for finding in self.findings)
 
     @property
-    def conclusion(self) -> str:
-        """Empty where something is wrong."""
-        if any(finding.wrong for finding in self.findings):
-            return ""
-        return "The device is ready." if self.fine else "The device is ready; mind the warning above."
+    def usable(self) -> bool:
+        """Warnings aside, nothing is wrong."""
+        return not any(finding.wrong for finding in self.findings)
 
 
 @dataclass(frozen=True, slots=True)

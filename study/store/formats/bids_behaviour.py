@@ -11,13 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from protocols.trial import Trial
+from study.session.views.form_views import number_in
 from study.store.disk.csv_rows import columns, rows_to_csv
 from study.store.disk.text_file import write_text
+from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 VERSION = "1.10.0"
 FIXED = ("subject", "session")
 """Columns that are part of the file name instead."""
+
+PARTICIPANT_COLUMNS: dict[str, tuple[str, ...]] = {
+    "age": (),
+    "sex": ("male", "female", "other"),
+    "handedness": ("left", "right", "ambidextrous"),
+}
+"""Columns of participants.tsv that BIDS defines, with the values that it takes; none: numbers."""
 
 TASK = (
     "Each trial plays a sinusoidal force at the hand, in one of two orthogonal directions; the participant answers "
@@ -38,7 +47,12 @@ Trials of a study of force directions, exported by hapteq: per participant and s
 
 
 def write_bids(
-    folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
+    folder: Path,
+    name: str,
+    trials: Sequence[Trial],
+    protocol_text: str,
+    facts: Mapping[str, Any],
+    answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
     """Write the dataset. folder: existing and empty. facts: JSON values on where the data come from. Raises
     CannotWriteError."""
@@ -60,14 +74,70 @@ def write_bids(
         }),
     ]  # fmt: skip
     subjects = list(dict.fromkeys(trial.subject for trial in trials))
-    rows = "".join(f"sub-{_label(subject)}\t{subject}\n" for subject in subjects)
-    written.append(_text(folder / "participants.tsv", f"participant_id\tcode\n{rows}"))
-    written.append(_json(folder / "participants.json", {"code": {"Description": "Code as recorded"}}))
+    written += _participants(folder, subjects, answers)
+    for table in dict.fromkeys(column.table for column in answers.columns):
+        written += _phenotype(folder, table, answers)
     for session in dict.fromkeys(trial.session for trial in trials):
         of = [trial for trial in trials if trial.session == session]
         sub, ses = f"sub-{_label(of[0].subject)}", f"ses-{_label(session)}"
         written.append(_text(folder / sub / ses / "beh" / f"{sub}_{ses}_task-{task}_beh.tsv", _tsv(of)))
     return tuple(written)
+
+
+def _participants(folder: Path, subjects: Sequence[str], answers: AnswerTable) -> list[Path]:
+    """The code, and of the questions before the trials those that BIDS has columns for."""
+    known = [
+        (place, column)
+        for place, column in enumerate(answers.columns)
+        if column.table == "before" and column.question.key in PARTICIPANT_COLUMNS
+    ]
+    said = {
+        column.question.key: [
+            next((row[2][place] for row in answers.rows if row[0] == subject and row[2][place]), "n/a")
+            for subject in subjects
+        ]
+        for place, column in known
+    }
+    said = {key: values for key, values in said.items() if all(_fits(key, value) for value in values)}
+    lines = [["participant_id", "code", *said]]
+    lines += [[f"sub-{_label(subject)}", subject, *(values[number] for values in said.values())]
+              for number, subject in enumerate(subjects)]  # fmt: skip
+    text = "".join("\t".join(line) + "\n" for line in lines)
+    described = {column.question.key: _describe_answers(column) for _, column in known if column.question.key in said}
+    return [
+        _text(folder / "participants.tsv", text),
+        _json(folder / "participants.json", {"code": {"Description": "Code as recorded"}, **described}),
+    ]
+
+
+def _fits(key: str, value: str) -> bool:
+    """Whether BIDS takes it in that column."""
+    if value == "n/a":
+        return True
+    return value in PARTICIPANT_COLUMNS[key] if PARTICIPANT_COLUMNS[key] else number_in(value) is not None
+
+
+def _phenotype(folder: Path, table: str, answers: AnswerTable) -> list[Path]:
+    """Answers to the questions of one table of the protocol, a row per session."""
+    columns_of = [(place, column) for place, column in enumerate(answers.columns) if column.table == table]
+    lines = [["participant_id", "session_id", *(column.question.key for _, column in columns_of)]]
+    lines += [[f"sub-{_label(subject)}", f"ses-{_label(session)}", *(_cell(said[place]) for place, _ in columns_of)]
+              for subject, session, said in answers.rows]  # fmt: skip
+    described = {column.question.key: _describe_answers(column) for _, column in columns_of}
+    text = "".join("\t".join(line) + "\n" for line in lines)
+    place = folder / "phenotype"
+    return [_text(place / f"{table}.tsv", text), _json(place / f"{table}.json", described)]
+
+
+def _describe_answers(column: AnswerColumn) -> dict[str, Any]:
+    question = column.question
+    unit = {"Units": question.unit} if question.unit else {}
+    return {"Description": question.question, **unit, **({"Levels": column.levels} if column.levels else {})}
+
+
+def _cell(answer: str) -> str:
+    """Free text without the tabs that separate columns."""
+    return " ".join(answer.split()) or "n/a"
 
 
 def _tsv(trials: Sequence[Trial]) -> str:

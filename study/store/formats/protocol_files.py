@@ -11,7 +11,7 @@ from typing import Generic, TypeVar
 from protocols.definition.problem import Problem
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.document.loading import Protocol, ProtocolError, load_protocol
+from protocols.document.loading import Protocol, ProtocolError
 from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_of, lock_to_json
 from study.errors import StudyError, WrongUseError
 from study.local_clock import machine_zone
@@ -20,6 +20,7 @@ from study.session.views.local_time import local_time
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text, write_text
 from study.store.disk.toml_text import read_toml_text
+from study.store.formats.participant_texts import load_in_language
 
 P = TypeVar("P", bound=Protocol, covariant=True)
 
@@ -30,7 +31,7 @@ class ProtocolFile(Generic[P]):
 
     protocol: P
     text: str
-    """The file's text, comments included."""
+    """The file's text, comments included; where it names a language, with all texts filled in."""
     path: Path | None
     """None for a shipped protocol."""
     lock: ProtocolLock | None
@@ -77,7 +78,7 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
     """A shipped protocol by its name, or any by its path.
 
     A lock beside the file or in `data` must match this protocol. Raises WrongUseError (no such protocol),
-    CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock).
+    CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock, a table of texts).
     """
     path = None if name in list_shipped_protocols() else _path_of(name)
     text = (
@@ -87,7 +88,7 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
     )
     source = f"{name}.toml" if path is None else path.name
     try:
-        protocol = load_protocol(text, source)
+        protocol, text = load_in_language(text, source, path.parent if path else None)
     except ProtocolError as error:
         raise ProtocolRefusedError(source, error) from error
     return ProtocolFile(protocol, text, path, _find_lock(protocol, path, data))

@@ -16,11 +16,14 @@ from study.store.disk.csv_rows import CsvError, columns, rows_from_csv, rows_to_
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
+from study.store.formats.answer_table import AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 from study.store.formats.trials_file import trial_problems
 
 DESCRIPTION_NAME = "dataset_description.json"
 PROTOCOL_NAME = "materials/protocol.toml"
+ANSWERS_NAME = "data/description-answers_data.csv"
+"""Only where the protocol asks questions."""
 KIND = "Psych-DS dataset"
 OURS = "hapteq"
 """Key of the description with what only this program needs: protocol, seeds, devices."""
@@ -49,7 +52,12 @@ def is_psych_ds(folder: Path) -> bool:
 
 
 def write_psych_ds(
-    folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
+    folder: Path,
+    name: str,
+    trials: Sequence[Trial],
+    protocol_text: str,
+    facts: Mapping[str, Any],
+    answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
     """Write the dataset. folder: existing and empty. facts: JSON values. Raises CannotWriteError."""
     (folder / "data").mkdir()
@@ -60,6 +68,9 @@ def write_psych_ds(
         path = folder / "data" / f"subject-{_value(rows[0].subject)}_session-{_value(session)}_data.csv"
         write_text(path, rows_to_csv(rows, Trial), overwrite=False)
         written.append(path)
+    if answers.columns:
+        written.append(folder / ANSWERS_NAME)
+        write_text(folder / ANSWERS_NAME, answers.as_csv(), overwrite=False)
     write_text(folder / PROTOCOL_NAME, protocol_text, overwrite=False)
     description = {
         "@context": "https://schema.org/",
@@ -67,7 +78,10 @@ def write_psych_ds(
         "name": name,
         "description": "Trials of a study of force directions, one row per presentation, as hapteq logged them.",
         "schemaVersion": "Psych-DS 0.4.0",
-        "variableMeasured": [_variable(column) for column in columns(Trial)],
+        "variableMeasured": [
+            *(_variable(column, *TRIAL_COLUMNS[column]) for column in columns(Trial)),
+            *(_variable(column.name, column.description, column.question.unit) for column in answers.columns),
+        ],
         OURS: dict(facts),
     }
     write_text(folder / DESCRIPTION_NAME, json.dumps(description, indent=2, ensure_ascii=False) + "\n", overwrite=False)
@@ -85,9 +99,13 @@ def read_psych_ds(folder: Path) -> ExportedTrials:
     except ValueError as error:
         raise UnusableFileError(path, KIND, (str(error),)) from error
     facts = description.get(OURS) if isinstance(description, dict) else None
-    files = tuple(sorted((folder / "data").glob("*_data.csv")))
+    files = tuple(sorted((folder / "data").glob("subject-*_data.csv")))
     if not isinstance(facts, dict) or not files:
-        missing = "no file below data/ ends in _data.csv" if isinstance(facts, dict) else f"the key '{OURS}' is missing"
+        missing = (
+            "no file below data/ is named subject-…_data.csv"
+            if isinstance(facts, dict)
+            else f"the key '{OURS}' is missing"
+        )
         raise UnusableFileError(path, KIND, (missing,))
     trials = tuple(trial for each in files for trial in trials_in(each, KIND))
     return ExportedTrials(trials, read_text(folder / PROTOCOL_NAME), facts, files)
@@ -104,8 +122,7 @@ def trials_in(path: Path, kind: str) -> tuple[Trial, ...]:
     return tuple(rows)
 
 
-def _variable(column: str) -> dict[str, str]:
-    words, unit = TRIAL_COLUMNS[column]
+def _variable(column: str, words: str, unit: str) -> dict[str, str]:
     found = {"@type": "PropertyValue", "name": column, "description": words}
     return {**found, "unitText": unit} if unit else found
 

@@ -10,10 +10,13 @@ from study.store.disk.csv_rows import columns, csv_line, rows_to_csv
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
+from study.store.formats.answer_table import AnswerTable
 from study.store.formats.psych_ds import ExportedTrials, trials_in
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME = "trials.csv", "dictionary.csv", "protocol.toml", "facts.json"
+ANSWERS_NAME = "answers.csv"
+"""Only where the protocol asks questions."""
 KIND = "table of exported trials"
 
 
@@ -22,16 +25,24 @@ def is_tidy_csv(folder: Path) -> bool:
 
 
 def write_tidy_csv(
-    folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
+    folder: Path,
+    name: str,
+    trials: Sequence[Trial],
+    protocol_text: str,
+    facts: Mapping[str, Any],
+    answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
     """Write the table. folder: existing and empty. name: of the study. facts: JSON values. Raises CannotWriteError."""
     rows = [["column", "description", "unit"], *([column, *TRIAL_COLUMNS[column]] for column in columns(Trial))]
+    rows += [[column.name, column.description, column.question.unit] for column in answers.columns]
     texts = {
         TRIALS_NAME: rows_to_csv(trials, Trial),
         DICTIONARY_NAME: "".join(csv_line(row) + "\n" for row in rows),
         PROTOCOL_NAME: protocol_text,
         FACTS_NAME: json.dumps({"study": name, **facts}, indent=2, ensure_ascii=False) + "\n",
     }
+    if answers.columns:
+        texts[ANSWERS_NAME] = answers.as_csv()
     for file_name, text in texts.items():
         write_text(folder / file_name, text, overwrite=False)
     return tuple(folder / file_name for file_name in texts)

@@ -12,13 +12,21 @@ import numpy as np
 from protocols.trial import Trial
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.csv_rows import columns
+from study.store.formats.answer_table import AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 NAME = "trials.mat"
+LONGEST_FIELD = 31
+"""Characters of a field's name in this version of the format."""
 
 
 def write_trials_mat(
-    folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
+    folder: Path,
+    name: str,
+    trials: Sequence[Trial],
+    protocol_text: str,
+    facts: Mapping[str, Any],
+    answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
     """Write numbers and booleans as columns (NaN for missing values), text as cells. Raises CannotWriteError."""
     from scipy.io import savemat
@@ -31,6 +39,7 @@ def write_trials_mat(
             "trials": {column: _column([getattr(trial, column) for trial in trials]) for column in columns(Trial)},
             "units": {column: TRIAL_COLUMNS[column][1] for column in columns(Trial)},
             "descriptions": {column: TRIAL_COLUMNS[column][0] for column in columns(Trial)},
+            **_answers(answers),
             "protocol": protocol_text,
             "provenance": json.dumps(dict(facts), ensure_ascii=False),
         },
@@ -40,10 +49,24 @@ def write_trials_mat(
     return (folder / NAME,)
 
 
+def _answers(table: AnswerTable) -> dict[str, Any]:
+    """A structure of cells, a row per session; nothing where no question is asked."""
+    if not table.columns:
+        return {}
+    rows = [(subject, session, *said) for subject, session, said in table.rows]
+    described = {column.name[:LONGEST_FIELD]: column.description for column in table.columns}
+    names = [name[:LONGEST_FIELD] for name in table.header]
+    return {"answers": dict(zip(names, map(_cells, zip(*rows, strict=True)), strict=False)), "questions": described}
+
+
 def _column(values: Sequence[Any]) -> Any:
     plain = [value.value if isinstance(value, Enum) else value for value in values]
     if any(isinstance(value, str) for value in plain):
-        cells = np.empty(len(plain), dtype=object)
-        cells[:] = ["" if value is None else value for value in plain]
-        return cells
+        return _cells(["" if value is None else value for value in plain])
     return np.array([np.nan if value is None else float(value) for value in plain])
+
+
+def _cells(values: Sequence[str]) -> Any:
+    cells = np.empty(len(values), dtype=object)
+    cells[:] = values
+    return cells

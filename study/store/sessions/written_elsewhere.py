@@ -13,8 +13,8 @@ from study.store.sessions.archive import FOLDER
 WRITTEN_ELSEWHERE = "written_elsewhere.txt"
 
 
-def note_written(source: Path, out: Path) -> None:
-    """Note the absolute path of `out` if a withdrawal would not find it.
+def note_written(source: Path, out: Path, always: bool = False) -> None:
+    """Note the absolute path of `out` if a withdrawal would not find it; always: it finds none of these.
 
     source: a data folder, or a session's in it. Read-only data are left unchanged.
     """
@@ -22,7 +22,7 @@ def note_written(source: Path, out: Path) -> None:
     data = source.parent if FOLDER.fullmatch(source.name) else source
     known = folders_written_elsewhere(data)
     beside = out.relative_to(data).parts if out.is_relative_to(data) else None
-    found = beside is not None and (len(beside) < 2 or FOLDER.fullmatch(beside[0]) is not None)
+    found = not always and beside is not None and (len(beside) < 2 or FOLDER.fullmatch(beside[0]) is not None)
     if found or out in known:
         return
     text = "".join(f"{path}\n" for path in (*known, out))

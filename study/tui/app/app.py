@@ -13,6 +13,7 @@ from textual.binding import Binding, BindingType
 from textual.events import Event
 from textual.screen import Screen
 
+from protocols.wording.words import ENGLISH_WORDS
 from study.errors import ExitCode
 from study.session.views.views import Reply as TrialReply
 from study.session.watching.requests import NoteAsked, PauseAsked
@@ -21,7 +22,6 @@ from study.tui.app import outcomes
 from study.tui.app.app_start import AppStart
 from study.tui.app.archive_screens import ArchiveScreens, ArchiveWanted, command_for
 from study.tui.app.engine_line import EngineLine, EngineSaid
-from study.tui.app.everywhere import EVERYWHERE
 from study.tui.app.load_screens import load_screens
 from study.tui.app.sitting_screens import SittingScreens
 from study.tui.departure import leave_with_the_terminal
@@ -175,7 +175,8 @@ class HapteqApp(App[None]):
         from study.tui.screens.help import HelpScreen
 
         about: str = getattr(self.screen, "HELP", "")
-        self.push_screen(HelpScreen(about.rstrip() + EVERYWHERE))
+        words = ENGLISH_WORDS if self._sitting is None else self._sitting.words
+        self.push_screen(HelpScreen(about.rstrip() + words["help_everywhere"], words))
 
     def action_next_theme(self) -> None:
         self.theme = NEXT[self.theme]
@@ -193,7 +194,7 @@ class HapteqApp(App[None]):
             return
         from study.tui.screens.note import NoteScreen
 
-        self.push_screen(NoteScreen(adverse, "experimenter"), self._write)
+        self.push_screen(NoteScreen(adverse, "experimenter", self._sitting.words), self._write)
 
     def _write(self, note: NoteAsked | None) -> None:
         if note is not None:

@@ -11,8 +11,20 @@ from textual.app import App
 from textual.screen import Screen
 from textual.widgets import Footer
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Reply as TrialReply
-from study.tui.engine.from_engine import Ask, Call, Close, Feedback, FromEngine, LookUpdate, Opened, Preparing, Trouble
+from study.tui.engine.from_engine import (
+    Ask,
+    Call,
+    Close,
+    Feedback,
+    FromEngine,
+    LookUpdate,
+    Opened,
+    Preparing,
+    Spoken,
+    Trouble,
+)
 from study.tui.engine.to_engine import Reply, ToEngine
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.screens.await_return import AwaitReturnScreen
@@ -30,7 +42,7 @@ from study.tui.screens.rest import RestScreen
 from study.tui.screens.trial import TrialScreen
 from study.tui.trial_replies import LEAVING
 
-SCREENS: dict[Call, Callable[[Any], Screen[Any]]] = {
+SCREENS: dict[Call, Callable[[Any, Words], Screen[Any]]] = {
     Call.FILL_IN: FormScreen,
     Call.DEVICE_CHECKED: DeviceCheckScreen,
     Call.SHOW_PLAYING: PlayingScreen,
@@ -42,16 +54,16 @@ SCREENS: dict[Call, Callable[[Any], Screen[Any]]] = {
 }
 
 
-def screen_for(ask: Ask, keys: AnswerKeys) -> Screen[Any]:
+def screen_for(ask: Ask, keys: AnswerKeys, words: Words) -> Screen[Any]:
     """A screen for every request but the trial, whose screen is kept for the whole sitting. Each is dismissed with
     the reply."""
     if ask.call is Call.WELCOME:
-        return InstructionsScreen(ask.shown, keys)
+        return InstructionsScreen(ask.shown, keys, words)
     if ask.call is Call.CHOOSE_DEMO:
-        return DemoScreen(ask.shown, keys)
+        return DemoScreen(ask.shown, keys, words)
     if ask.call is Call.PAUSE:
-        return PauseScreen(ask.shown, leaving=ask.shown.reason == LEAVING.reason)
-    return SCREENS[ask.call](ask.shown)
+        return PauseScreen(ask.shown, ask.shown.reason == LEAVING.reason, words)
+    return SCREENS[ask.call](ask.shown, words)
 
 
 def forget_drawn_before(app: App[Any]) -> None:
@@ -66,7 +78,6 @@ def forget_drawn_before(app: App[Any]) -> None:
             footer.mutate_reactive(Footer.compact)
 
 
-OPENING = "Preparing the device: some ten seconds the first time."
 TROUBLE_FOR_S = 8.0
 
 
@@ -83,6 +94,8 @@ class SittingScreens:
         """forget_earlier: lets keys that were read before now answer nothing."""
         self.path = ""
         """Folder of the session, once it is opened."""
+        self.words = ENGLISH_WORDS
+        """The participant's texts, once the engine has read the protocol."""
         self._app = app
         self._send = send
         self._keys = keys
@@ -108,6 +121,10 @@ class SittingScreens:
                 self._trouble(sentence)
             case Opened(path=path):
                 self.path = path
+            case Spoken(words=words):
+                self.words = words
+                if self._preparing is not None:
+                    self._preparing.speak(words)
             case Preparing(sentence=sentence):
                 await self.prepare(sentence)
 
@@ -115,7 +132,7 @@ class SittingScreens:
         """Called by the trial's screen, which disarms itself."""
         self._reply(reply)
 
-    async def prepare(self, sentence: str = OPENING) -> None:
+    async def prepare(self, sentence: str = ENGLISH_WORDS["preparing_device"]) -> None:
         """Show that the device is prepared, while nothing is asked."""
         self._number, self._shown, self._trial = 0, None, None
         if self._preparing is None:
@@ -137,13 +154,13 @@ class SittingScreens:
             trial = self._trial if self._trial is not None else await self._trial_screen()
             trial.arm(ask.shown)
             return
-        self._shown = screen_for(ask, self._keys)
+        self._shown = screen_for(ask, self._keys, self.words)
         await self._app.push_screen(self._shown, partial(self._reply_once_dismissed, ask.number))
         # Typed ahead, before what is asked here can have been read.
         self._forget_earlier()
 
     async def _trial_screen(self) -> TrialScreen:
-        self._trial = TrialScreen(self._keys)
+        self._trial = TrialScreen(self._keys, self.words)
         await self._app.push_screen(self._trial)
         return self._trial
 
@@ -152,6 +169,7 @@ class SittingScreens:
             self._shown.update_view(update.view)
 
     def _trouble(self, sentence: str) -> None:
+        sentence = self.words.fact(sentence)
         if self._trial is not None:
             self._trial.show_trouble(sentence)
         if self._trial is None or self._shown is not None:

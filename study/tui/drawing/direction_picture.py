@@ -3,24 +3,31 @@
 import math
 from functools import lru_cache
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import DirectionPicture
 from study.tui.drawing.braille import Canvas
 
 ENDS = {
-    "yz": (("right", "left"), ("up", "down")),
-    "xy": (("toward you", "away from you"), ("right", "left")),
-    "zx": (("up", "down"), ("toward you", "away from you")),
+    "yz": (("end_right", "end_left"), ("end_up", "end_down")),
+    "xy": (("end_toward", "end_away"), ("end_right", "end_left")),
+    "zx": (("end_up", "end_down"), ("end_toward", "end_away")),
 }
-"""Words for the positive and the negative end of a plane's first and second axis."""
+"""Keys of the words for the positive and the negative end of a plane's first and second axis."""
 
 SCREEN = {"yz": ((1, 0), (0, 1)), "xy": ((0, -1), (1, 0)), "zx": ((0, 1), (1, 0))}
 """Where a plane's first and second axis point on the screen: (right, up). 'xy' is seen from above."""
 
 
-def sentence(picture: DirectionPicture, number: int) -> str:
+def sentence(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORDS) -> str:
     """A direction in words, such as "1: up-left to down-right"."""
+    return words.fill("direction", {"number": number, "ends": ends(picture, number, words)})
+
+
+def ends(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORDS) -> str:
+    """Such as "up-left to down-right"."""
     angle = picture.angle_deg[number - 1]
-    return f"{number}: {_end(picture.plane, angle)} to {_end(picture.plane, angle + 180)}"
+    start, end = _end(picture.plane, angle, words), _end(picture.plane, angle + 180, words)
+    return words.fill("direction_ends", {"start": start, "end": end})
 
 
 def draw_directions(picture: DirectionPicture, columns: int = 18, rows: int = 9) -> list[str]:
@@ -90,12 +97,11 @@ def _on_screen(plane: str, angle_deg: float) -> tuple[float, float]:
     return c * first[0] + s * second[0], c * first[1] + s * second[1]
 
 
-def _end(plane: str, angle_deg: float) -> str:
+def _end(plane: str, angle_deg: float, words: Words) -> str:
     (first_plus, first_minus), (second_plus, second_minus) = ENDS[plane]
     c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
-    words = []
-    if abs(s) > 0.2:
-        words.append(second_plus if s > 0 else second_minus)
-    if abs(c) > 0.2:
-        words.append(first_plus if c > 0 else first_minus)
-    return "-".join(words)
+    along_second = words[second_plus if s > 0 else second_minus]
+    along_first = words[first_plus if c > 0 else first_minus]
+    if abs(s) > 0.2 and abs(c) > 0.2:
+        return words.fill("end_both", {"first": along_second, "second": along_first})
+    return along_second if abs(s) > 0.2 else along_first

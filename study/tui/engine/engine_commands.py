@@ -8,12 +8,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from protocols.wording.words import Words
 from study.devices.clock import RealClock
 from study.devices.device import Device
 from study.devices.opening import calibrate_accelerometer, keep_accelerometer, lab_file_path
 from study.errors import StudyError, WrongUseError
 from study.local_clock import machine_zone
 from study.session.views.archive_views import HomeView
+from study.session.views.forms import words_of
 from study.store.disk.privacy import data_folder_warning
 from study.store.sessions.archive import SessionFolder, find_session
 from study.tui.engine.from_engine import (
@@ -27,6 +29,7 @@ from study.tui.engine.from_engine import (
     Results,
     SensorKept,
     Session,
+    Spoken,
     Trouble,
     Withdrawn,
     Working,
@@ -64,8 +67,6 @@ REPLY_S = 0.5
 """A wait for a reply, which an interruption ends in between."""
 
 CALIBRATION_STOPPED = StudyError("The calibration was stopped", "", "Begin it again.", "Nothing was written.")
-
-OPENING = "Preparing the device: some ten seconds the first time."
 
 
 class EngineCommands:
@@ -107,7 +108,8 @@ class EngineCommands:
         plan = plan_sitting(order.protocol, order.subject, None, order.seed, Path(order.data), model)
         for note in plan.notes:
             self._link.send(Trouble(note))
-        self._sit(lambda participant: conduct_new(plan.session, order.device, participant))
+        words = words_of(plan.session.protocol)
+        self._sit(words, lambda participant: conduct_new(plan.session, order.device, participant))
 
     def _resume(self, command: Resume) -> None:
         folder = find_session(command.session, Path(command.data))
@@ -127,16 +129,18 @@ class EngineCommands:
             written = finish_closed(folder, folded)
             self._link.send(Finished(str(folder.path), folded.state.answers, _results(written)))
             return
-        self._sit(lambda participant: conduct_resumed(folder, command.device, participant))
+        words = words_of(folded.state.protocol)
+        self._sit(words, lambda participant: conduct_resumed(folder, command.device, participant))
 
-    def _sit(self, conduct: Callable[[Participant], Conducted]) -> None:
-        self._link.send(Preparing(OPENING))
+    def _sit(self, words: Words, conduct: Callable[[Participant], Conducted]) -> None:
+        self._link.send(Spoken(words))
+        self._link.send(Preparing(words["preparing_device"]))
         with self._participant() as participant:
             end = conduct(participant)
         if end.state.closed:
             self.opened = None  # there is nothing left to go on with
         if not end.left:
-            self._link.send(Preparing("Making the tables and the report."))
+            self._link.send(Preparing(words["preparing_report"]))
         written = end_sitting(end, self._clock.utc())
         self._link.send(Finished(str(end.folder.path), end.state.answers, _results(written)))
 

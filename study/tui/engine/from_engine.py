@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+from protocols.wording.words import Words
 from study.session.views.archive_views import DiagnosisView, HomeView, SessionView
 from study.session.views.views import HandleView
 
@@ -74,6 +75,13 @@ class Session:
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
     view: DiagnosisView
+
+
+@dataclass(frozen=True, slots=True)
+class Spoken:
+    """What the participant of the sitting reads, from here on."""
+
+    words: Words
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +192,7 @@ FromEngine = (
     | Session
     | Diagnosis
     | Preparing
+    | Spoken
     | Working
     | LayDown
     | Calibrated

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.errors import WrongUseError
 
 RESERVED = "pqrn?"
@@ -20,12 +21,11 @@ class AnswerKeys:
             return 1
         return 2 if key in ("2", self.second) else None
 
-    @property
-    def choice(self) -> str:
+    def choice(self, words: Words = ENGLISH_WORDS) -> str:
         """Keys in a prompt, such as "f for 1, j for 2"; "1 or 2" by default."""
         if (self.first, self.second) == ("1", "2"):
-            return "1 or 2"
-        return f"{self.first} for 1, {self.second} for 2"
+            return words["keys_digits"]
+        return words.fill("keys_named", {"first": self.first, "second": self.second})
 
 
 DIGITS = AnswerKeys()

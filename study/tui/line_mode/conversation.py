@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TextIO
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.devices.clock import Clock
 from study.tui.line_mode.line_input import LineInput
 from study.workflows.trial.display import SignOfLife
@@ -35,10 +36,11 @@ class WaitOver(Enum):
 
 
 class Conversation:
-    def __init__(self, lines: LineInput, out: TextIO, clock: Clock) -> None:
+    def __init__(self, lines: LineInput, out: TextIO, clock: Clock, words: Words = ENGLISH_WORDS) -> None:
         self._lines = lines
         self._out = out
         self.clock = clock
+        self.words = words
 
     def say(self, *sentences: str) -> None:
         for text in sentences:
@@ -46,6 +48,14 @@ class Conversation:
             lines = textwrap.wrap(text, LINE_WIDTH) if len(text) > LINE_WIDTH else [text]
             self._out.write("\n".join(lines) + "\n")
         self._out.flush()
+
+    def speak(self, *keys: str) -> None:
+        """Texts by their keys."""
+        self.say(*(self.words[key] for key in keys))
+
+    def refuse(self, key: str, line: Line) -> None:
+        """Say that a line was not understood."""
+        self.say(self.words.fill(key, {"typed": shown(line, self.words)}))
 
     def prompt(self, text: str) -> None:
         self._out.write(text)
@@ -104,10 +114,10 @@ def printable(text: str) -> str:
     return "".join(c for c in text if c.isprintable()).strip()
 
 
-def shown(line: Line) -> str:
+def shown(line: Line, words: Words = ENGLISH_WORDS) -> str:
     """The typed line as a sentence may quote it."""
     plain = printable(line.text)[:20]
-    return f"'{plain}'" if plain else "Enter alone"
+    return f"'{plain}'" if plain else words["line_enter_alone"]
 
 
 def _keep_waiting() -> bool:

@@ -3,9 +3,8 @@
 from collections.abc import Callable
 from typing import TextIO
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.devices.clock import Clock
-from study.session.facts.void_reasons import void_for_participant
-from study.session.views.counted import answers_are
 from study.session.views.form_views import Form, FormReply
 from study.session.views.views import (
     AfterPause,
@@ -28,7 +27,7 @@ from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_mode import plain_demo, plain_forms, plain_pause, plain_question
 from study.tui.line_mode.conversation import Conversation
 from study.tui.line_mode.line_input import LineInput
-from study.tui.trial_words import progress_sentence, refusal_words, run_name
+from study.tui.trial_words import progress_sentence, refusal_words, run_key, void_words
 from study.workflows.trial.display import SignOfLife
 
 
@@ -42,8 +41,10 @@ class PlainDisplay:
         clock: Clock,
         keys: AnswerKeys = DIGITS,
         note: Callable[[NoteAsked], None] | None = None,
+        words: Words = ENGLISH_WORDS,
     ) -> None:
-        self._talk = Conversation(lines, out, clock)
+        self._words = words
+        self._talk = Conversation(lines, out, clock, words)
         self._keys = keys
         self._note = note
         self._demo_shown = False
@@ -60,9 +61,7 @@ class PlainDisplay:
 
     def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
         if not self._demo_shown:
-            self._talk.say(
-                "", "Feel both directions, as often as you like:", *plain_question.picture_lines(menu.picture)
-            )
+            self._talk.say("", self._words["line_demo"], *plain_question.picture_lines(menu.picture, self._words))
             self._demo_shown = True
         return plain_demo.choose_demo(menu, self._talk, self._keys, sign_of_life)
 
@@ -73,14 +72,14 @@ class PlainDisplay:
         return plain_demo.await_handle(look, self._talk, sign_of_life)
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        run = (run_name(question), question.run_number)
+        run = (run_key(question), question.run_number)
         if question.progress is not None and run != self._run_told:
-            self._talk.say("", progress_sentence(question.progress))
+            self._talk.say("", progress_sentence(question.progress, self._words))
             self._run_told = run
         return plain_question.ask(question, self._talk, self._keys, sign_of_life)
 
     def feedback(self, correct: bool) -> None:
-        self._talk.say("Right." if correct else "Wrong.")
+        self._talk.speak("right" if correct else "wrong")
 
     def practice_over(self, result: PracticeResult) -> None:
         plain_question.practice_over(result, self._talk)
@@ -93,18 +92,20 @@ class PlainDisplay:
 
     def await_return(self, reason: str) -> None:
         self._talk.forget()
-        self._talk.say("", f"The last trial does not count. {void_for_participant(reason)}")
-        self._talk.say("Press Enter when you are ready for it again.")
+        self._talk.say("", f"{self._words['void_title']}. {void_words(reason, self._words)}")
+        self._talk.speak("line_ready_again")
         self._talk.answer_or_leave()
 
     def goodbye(self, notice: Goodbye) -> None:
+        words = self._words
         if notice.outcome:
-            self._talk.say("", *refusal_words(notice.outcome))
+            self._talk.say("", *refusal_words(notice.outcome, words))
         elif notice.finished:
-            self._talk.say("", f"Finished: {notice.answers} answers. Thank you.")
+            self._talk.say("", words.counted("line_finished", notice.answers))
         else:
-            because = f": {notice.reason}" if notice.reason else ""
-            self._talk.say("", f"This sitting is over{because}. {answers_are(notice.answers)} on disk. Thank you.")
+            because = words.fill("line_over_because", {"reason": words.fact(notice.reason)})
+            over = because if notice.reason else words["line_over"]
+            self._talk.say("", f"{over} {words.counted('saved', notice.answers)} {words['line_thanks']}")
 
     def trouble(self, sentence: str) -> None:
-        self._talk.say(sentence)
+        self._talk.say(self._words.fact(sentence))

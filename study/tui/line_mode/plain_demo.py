@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 
+from protocols.wording.words import Words
 from study.session.views.views import DemoChoice, DemoDone, DemoMenu, HandleView, PlayDemo, PlayingNotice, Unanswered
-from study.tui.drawing.direction_picture import sentence
+from study.tui.drawing.direction_picture import ends
 from study.tui.keys.answer_keys import AnswerKeys
-from study.tui.line_mode.conversation import GLANCE_S, Conversation, WaitOver, shown
+from study.tui.line_mode.conversation import GLANCE_S, Conversation, WaitOver
 from study.tui.line_mode.plain_question import LEFT
 from study.tui.trial_replies import PAUSE
+from study.tui.trial_words import felt_so_far
 from study.workflows.trial.display import SignOfLife
 
 SAY_AGAIN_S = 1.0
@@ -20,9 +22,9 @@ INPUT_ENDED = Unanswered(WaitOver.INPUT_ENDED.value, leave=True)
 def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> DemoChoice:
     talk.forget()
     vibration = menu.vibration
-    talk.say("", _place(menu, vibration))
+    talk.say("", _place(menu, vibration, talk.words))
     while True:
-        talk.prompt(f"{keys.choice} plays, n next vibration, b back, Enter ends: ")
+        talk.prompt(talk.words.fill("line_demo_prompt", {"keys": keys.choice(talk.words)}))
         line = talk.wait(sign_of_life)
         if line is WaitOver.CUT_SHORT:
             return DemoDone()
@@ -31,21 +33,21 @@ def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_li
         if line.word in ("", "done"):
             return DemoDone()
         if line.word in ("n", "b"):
-            vibration, said = _step_vibration(menu, vibration, 1 if line.word == "n" else -1)
+            vibration, said = _step_vibration(menu, vibration, 1 if line.word == "n" else -1, talk.words)
             talk.say(said)
             continue
         number = keys.answer(line.text)
         if number is not None:
             return PlayDemo(vibration, number)
-        talk.say(f"{shown(line)} is none of these keys; q leaves the study.")
+        talk.refuse("line_demo_no_key", line)
 
 
 def show_playing(notice: PlayingNotice, talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
     """Wait for the end. Keys typed meanwhile are no answers: only p and q are accepted."""
     talk.forget()
     if notice.title:  # a gap between two intervals has none
-        words = f" ({sentence(notice.picture, notice.number)[3:]})" if notice.picture is not None else ""
-        talk.say(f"{notice.title}{words}")
+        along = "" if notice.picture is None else f" ({ends(notice.picture, notice.number, talk.words)})"
+        talk.say(f"{talk.words.fact(notice.title)}{along}")
     until_s = talk.clock.now_s() + notice.seconds
     while (left_s := until_s - talk.clock.now_s()) > 1e-9:
         cut = _glance(talk, sign_of_life, min(GLANCE_S, left_s))
@@ -60,7 +62,7 @@ def await_handle(look: Callable[[], HandleView], talk: Conversation, sign_of_lif
     while not (view := look()).ready:
         now_s = talk.clock.now_s()
         if view.sentence != said and now_s - said_at_s >= SAY_AGAIN_S:
-            talk.say(view.sentence)
+            talk.say(talk.words.fact(view.sentence))
             said, said_at_s = view.sentence, now_s
         cut = INPUT_ENDED if talk.input_is_over() else _glance(talk, sign_of_life, GLANCE_S)
         if cut is not None:
@@ -76,18 +78,17 @@ def _glance(talk: Conversation, sign_of_life: SignOfLife, seconds: float) -> Una
     return {"q": LEFT, "p": PAUSE}.get(line.word) if line is not None else None
 
 
-def _step_vibration(menu: DemoMenu, vibration: int, step: int) -> tuple[int, str]:
+def _step_vibration(menu: DemoMenu, vibration: int, step: int, words: Words) -> tuple[int, str]:
     """The new vibration number and a sentence; unchanged at either end."""
     turned = vibration + step
     if turned < 1:
-        return vibration, "This is the first vibration."
+        return vibration, words["line_demo_first"]
     if turned > menu.vibrations:
-        return vibration, "This is the last vibration."
-    return turned, _place(menu, turned)
+        return vibration, words["line_demo_last"]
+    return turned, _place(menu, turned, words)
 
 
-def _place(menu: DemoMenu, vibration: int) -> str:
-    felt = [str(number) for number in (1, 2) if (vibration, number) in menu.felt]
-    so_far = f"Felt so far: {' and '.join(felt)}." if felt else "Nothing of it was felt yet."
-    moves = "" if menu.handle_moves else " The device is a simulation: nothing moves."
-    return f"Demonstration, vibration {vibration} of {menu.vibrations}. {so_far}{moves}"
+def _place(menu: DemoMenu, vibration: int, words: Words) -> str:
+    place = words.fill("line_demo_place", {"vibration": vibration, "vibrations": menu.vibrations})
+    moves = "" if menu.handle_moves else f" {words['simulation']}"
+    return f"{place} {felt_so_far(menu, vibration, words)}{moves}"

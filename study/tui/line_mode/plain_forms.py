@@ -1,17 +1,20 @@
 """Line mode: forms and the device check, one question after another."""
 
+from protocols.wording.words import Words
 from study.session.views.form_entry import CHECKED
-from study.session.views.form_views import Form, FormField, FormReply
+from study.session.views.form_views import Form, FormField, FormReply, has_answer
 from study.session.views.views import DeviceReport
 from study.tui.line_mode.conversation import Conversation, Line, printable, shown
+from study.tui.trial_words import limits_words, origin
 
 BACK = "b"
 
 
 def fill_in(form: Form, talk: Conversation) -> FormReply:
     talk.forget()
-    talk.say("", form.title, *filter(None, (form.introduction, _version(form))))
-    talk.say(f"{_count(len(form.fields))} Type the answer and Enter; {BACK} goes one question back, q leaves.")
+    words = talk.words
+    talk.say("", form.title, *filter(None, (form.introduction, origin(form, words))))
+    talk.say(words.counted("line_form", len(form.fields)))
     answers: dict[str, str] = {}
     at, changed = 0, False
     while True:
@@ -20,7 +23,7 @@ def fill_in(form: Form, talk: Conversation) -> FormReply:
                 return FormReply(answers)
             at, changed = 0, False
         field = form.fields[at]
-        answer = _ask(field, f"{at + 1} of {len(form.fields)}", talk)
+        answer = _ask(field, (at + 1, len(form.fields)), talk)
         if answer is None:
             at = max(0, at - 1)
             continue
@@ -33,40 +36,46 @@ def _confirm_changes(form: Form, answers: dict[str, str], talk: Conversation) ->
     """Whether changed answers are confirmed; otherwise the form is asked again."""
     talk.forget()
     told = ", ".join(f"{number} {answers[field.key]}" for number, field in enumerate(form.fields, start=1))
-    talk.say("", f"You changed an answer. Your answers are now: {told}.")
+    words = talk.words
+    talk.say("", words.fill("line_form_changed", {"answers": told}))
     while True:
-        talk.prompt(f"y if that is right, {BACK} to answer again: ")
+        talk.prompt(words["line_form_confirm"])
         line = talk.answer_or_leave()
-        if line.word in ("y", "yes", BACK):
+        if line.word in (words["line_form_confirm_letter"], words["yes"], BACK):
             return line.word != BACK
         talk.forget()
-        talk.say(f"{shown(line)} is no answer.")
+        talk.refuse("no_answer", line)
 
 
 def device_checked(report: DeviceReport, talk: Conversation) -> bool:
     talk.forget()
-    talk.say("", f"Device: {report.device}{' (simulated: nothing moves)' if report.simulated else ''}")
+    words = talk.words
+    moves = f" {words['simulation']}" if report.simulated else ""
+    talk.say("", f"{words.fill('line_check', {'device': report.device})}{moves}")
     for finding in report.findings:
         advice = f". {finding.advice}" if finding.advice and not finding.fine else ""
         talk.say(f"{finding.verdict}: {finding.name}, {finding.value}{advice}")
-    talk.say(report.conclusion or "Something needs a look before you go on.")
+    ready = "check_ready" if report.fine else "check_ready_warning"
+    talk.speak(ready if report.usable else "line_check_look")
     while True:
-        talk.prompt("Enter goes on, c checks again, q leaves: ")
+        talk.prompt(words["line_check_prompt"])
         line = talk.answer_or_leave()
         if line.word in ("", "c"):
             return not line.word
         talk.forget()
-        talk.say(f"{shown(line)} is no answer.")
+        talk.refuse("no_answer", line)
 
 
-def _ask(field: FormField, place: str, talk: Conversation) -> str | None:
+def _ask(field: FormField, place: tuple[int, int], talk: Conversation) -> str | None:
     """The answer; None: back to the previous question."""
     numbered = bool(field.choices) and not any(choice.isdigit() for choice in field.choices)
-    talk.say("", f"{place}: {field.label}")
+    words = talk.words
+    asked = {"number": place[0], "all": place[1], "question": field.label}
+    talk.say("", words.fill("line_form_place", asked))
     for number, choice in enumerate(field.choices, start=1):
         talk.say(f"  {number}  {choice}" if numbered else f"  {choice}")
     while True:
-        talk.prompt(_prompt(field, numbered))
+        talk.prompt(_prompt(field, numbered, words))
         line = talk.answer()
         answer = _parse_answer(field, line, numbered)
         if answer is not None:
@@ -76,7 +85,7 @@ def _ask(field: FormField, place: str, talk: Conversation) -> str | None:
         if line.word == BACK:
             return None
         talk.forget()  # typed ahead for the questions after this one
-        talk.say(_refusal(field, line, numbered))
+        talk.say(_refusal(field, line, numbered, words))
 
 
 def _parse_answer(field: FormField, line: Line, numbered: bool) -> str | None:
@@ -85,7 +94,8 @@ def _parse_answer(field: FormField, line: Line, numbered: bool) -> str | None:
     if not text:
         return None if field.needed else ""
     if not field.choices:
-        return None if line.word in (BACK, "q") else text
+        fits = line.word not in (BACK, "q") and has_answer(field, text)
+        return text if fits else None
     if numbered and text.isdecimal() and 1 <= int(text) <= len(field.choices):
         return field.choices[int(text) - 1]
     meant = [choice for choice in field.choices if choice.casefold() == text.casefold()]
@@ -94,22 +104,19 @@ def _parse_answer(field: FormField, line: Line, numbered: bool) -> str | None:
     return meant[0] if len(meant) == 1 else None
 
 
-def _prompt(field: FormField, numbered: bool) -> str:
-    what = "Number or word" if numbered else "Answer"
-    return f"{what}: " if field.needed else f"{what} (Enter alone for none): "
+def _prompt(field: FormField, numbered: bool, words: Words) -> str:
+    what = "line_form_number" if numbered else "line_form_answer"
+    return words[what if field.needed else f"{what}_or_none"]
 
 
-def _refusal(field: FormField, line: Line, numbered: bool) -> str:
+def _refusal(field: FormField, line: Line, numbered: bool, words: Words) -> str:
+    typed = shown(line, words)
+    if field.limits is not None:
+        return words.fill("line_form_limits", {"typed": typed, "wanted": limits_words(field.limits, words)})
     if not field.choices:
-        return "An answer is needed here."
-    numbers = f", or its number, 1 to {len(field.choices)}" if numbered else ""
-    return f"{shown(line)} is none of the answers. Type {' or '.join(field.choices)}{numbers}."
-
-
-def _count(questions: int) -> str:
-    return "1 question." if questions == 1 else f"{questions} questions."
-
-
-def _version(form: Form) -> str:
-    parts = (form.version and f"Version {form.version}", form.ethics_id and f"Ethics approval {form.ethics_id}")
-    return ". ".join(part for part in parts if part) + "." if any(parts) else ""
+        return words["line_form_needed"]
+    answers = field.choices[0]
+    for choice in field.choices[1:]:
+        answers = words.fill("line_form_or", {"first": answers, "second": choice})
+    told = {"typed": typed, "answers": answers, "count": len(field.choices)}
+    return words.fill("line_form_none_numbered" if numbered else "line_form_none", told)

@@ -2,25 +2,26 @@
 
 from collections.abc import Callable
 
-from study.session.views.counted import answers_are
+from protocols.wording.words import Words
 from study.session.views.views import AfterPause, PauseNotice, RestNotice
 from study.session.watching.requests import NoteAsked
-from study.tui.line_mode.conversation import GLANCE_S, Conversation, Line, WaitOver, printable, shown
-from study.tui.trial_words import WITHDRAW, progress_sentence, runs_left
+from study.tui.line_mode.conversation import GLANCE_S, Conversation, Line, WaitOver, printable
+from study.tui.trial_words import progress_sentence
 from study.workflows.trial.display import SignOfLife
 
 COUNT_EVERY_S = 10.0
 
 
 def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> float:
-    left = runs_left(notice.runs_left)
-    talk.say("", f"Rest. Let go of the handle for at least {notice.seconds:.0f} s. {left}")
+    words = talk.words
+    rested = words.fill("line_rest", {"seconds": f"{notice.seconds:.0f}"})
+    talk.say("", f"{rested} {words.counted('runs_left', notice.runs_left)}")
     if notice.progress is not None:
-        talk.say(progress_sentence(notice.progress))
+        talk.say(progress_sentence(notice.progress, words))
     started_s = talk.clock.now_s()
     if _count_down(started_s + notice.seconds, talk, sign_of_life):
         talk.forget()
-        talk.say("Press Enter to go on.")
+        talk.speak("enter_goes_on")
         line = talk.wait(sign_of_life)
         if line is WaitOver.INPUT_ENDED or (isinstance(line, Line) and line.word == "q"):
             raise KeyboardInterrupt
@@ -31,10 +32,12 @@ def pause(
     notice: PauseNotice, talk: Conversation, note: Callable[[NoteAsked], None] | None, sign_of_life: SignOfLife
 ) -> AfterPause:
     talk.forget()
-    talk.say("", f"Pause ({notice.reason}). Nothing is played. {answers_are(notice.answers)} on disk.")
-    talk.say(_choices(notes=note is not None))
+    words = talk.words
+    paused = words.fill("line_pause", {"reason": words.fact(notice.reason)})
+    talk.say("", f"{paused} {words.counted('saved', notice.answers)}")
+    talk.say(_choices(note is not None, words))
     while True:
-        talk.prompt("Enter goes on: ")
+        talk.prompt(words["line_pause_prompt"])
         line = talk.wait(sign_of_life)
         if line is WaitOver.CUT_SHORT:
             return AfterPause.LEAVE
@@ -51,33 +54,33 @@ def pause(
             case "n" | "e" if note is not None:
                 _take_note(line.word == "e", talk, note)
             case "?":
-                talk.say(_choices(notes=note is not None))
+                talk.say(_choices(note is not None, words))
             case _:
-                talk.say(f"{shown(line)} is none of the keys; ? tells them.")
+                talk.refuse("line_pause_no_key", line)
 
 
-def _choices(notes: bool) -> str:
-    more = " n writes a note, e reports that something happened to the participant." if notes else ""
-    return f"Enter goes on, q leaves and another day goes on, w takes the consent back and erases the session.{more}"
+def _choices(notes: bool, words: Words) -> str:
+    return " ".join(words[key] for key in ("line_pause_keys", *(["line_pause_notes"] if notes else [])))
 
 
 def _withdraws(talk: Conversation) -> bool:
-    talk.say("Everything recorded of this participant will be erased, and cannot be brought back.")
-    talk.prompt(f"Type {WITHDRAW} to confirm; Enter alone keeps everything: ")
-    confirmed = talk.answer().word == WITHDRAW
+    word = talk.words["withdraw_word"]
+    talk.speak("withdraw_all")
+    talk.prompt(talk.words.fill("line_withdraw", {"word": word}))
+    confirmed = talk.answer().word == word.casefold()
     if not confirmed:
-        talk.say("Nothing is erased.")
+        talk.speak("nothing_erased")
     return confirmed
 
 
 def _take_note(adverse: bool, talk: Conversation, note: Callable[[NoteAsked], None]) -> None:
-    talk.prompt("What happened? " if adverse else "Note: ")
+    talk.prompt(talk.words["line_happened" if adverse else "line_note"])
     text = printable(talk.answer().text)
     if not text:
-        talk.say("Nothing was written.")
+        talk.speak("nothing_written")
         return
     note(NoteAsked("participant", text, adverse))
-    talk.say("Written into the log.")
+    talk.speak("line_noted")
 
 
 def _count_down(until_s: float, talk: Conversation, sign_of_life: SignOfLife) -> bool:

@@ -1,7 +1,7 @@
 """Line mode: one trial with its question and instructions."""
 
 from protocols.trial import VoidCause
-from study.session.views.counted import answers_are
+from protocols.wording.words import Words
 from study.session.views.views import (
     Answered,
     DirectionPicture,
@@ -15,52 +15,49 @@ from study.session.views.views import (
 from study.tui.drawing.direction_picture import draw_directions, sentence
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.line_mode.conversation import Conversation, Line, WaitOver, shown
-from study.tui.trial_replies import NO_REPEATS, PAUSE, REPEAT, repeat_words
+from study.tui.trial_replies import PAUSE, REPEAT, repeat_words
 from study.tui.trial_words import heading, plan
 from study.workflows.trial.display import SignOfLife
 
 LEFT = Unanswered("the participant left", leave=True)
-INTERVALS = "In one of the two intervals it shook, however weakly; in the other it did not. Type the number of the one."
 
 
-def keys_sentence(keys: AnswerKeys) -> str:
-    return (
-        f"Keys: {keys.choice} answers, r plays it again, p pauses, q leaves, ? shows this. Each "
-        "followed by Enter. Ctrl-C stops the device at once."
-    )
+def keys_sentence(keys: AnswerKeys, words: Words) -> str:
+    return words.fill("line_keys", {"keys": keys.choice(words)})
 
 
-def picture_lines(picture: DirectionPicture) -> tuple[str, ...]:
+def picture_lines(picture: DirectionPicture, words: Words) -> tuple[str, ...]:
     """The drawing, and both directions in words."""
-    return (*draw_directions(picture), sentence(picture, 1), sentence(picture, 2))
+    return (*draw_directions(picture), sentence(picture, 1, words), sentence(picture, 2, words))
 
 
 def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
+    words = talk.words
     talk.forget()
     talk.say(notice.title, "")
     if notice.resumed_after:
-        talk.say(f"Welcome back: {answers_are(notice.resumed_after)} on disk; the study goes on where it stopped.", "")
+        talk.say(words.counted("welcome_back", notice.resumed_after), "")
     talk.say(
-        "Hold the handle with a constant, comfortable grip. In each trial it shakes along one of two directions:",
+        words["line_hold"],
         "",
-        *picture_lines(notice.picture),
+        *picture_lines(notice.picture, words),
         "",
-        "Feel as long as you like, then type its number and Enter. When in doubt, guess.",
-        plan(notice),
-        keys_sentence(keys),
+        words["line_how"],
+        plan(notice, words),
+        keys_sentence(keys, words),
     )
     if not notice.felt:
-        talk.say("", f"Practice: the device is a simulation ({notice.device}), so nothing moves here.")
-        talk.say("Your answers are marked 'not felt' and never enter an analysis of people.")
-    talk.say("", "Press Enter to begin.")
+        talk.say("", words.fill("not_felt", {"device": notice.device}))
+    talk.say("", words["enter_begins"])
     talk.answer_or_leave()
 
 
 def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
+    words, choice = talk.words, {"keys": keys.choice(talk.words)}
     talk.forget()
-    talk.say("", heading(question))
+    talk.say("", heading(question, words))
     until_s = talk.clock.now_s() + question.time_limit_s if question.time_limit_s else float("inf")
-    prompt = f"Which interval, {keys.choice}? " if question.task is Task.INTERVAL else f"{keys.choice}? "
+    prompt = words.fill("line_which_interval" if question.task is Task.INTERVAL else "line_which", choice)
     while True:
         talk.prompt(prompt)
         line = talk.wait(sign_of_life, until_s)
@@ -70,16 +67,22 @@ def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: 
         reply = parse_reply(line, keys)
         if reply is REPEAT:
             if question.repeats_left == 0:
-                talk.say(f"{NO_REPEATS} Type {keys.choice} and Enter; ? for help.")
+                talk.say(f"{words['no_repeats']} {words.fill('line_type', choice)}")
                 continue
-            talk.say(repeat_words(question.repeats_left))
+            talk.say(repeat_words(question.repeats_left, words))
         if reply is not None:
             return reply
         if line.word == "?":
-            explanation = (INTERVALS,) if question.task is Task.INTERVAL else picture_lines(question.picture)
-            talk.say(*explanation, keys_sentence(keys))
+            talk.say(*_explanation(question, words), keys_sentence(keys, words))
         else:
-            talk.say(f"{shown(line)} is no answer. Type {keys.choice} and Enter; ? for help.")
+            refused = words.fill("no_answer", {"typed": shown(line, words)})
+            talk.say(f"{refused} {words.fill('line_type', choice)}")
+
+
+def _explanation(question: Question, words: Words) -> tuple[str, ...]:
+    if question.task is Task.INTERVAL:
+        return (words["line_intervals"],)
+    return picture_lines(question.picture, words)
 
 
 def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
@@ -92,10 +95,6 @@ def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
 
 def practice_over(result: PracticeResult, talk: Conversation) -> None:
     talk.forget()
-    talk.say("", f"End of this practice. Right answers: {result.right} of the last {result.of}.")
-    if result.passed:
-        talk.say("That is enough to go on.")
-    else:
-        talk.say("Some vibrations are hard to tell for everyone. The study goes on all the same.")
-    talk.say("Press Enter to go on.")
+    talk.say("", talk.words.fill("line_practice", {"right": result.right, "asked": result.of}))
+    talk.speak("practice_enough" if result.passed else "practice_hard", "enter_goes_on")
     talk.answer_or_leave()

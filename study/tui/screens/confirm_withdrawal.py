@@ -9,22 +9,16 @@ from textual.screen import ModalScreen
 from textual.widgets import Footer, Input
 
 from study.tui.screens.help import HelpScreen
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
-from study.tui.trial_words import WITHDRAW
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 
-class ConfirmWithdrawal(ModalScreen[bool]):
+class ConfirmWithdrawal(SpokenScreen[bool], ModalScreen[bool]):
     """Returns True if the word was typed."""
 
-    HELP = """\
-# Taking the consent back
-
-- A participant may take the consent back at any time, without giving a reason.
-- Everything recorded of this participant is then erased, and cannot be brought back.
-- Type the word and press **Enter** to erase. **Esc** keeps everything.
-"""
+    PAGE = "help_withdraw"
     DEFAULT_CSS = """
     ConfirmWithdrawal { align: center middle; }
     ConfirmWithdrawal Card { border: round $error; }
@@ -37,24 +31,24 @@ class ConfirmWithdrawal(ModalScreen[bool]):
     ]
 
     def compose(self) -> ComposeResult:
-        with Card("Take the consent back"):
-            yield LiteralText("Everything recorded of this participant will be erased, and cannot be brought back.")
-            yield LiteralText(
-                f"To erase it, type {WITHDRAW} and press Enter. Esc keeps everything.", classes="gap strong"
-            )
+        words = self.words
+        with Card(words["withdraw_title"]):
+            yield LiteralText(words["withdraw_all"])
+            yield LiteralText(words.fill("withdraw_how", {"word": words["withdraw_word"]}), classes="gap strong")
             yield Input(compact=True)
             yield LiteralText(id="said")
         yield Footer(show_command_palette=False)
 
     @on(Input.Submitted)
     def _judge(self, typed: Input.Submitted) -> None:
-        if typed.value.strip().casefold() == WITHDRAW:
+        word = self.words["withdraw_word"]
+        if typed.value.strip().casefold() == word.casefold():
             take_off(self, True)
         else:
-            self.query_one("#said", LiteralText).update(f"That is not the word {WITHDRAW}. Nothing is erased.")
+            self.query_one("#said", LiteralText).update(self.words.fill("withdraw_other", {"word": word}))
 
     def action_help(self) -> None:
-        self.app.push_screen(HelpScreen(self.HELP))
+        self.app.push_screen(HelpScreen(self.HELP, self.words))
 
     def action_leave(self) -> None:
         take_off(self, False)

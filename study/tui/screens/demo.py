@@ -7,25 +7,20 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.events import Key
 from textual.message import Message
-from textual.screen import Screen
 from textual.widgets import Footer
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
+from study.tui.trial_words import felt_so_far
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
 
 
-class DemoScreen(Screen[DemoChoice]):
-    HELP = """\
-# Demonstration
-
-- **1** and **2** play that direction, as often as you like. Nothing is asked, nothing is recorded as an answer.
-- **Left** and **Right** (or **b** and **n**) change the vibration: 1 is the slowest.
-- What you have felt already is marked with a tick.
-- **Enter** ends the demonstration; it asks once if something was not felt yet.
-"""
+class DemoScreen(SpokenScreen[DemoChoice]):
+    PAGE = "help_demo"
     DEFAULT_CSS = """
     DemoScreen #title { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
     DemoScreen #steps { height: 1; margin: 0 1; text-align: center; }
@@ -46,8 +41,8 @@ class DemoScreen(Screen[DemoChoice]):
     class PauseWanted(Message):
         """The demonstration's reply has no word for it."""
 
-    def __init__(self, menu: DemoMenu, keys: AnswerKeys = DIGITS) -> None:
-        super().__init__()
+    def __init__(self, menu: DemoMenu, keys: AnswerKeys = DIGITS, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._menu = menu
         self._keys = keys
         self._vibration = menu.vibration
@@ -57,14 +52,14 @@ class DemoScreen(Screen[DemoChoice]):
         yield LiteralText(id="title")
         yield LiteralText(id="steps")
         with Horizontal(id="answers"):
-            yield DirectionPanel(1, self._menu.picture)
-            yield DirectionPanel(2, self._menu.picture)
+            yield DirectionPanel(1, self._menu.picture, self.words)
+            yield DirectionPanel(2, self._menu.picture, self.words)
         yield LiteralText(id="said")
-        yield LiteralText("" if self._menu.handle_moves else "The device is a simulation: nothing moves.", id="note")
+        yield LiteralText("" if self._menu.handle_moves else self.words["simulation"], id="note")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._show(f"Press {self._keys.choice} to feel it, → for the next one, Enter when you felt enough.")
+        self._show(self.words.fill("demo_how", {"keys": self._keys.choice(self.words)}))
 
     def on_key(self, event: Key) -> None:
         answer = self._keys.answer(event.character or event.key)
@@ -78,12 +73,12 @@ class DemoScreen(Screen[DemoChoice]):
     def action_turn(self, step: int) -> None:
         turned = self._vibration + step
         if turned < 1:
-            self._show("This is the slowest vibration.")
+            self._show(self.words["demo_slowest"])
         elif turned > self._menu.vibrations:
-            self._show("This is the fastest vibration.")
+            self._show(self.words["demo_fastest"])
         else:
             self._vibration = turned
-            self._show(self._so_far())
+            self._show(felt_so_far(self._menu, self._vibration, self.words))
 
     def action_pause(self) -> None:
         self.post_message(self.PauseWanted())
@@ -93,15 +88,14 @@ class DemoScreen(Screen[DemoChoice]):
         unfelt = 2 * self._menu.vibrations - len(set(self._menu.felt))
         if unfelt and not self._asked:
             self._asked = True
-            count = f"{unfelt} of {2 * self._menu.vibrations}"
-            self._show(f"{count} were not felt yet: ← and → lead there. Enter again goes on.")
+            self._show(self.words.fill("demo_unfelt", {"unfelt": unfelt, "all": 2 * self._menu.vibrations}))
             return
         take_off(self, DemoDone())
 
     def _show(self, sentence: str) -> None:
         menu = self._menu
         self.query_one("#title", LiteralText).update(
-            f"Demonstration: vibration {self._vibration} of {menu.vibrations}. Feel both directions."
+            self.words.fill("demo_title", {"vibration": self._vibration, "vibrations": menu.vibrations})
         )
         self.query_one("#steps", LiteralText).update("  ".join(self._step(v + 1) for v in range(menu.vibrations)))
         for panel in self.query(DirectionPanel):
@@ -111,7 +105,3 @@ class DemoScreen(Screen[DemoChoice]):
     def _step(self, vibration: int) -> str:
         ticks = "".join("✓" if (vibration, number) in self._menu.felt else "·" for number in (1, 2))
         return f"[{vibration} {ticks}]" if vibration == self._vibration else f" {vibration} {ticks} "
-
-    def _so_far(self) -> str:
-        felt = [str(number) for number in (1, 2) if (self._vibration, number) in self._menu.felt]
-        return f"Felt so far: {' and '.join(felt)}." if felt else "Nothing of it was felt yet."

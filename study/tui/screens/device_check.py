@@ -4,26 +4,20 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.screen import Screen
 from textual.widgets import Footer
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import DeviceFinding, DeviceReport
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.literal_text import LiteralText
 
 
-class DeviceCheckScreen(Screen[bool]):
+class DeviceCheckScreen(SpokenScreen[bool]):
     """True: go on. False: check again."""
 
-    HELP = """\
-# Device check
-
-- Each line is one finding: **ok**, **warn** or **LOOK**, with what to do about it.
-- **c** checks again, after something was plugged in or mended.
-- **Enter** goes on where all is well; **g** goes on although something needs a look.
-- The findings are kept with the data.
-"""
+    PAGE = "help_check"
     DEFAULT_CSS = """
     DeviceCheckScreen { align: center top; }
     DeviceCheckScreen .advice { margin-left: 6; color: $text-warning; }
@@ -35,32 +29,27 @@ class DeviceCheckScreen(Screen[bool]):
         Binding("c", "check_again", "Check again"),
     ]
 
-    def __init__(self, report: DeviceReport) -> None:
-        super().__init__()
+    def __init__(self, report: DeviceReport, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._report = report
 
     def compose(self) -> ComposeResult:
-        report = self._report
+        report, words = self._report, self.words
         names = max((len(finding.name) for finding in report.findings), default=0)
         with Sheet():
-            yield LiteralText(f"Device check: {report.device}", classes="title")
+            yield LiteralText(words.fill("check_title", {"device": report.device}), classes="title")
             if report.simulated:
-                yield LiteralText("The device is a simulation: nothing moves.")
+                yield LiteralText(words["simulation"])
             yield LiteralText()
             for finding in report.findings:
                 yield LiteralText(_line(finding, names), classes="fine" if finding.fine else "look")
                 if finding.advice and not finding.fine:
                     yield LiteralText(finding.advice, classes="advice")
-            if report.conclusion:
-                yield LiteralText(f"{report.conclusion} Press Enter to go on.", classes="gap strong")
-            else:
-                yield LiteralText(
-                    "Something needs a look. Press c to check again, or g to go on all the same.", classes="gap strong"
-                )
+            yield LiteralText(_conclusion(report, words), classes="gap strong")
         yield Footer(show_command_palette=False)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        usable = bool(self._report.conclusion)
+        usable = self._report.usable
         return {"go_on": usable, "go_on_anyway": not usable}.get(action, True)
 
     def action_go_on(self) -> None:
@@ -71,6 +60,12 @@ class DeviceCheckScreen(Screen[bool]):
 
     def action_check_again(self) -> None:
         take_off(self, False)
+
+
+def _conclusion(report: DeviceReport, words: Words) -> str:
+    if not report.usable:
+        return words["check_look"]
+    return f"{words['check_ready' if report.fine else 'check_ready_warning']} {words['enter_goes_on']}"
 
 
 def _line(finding: DeviceFinding, names: int) -> str:

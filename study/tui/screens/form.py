@@ -9,9 +9,9 @@ from textual.containers import Container
 from textual.errors import NoWidget
 from textual.events import Click, Event, Key, Paste
 from textual.message import Message
-from textual.screen import Screen
 from textual.widgets import Button, Footer
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.form_entry import (
     FormEntry,
     blank_entry,
@@ -23,7 +23,9 @@ from study.session.views.form_entry import (
     reply_of,
 )
 from study.session.views.form_views import Form, FormReply, find_missing_fields
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
+from study.tui.trial_words import limits_words, origin
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.form_question import FormQuestion
@@ -42,22 +44,13 @@ KEYS = (
 )
 """Footer entries: key, where it has this meaning (empty: everywhere), how it is shown, meaning."""
 FOOTER_KEYS = frozenset(key for key, *_ in KEYS)
-FINISHED = "Go down to Continue and press Enter."
 
 
-class FormScreen(Screen[FormReply]):
+class FormScreen(SpokenScreen[FormReply]):
     """Shows a `FormEntry`. No widget in it has the focus: keys, clicks and pastes come to the screen in order, and
     each is applied to the entry before the next."""
 
-    HELP = """\
-# A form
-
-- **Up**, **Down** and **Tab** go from question to question.
-- A choice is made by its number, by its first letter, or with **Left**, **Right** and **Space**.
-- **Enter** chooses what is highlighted and goes to the next question.
-- **Continue** stands below the last question. It says what is missing.
-- You may ask the experimenter about anything that is unclear. **Ctrl+C** leaves.
-"""
+    PAGE = "help_form"
     DEFAULT_CSS = """
     FormScreen Container { height: 1fr; align-horizontal: center; }
     FormScreen #top { height: 1; padding: 0 1; background: $panel; text-style: bold; }
@@ -81,8 +74,8 @@ class FormScreen(Screen[FormReply]):
         widget: ChoiceRow | FormQuestion | Button
         choice: int | None = None
 
-    def __init__(self, form: Form) -> None:
-        super().__init__()
+    def __init__(self, form: Form, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._entry = blank_entry(form)
         self._alive: list[bool | None] = []
 
@@ -92,9 +85,9 @@ class FormScreen(Screen[FormReply]):
         with Container(), Sheet(can_focus=False):
             yield LiteralText(form.introduction, id="introduction")
             for number, field in enumerate(form.fields, start=1):
-                yield FormQuestion(number, field)
-            yield LiteralText(_origin(form), id="origin")
-            button = Button("Continue", variant="primary", compact=True)
+                yield FormQuestion(number, field, self.words)
+            yield LiteralText(origin(form, self.words), id="origin")
+            button = Button(self.words["key_continue"], variant="primary", compact=True)
             button.can_focus = False
             yield button
         yield LiteralText(id="said")
@@ -190,29 +183,29 @@ class FormScreen(Screen[FormReply]):
         if entry.field is None:
             button.scroll_visible(animate=False)
         open_ones = len(find_missing_fields(entry.form, reply_of(entry)))
-        told = f"{open_ones} of {len(entry.given)} still open" if open_ones else "everything is answered"
-        self.query_one("#top", LiteralText).update(f"{entry.form.title}: {told}")
-        self.query_one("#said", LiteralText).update(_said(entry, all_answered=not open_ones))
+        counts = {"title": entry.form.title, "open": open_ones, "all": len(entry.given)}
+        top = self.words.fill("form_open" if open_ones else "form_complete", counts)
+        self.query_one("#top", LiteralText).update(top)
+        self.query_one("#said", LiteralText).update(_said(entry, not open_ones, self.words))
         alive = [self.check_action("press", key[:2]) for key in KEYS]
         if alive != self._alive:
             self._alive = alive
             self.refresh_bindings()
 
 
-def _said(entry: FormEntry, all_answered: bool) -> str:
+def _said(entry: FormEntry, all_answered: bool, words: Words) -> str:
     if entry.open:
-        left = len(entry.open) - 1
-        more = "" if not left else " 1 more is open." if left == 1 else f" {left} more are open."
-        return f"Please answer {entry.open[0] + 1}: {_quote(entry.form.fields[entry.open[0]].label)}{more}"
+        left, field = len(entry.open) - 1, entry.form.fields[entry.open[0]]
+        asked = _quote(field.label) if field.limits is None else limits_words(field.limits, words)
+        please = words.fill("form_please", {"number": entry.open[0] + 1, "question": asked})
+        return f"{please} {words.counted('form_more', left)}" if left else please
     if entry.check:
-        changed = ", ".join(f"{index + 1} is “{entry.given[index].answer}”" for index in entry.check)
-        return f"Changed: {changed}. If that is right, go to Continue once more."
-    return FINISHED if all_answered else ""
-
-
-def _origin(form: Form) -> str:
-    parts = (form.version and f"Version {form.version}", form.ethics_id and f"Ethics approval {form.ethics_id}")
-    return ". ".join(part for part in parts if part) + "." if any(parts) else ""
+        changes = ", ".join(
+            words.fill("form_change", {"number": index + 1, "answer": entry.given[index].answer})
+            for index in entry.check
+        )
+        return words.fill("form_changed", {"changes": changes})
+    return words["form_done"] if all_answered else ""
 
 
 def _quote(label: str) -> str:

@@ -4,53 +4,48 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.screen import Screen
 from textual.widgets import Footer
 
-from study.session.views.counted import answers_are
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Goodbye
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
 from study.tui.trial_words import refusal_words
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 
-class GoodbyeScreen(Screen[None]):
-    HELP = """\
-# The end
-
-- The device is still, and every answer is on the disk.
-- A session that is not finished can be resumed another day, at the trial where it stopped.
-- **Enter** closes this page.
-"""
+class GoodbyeScreen(SpokenScreen[None]):
+    PAGE = "help_goodbye"
     DEFAULT_CSS = "GoodbyeScreen { align: center middle; }"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "close_page", "Close", key_display="Enter")]
 
-    def __init__(self, notice: Goodbye) -> None:
-        super().__init__()
+    def __init__(self, notice: Goodbye, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._notice = notice
 
     def compose(self) -> ComposeResult:
-        notice = self._notice
-        with Card("Thank you" if notice.outcome else "Finished" if notice.finished else "The end of this sitting"):
+        notice, words = self._notice, self.words
+        title = "end_thanks" if notice.outcome else "end_finished" if notice.finished else "end_sitting"
+        with Card(words[title]):
             if notice.outcome:
-                for sentence in refusal_words(notice.outcome):
+                for sentence in refusal_words(notice.outcome, words):
                     yield LiteralText(sentence, classes="strong")
             elif notice.finished:
-                yield LiteralText("Thank you! This was the last trial.", classes="strong")
+                yield LiteralText(words["end_last_trial"], classes="strong")
             else:
-                yield LiteralText(f"Thank you. The session stops here{_because(notice.reason)}.", classes="strong")
+                yield LiteralText(_stops(notice.reason, words), classes="strong")
             if notice.answers:
-                yield LiteralText(f"{answers_are(notice.answers)} on the disk.", classes="gap")
+                yield LiteralText(words.counted("saved", notice.answers), classes="gap")
             if notice.answers and not notice.finished:
-                yield LiteralText("It can be resumed at the trial where it stopped.", classes="gap")
-            held = "" if notice.outcome else "You may let go of the handle. "
-            yield LiteralText(f"{held}Press Enter to close this page.", classes="gap")
+                yield LiteralText(words["end_resume"], classes="gap")
+            held = "" if notice.outcome else f"{words['end_let_go']} "
+            yield LiteralText(f"{held}{words['end_close']}", classes="gap")
         yield Footer(show_command_palette=False)
 
     def action_close_page(self) -> None:
         take_off(self, None)
 
 
-def _because(reason: str) -> str:
-    return f": {reason}" if reason else ""
+def _stops(reason: str, words: Words) -> str:
+    return words.fill("end_stops_because", {"reason": words.fact(reason)}) if reason else words["end_stops"]

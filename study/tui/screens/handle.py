@@ -4,27 +4,21 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.screen import Screen
 from textual.widgets import Footer
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import HandleView, Unanswered
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.handle_target import HandleTarget
 from study.tui.widgets.literal_text import LiteralText
 
 
-class HandleScreen(Screen[Unanswered | None]):
+class HandleScreen(SpokenScreen[Unanswered | None]):
     """The application closes it when the handle is there."""
 
-    HELP = """\
-# The handle's place
-
-- The ring is where a trial may start; the spot is your handle.
-- Move it into the ring and hold it there loosely. The trial then begins by itself.
-- **p** pauses, **q** pauses and offers to leave.
-- If the spot never moves, tell the experimenter: the device may have lost its handle.
-"""
+    PAGE = "help_handle"
     DEFAULT_CSS = """
     HandleScreen #title { height: 1; margin: 1 1 1 1; text-align: center; text-style: bold; }
     HandleScreen HandleTarget { margin: 0 1; }
@@ -36,12 +30,12 @@ class HandleScreen(Screen[Unanswered | None]):
         Binding("q", "leave", "Leave"),
     ]
 
-    def __init__(self, view: HandleView) -> None:
-        super().__init__()
+    def __init__(self, view: HandleView, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._view = view
 
     def compose(self) -> ComposeResult:
-        yield LiteralText("Bring the handle into the ring. The trial then begins by itself.", id="title")
+        yield LiteralText(self.words["handle_title"], id="title")
         yield HandleTarget()
         yield LiteralText(id="sentence")
         yield Footer(show_command_palette=False)
@@ -53,7 +47,7 @@ class HandleScreen(Screen[Unanswered | None]):
         self._view = view
         if self.query(HandleTarget):  # not yet, where it comes before the first frame
             self.query_one(HandleTarget).view = view
-            self.query_one("#sentence", LiteralText).update(view.sentence)
+            self.query_one("#sentence", LiteralText).update(self.words.fact(view.sentence))
 
     def action_pause(self) -> None:
         take_off(self, PAUSE)

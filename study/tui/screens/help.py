@@ -8,10 +8,12 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Footer
 
+from protocols.wording.words import ENGLISH_WORDS, Words
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
 
 
-class HelpScreen(ModalScreen[None]):
+class HelpScreen(SpokenScreen[None], ModalScreen[None]):
     CSS = """
     HelpScreen { align: center middle; }
     HelpScreen VerticalScroll {
@@ -21,15 +23,15 @@ class HelpScreen(ModalScreen[None]):
     """
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape,f1,q,question_mark", "leave", "Back", key_display="Esc")]
 
-    def __init__(self, text: str) -> None:
-        super().__init__()
+    def __init__(self, text: str, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._text = text
 
     def compose(self) -> ComposeResult:
         from textual.widgets import Markdown  # takes its time, and the first frame needs none
 
         with VerticalScroll() as box:
-            box.border_title = "Help"
+            box.border_title = self.words["help_title"]
             yield Markdown(self._text)
         yield Footer()
 

@@ -1,6 +1,6 @@
 """A note for the log by the person at the screen, or a report of an adverse event."""
 
-from typing import ClassVar, cast
+from typing import ClassVar
 
 from textual import on
 from textual.app import ComposeResult
@@ -8,8 +8,10 @@ from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen
 from textual.widgets import Button, Footer, TextArea
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.watching.requests import NoteAsked, Who
 from study.tui.screens.help import HelpScreen
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.choice_row import ChoiceRow
@@ -19,17 +21,10 @@ MOST_CHARACTERS = 500
 WRITERS: tuple[Who, ...] = ("participant", "experimenter")
 
 
-class NoteScreen(ModalScreen[NoteAsked | None]):
+class NoteScreen(SpokenScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
     """Returns None if nothing is to be written."""
 
-    HELP = """\
-# A note
-
-- Write what should be known about this session later. No names: the log is kept with the data.
-- **Tab** goes on to who writes it, and whether something happened to the participant.
-- **Ctrl+S** or the button writes it into the log; **Esc** leaves without writing.
-- If a person was hurt, leave the handle alone and look after the participant first.
-"""
+    PAGE = "help_note"
     DEFAULT_CSS = """
     NoteScreen { align: center middle; }
     NoteScreen TextArea { height: 5; margin: 1 0; }
@@ -43,20 +38,22 @@ class NoteScreen(ModalScreen[NoteAsked | None]):
         Binding("f1", "help", "Help"),
     ]
 
-    def __init__(self, adverse: bool = False, who: Who = "participant") -> None:
-        super().__init__()
+    def __init__(self, adverse: bool = False, who: Who = "participant", words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._adverse = adverse
         self._who = who
 
     def compose(self) -> ComposeResult:
-        with Card("Something happened" if self._adverse else "A note"):
-            yield LiteralText("What happened?" if self._adverse else "What is to be noted? No names, please.")
+        words = self.words
+        with Card(words["note_title_happened" if self._adverse else "note_title"]):
+            yield LiteralText(words["note_happened" if self._adverse else "note_what"])
             yield TextArea(soft_wrap=True, tab_behavior="focus")
-            yield LiteralText("Who writes this?")
-            yield ChoiceRow(WRITERS, WRITERS.index(self._who) if self._who in WRITERS else None, id="who")
-            yield LiteralText("Did something happen to the participant, such as pain, numbness or a fright?")
-            yield ChoiceRow(("no", "yes"), int(self._adverse), id="adverse")
-            yield Button("Write it into the log", variant="primary", compact=True)
+            yield LiteralText(words["note_who"])
+            writers = tuple(words[f"note_{who}"] for who in WRITERS)
+            yield ChoiceRow(writers, WRITERS.index(self._who) if self._who in WRITERS else None, id="who")
+            yield LiteralText(words["note_adverse"])
+            yield ChoiceRow((words["no"], words["yes"]), int(self._adverse), id="adverse")
+            yield Button(words["note_button"], variant="primary", compact=True)
             yield LiteralText(id="said")
         yield Footer(show_command_palette=False)
 
@@ -67,21 +64,21 @@ class NoteScreen(ModalScreen[NoteAsked | None]):
     @on(Button.Pressed)
     def action_save(self) -> None:
         text = " ".join(self.query_one(TextArea).text.split())
-        who = self.query_one("#who", ChoiceRow).answer
+        who = self.query_one("#who", ChoiceRow).chosen
         if not text:
-            self._refuse("Nothing is written yet. Type what happened, or press Esc to leave.")
+            self._refuse(self.words["note_empty"])
         elif len(text) > MOST_CHARACTERS:
-            self._refuse(f"At most {MOST_CHARACTERS} characters fit; these are {len(text)}.")
-        elif not who:
-            self._refuse("Please choose who writes this.")
+            self._refuse(self.words.fill("note_long", {"most": MOST_CHARACTERS, "count": len(text)}))
+        elif who is None:
+            self._refuse(self.words["note_no_writer"])
         else:
-            take_off(self, NoteAsked(cast(Who, who), text, self.query_one("#adverse", ChoiceRow).answer == "yes"))
+            take_off(self, NoteAsked(WRITERS[who], text, self.query_one("#adverse", ChoiceRow).chosen == 1))
 
     def action_leave(self) -> None:
         take_off(self, None)
 
     def action_help(self) -> None:
-        self.app.push_screen(HelpScreen(self.HELP))
+        self.app.push_screen(HelpScreen(self.HELP, self.words))
 
     def _refuse(self, sentence: str) -> None:
         self.query_one("#said", LiteralText).update(sentence)

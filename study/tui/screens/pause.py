@@ -7,38 +7,30 @@ from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.message import Message
-from textual.screen import Screen
 from textual.widgets import Footer, OptionList
 from textual.widgets.option_list import Option
 
-from study.session.views.counted import answers_are
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import AfterPause, PauseNotice
 from study.session.watching.requests import NoteAsked
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.note import NoteScreen
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 CHOICES = {
-    AfterPause.GO_ON: "Go on with the study",
-    AfterPause.LEAVE: "Leave; the session can be resumed another day",
-    AfterPause.WITHDRAW: "Take the consent back; everything is erased",
+    AfterPause.GO_ON: "pause_go_on",
+    AfterPause.LEAVE: "pause_leave",
+    AfterPause.WITHDRAW: "pause_withdraw",
 }
 
 
-class PauseScreen(Screen[AfterPause]):
+class PauseScreen(SpokenScreen[AfterPause]):
     """leaving: the participant asked to leave, so that choice is highlighted."""
 
-    HELP = """\
-# Pause
-
-- Nothing is played, and the handle is free. Take as long as you like.
-- **Up** and **Down** choose how to go on, **Enter** does it.
-- **n** writes a note into the log; **e** reports that something happened to the participant.
-- Leaving keeps every answer: the session can be resumed at this trial.
-- Taking the consent back erases everything, and asks once more before it does.
-"""
+    PAGE = "help_pause"
     DEFAULT_CSS = """
     PauseScreen { align: center middle; }
     PauseScreen OptionList, PauseScreen OptionList:focus {
@@ -56,18 +48,18 @@ class PauseScreen(Screen[AfterPause]):
     class NoteWritten(Message):
         note: NoteAsked
 
-    def __init__(self, notice: PauseNotice, leaving: bool = False) -> None:
-        super().__init__()
+    def __init__(self, notice: PauseNotice, leaving: bool = False, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._notice = notice
         self._leaving = leaving
 
     def compose(self) -> ComposeResult:
-        answers = self._notice.answers
-        with Card("Pause"):
-            yield LiteralText("Nothing is played. You may let go of the handle.", classes="strong")
-            yield LiteralText(f"Reason: {self._notice.reason}.", classes="gap")
-            yield LiteralText(f"{answers_are(answers)} on the disk.")
-            yield OptionList(*(Option(words, id=choice.value) for choice, words in CHOICES.items()), markup=False)
+        words = self.words
+        with Card(words["pause_title"]):
+            yield LiteralText(words["pause_free"], classes="strong")
+            yield LiteralText(words.fill("pause_reason", {"reason": words.fact(self._notice.reason)}), classes="gap")
+            yield LiteralText(words.counted("saved", self._notice.answers))
+            yield OptionList(*(Option(words[key], id=choice.value) for choice, key in CHOICES.items()), markup=False)
             yield LiteralText(id="said")
         yield Footer(show_command_palette=False)
 
@@ -79,7 +71,7 @@ class PauseScreen(Screen[AfterPause]):
     def _decide(self, selected: OptionList.OptionSelected) -> None:
         choice = AfterPause(selected.option.id)
         if choice is AfterPause.WITHDRAW:
-            self.app.push_screen(ConfirmWithdrawal(), self._withdraw)
+            self.app.push_screen(ConfirmWithdrawal(self.words), self._withdraw)
         else:
             take_off(self, choice)
 
@@ -87,17 +79,17 @@ class PauseScreen(Screen[AfterPause]):
         self.query_one(OptionList).action_select()
 
     def action_note(self, adverse: bool) -> None:
-        self.app.push_screen(NoteScreen(adverse), self._take_note)
+        self.app.push_screen(NoteScreen(adverse, words=self.words), self._take_note)
 
     def _withdraw(self, confirmed: bool | None) -> None:
         if confirmed:
             take_off(self, AfterPause.WITHDRAW)
         else:
-            self.query_one("#said", LiteralText).update("Nothing is erased.")
+            self.query_one("#said", LiteralText).update(self.words["nothing_erased"])
 
     def _take_note(self, note: NoteAsked | None) -> None:
         if note is None:
-            self.query_one("#said", LiteralText).update("Nothing was written.")
+            self.query_one("#said", LiteralText).update(self.words["nothing_written"])
             return
         self.post_message(self.NoteWritten(note))
-        self.query_one("#said", LiteralText).update("It goes into the log.")
+        self.query_one("#said", LiteralText).update(self.words["goes_into_log"])

@@ -5,26 +5,21 @@ from typing import ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
-from textual.screen import Screen
 from textual.widgets import Footer
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import PlayingNotice, Unanswered
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
 
 
-class PlayingScreen(Screen[Unanswered | None]):
+class PlayingScreen(SpokenScreen[Unanswered | None]):
     """The application closes it when the time is over."""
 
-    HELP = """\
-# Only feel
-
-- What you feel now is the one that is framed. It ends by itself.
-- No answer is needed yet: it is asked for afterwards.
-- **p** pauses at once; **q** pauses and offers to leave.
-"""
+    PAGE = "help_playing"
     DEFAULT_CSS = """
     PlayingScreen #title { height: 1; margin: 2 1 0 1; text-align: center; text-style: bold; }
     PlayingScreen #answers { height: 1fr; margin: 0 1; }
@@ -36,24 +31,24 @@ class PlayingScreen(Screen[Unanswered | None]):
         Binding("q", "leave", "Leave"),
     ]
 
-    def __init__(self, notice: PlayingNotice) -> None:
-        super().__init__()
+    def __init__(self, notice: PlayingNotice, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._notice = notice
 
     def compose(self) -> ComposeResult:
-        notice = self._notice
-        yield LiteralText(notice.title, id="title")
+        notice, words = self._notice, self.words
+        yield LiteralText(words.fact(notice.title), id="title")
         if notice.title and not notice.number:  # a probe: nothing will be asked about it
-            yield LiteralText("It ends by itself. No key is needed.", id="said")
+            yield LiteralText(words["playing_no_key"], id="said")
             yield Footer(show_command_palette=False)
             return
         with Horizontal(id="answers"):
             for number in (1, 2):
-                panel = DirectionPanel(number, notice.picture)
+                panel = DirectionPanel(number, notice.picture, words)
                 # Between two intervals there is nothing to feel, and no title.
                 panel.mark = "now" if notice.title and number == notice.number else ""
                 yield panel
-        yield LiteralText("Only feel. No key is needed yet." if notice.title else "A moment.", id="said")
+        yield LiteralText(words["playing_only_feel" if notice.title else "playing_gap"], id="said")
         yield Footer(show_command_palette=False)
 
     def action_pause(self) -> None:

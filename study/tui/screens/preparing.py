@@ -5,23 +5,16 @@ from collections.abc import Callable
 
 from textual.app import ComposeResult
 from textual.containers import Vertical
-from textual.screen import Screen
 from textual.widgets import Footer, Static
+
+from protocols.wording.words import ENGLISH_WORDS, Words
+from study.tui.spoken_screen import SpokenScreen
 
 TICK_S = 0.5
 
-HELP = """\
-# Preparing
 
-The program gets the device ready. Nothing moves, and there is nothing to do. The first time on a computer this
-takes longer, because the simulated device is compiled.
-
-**Ctrl+Q** leaves; a session that was begun can be resumed.
-"""
-
-
-class PreparingScreen(Screen[None]):
-    HELP = HELP
+class PreparingScreen(SpokenScreen[None]):
+    PAGE = "help_preparing"
     CSS = """
     PreparingScreen { align: center middle; }
     PreparingScreen > Vertical {
@@ -30,17 +23,19 @@ class PreparingScreen(Screen[None]):
     PreparingScreen #elapsed { margin-top: 1; color: $foreground 65%; }
     """
 
-    def __init__(self, sentence: str, now_s: Callable[[], float] = time.monotonic) -> None:
-        super().__init__()
+    def __init__(
+        self, sentence: str, now_s: Callable[[], float] = time.monotonic, words: Words = ENGLISH_WORDS
+    ) -> None:
+        super().__init__(words)
         self._sentence = sentence
         self._now_s = now_s
         self._began_s = now_s()
 
     def compose(self) -> ComposeResult:
         with Vertical() as box:
-            box.border_title = "One moment"
+            box.border_title = self.words["preparing_title"]
             yield Static(self._sentence, id="sentence", markup=False)
-            yield Static(elapsed_words(0.0), id="elapsed", markup=False)
+            yield Static(elapsed_words(0.0, self.words), id="elapsed", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -54,11 +49,17 @@ class PreparingScreen(Screen[None]):
         if self.query("#sentence"):
             self.query_one("#sentence", Static).update(sentence)
 
+    def speak(self, words: Words) -> None:
+        """In this language from now on."""
+        self.words = words
+        for box in self.query(Vertical):
+            box.border_title = words["preparing_title"]
+
     def _tick(self) -> None:
-        self.query_one("#elapsed", Static).update(elapsed_words(self._now_s() - self._began_s))
+        self.query_one("#elapsed", Static).update(elapsed_words(self._now_s() - self._began_s, self.words))
 
 
-def elapsed_words(seconds: float) -> str:
+def elapsed_words(seconds: float, words: Words = ENGLISH_WORDS) -> str:
     """Elapsed time in words."""
-    whole = int(seconds)
-    return f"{whole} s so far" if whole < 60 else f"{whole // 60} min {whole % 60} s so far"
+    minutes, left = divmod(int(seconds), 60)
+    return words.fill("elapsed_min" if minutes else "elapsed_s", {"minutes": minutes, "seconds": left})

@@ -6,31 +6,23 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.screen import Screen
 from textual.widgets import Digits, Footer
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import RestNotice
+from study.tui.spoken_screen import SpokenScreen
 from study.tui.take_off import take_off
-from study.tui.trial_words import progress_sentence, runs_left
+from study.tui.trial_words import progress_sentence
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 TICK_S = 0.2
-RESTING = "There is no hurry."
-READY = "When you are ready, press Enter."
 
 
-class RestScreen(Screen[float]):
+class RestScreen(SpokenScreen[float]):
     """Returns the seconds rested, never fewer than requested."""
 
-    HELP = """\
-# Rest
-
-- Let go of the handle and relax your hand. Nothing is played.
-- The rest is part of the study: a tired hand feels less. It cannot be shortened.
-- When it is over, take as long as you like, and press **Enter** to go on.
-- **Ctrl+C** leaves; the session can be resumed.
-"""
+    PAGE = "help_rest"
     DEFAULT_CSS = """
     RestScreen { align: center middle; }
     RestScreen Digits { width: 100%; text-align: center; text-style: bold; margin-top: 1; }
@@ -38,20 +30,20 @@ class RestScreen(Screen[float]):
     """
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on", key_display="Enter")]
 
-    def __init__(self, notice: RestNotice) -> None:
-        super().__init__()
+    def __init__(self, notice: RestNotice, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._notice = notice
         self._began_s = time.monotonic()
 
     def compose(self) -> ComposeResult:
-        notice = self._notice
-        with Card("Rest"):
-            yield LiteralText("Let go of the handle and relax your hand.", classes="strong")
+        notice, words = self._notice, self.words
+        with Card(words["rest_title"]):
+            yield LiteralText(words["rest_relax"], classes="strong")
             yield Digits()
             yield LiteralText(id="said", classes="gap strong")
-            yield LiteralText(runs_left(notice.runs_left), classes="gap")
+            yield LiteralText(words.counted("runs_left", notice.runs_left), classes="gap")
             if notice.progress is not None:
-                yield LiteralText(progress_sentence(notice.progress))
+                yield LiteralText(progress_sentence(notice.progress, words))
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -70,7 +62,7 @@ class RestScreen(Screen[float]):
     def _tick(self) -> None:
         left_s = max(0, math.ceil(self._notice.seconds - self._seconds_rested()))
         self.query_one(Digits).update(f"{left_s // 60}:{left_s % 60:02d}")
-        self.query_one("#said", LiteralText).update(READY if self._over() else RESTING)
+        self.query_one("#said", LiteralText).update(self.words["rest_ready" if self._over() else "rest_resting"])
         if self._over():
             self._ticking.stop()
             self.refresh_bindings()

@@ -9,29 +9,26 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.events import Key, Paste
 from textual.message import Message
-from textual.screen import Screen
 from textual.timer import Timer
 from textual.widgets import Footer
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Answered, Question, Reply, Task, Unanswered
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.keys.key_presses import KeyPresses, arrival_s
-from study.tui.trial_replies import LEAVING, NO_REPEATS, PAUSE, REPEAT, TIME_OVER, repeat_words
-from study.tui.trial_words import heading, run_name
+from study.tui.spoken_screen import SpokenScreen
+from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER, repeat_words
+from study.tui.trial_words import heading, run_key
 from study.tui.widgets.direction_panel import DirectionPanel, Mark
 from study.tui.widgets.literal_text import LiteralText
 from study.tui.widgets.session_bar import SessionBar
 
-ASKED = {
-    Task.DIRECTION: "Along which of the two directions does it shake?",
-    Task.INTERVAL: "In which of the two intervals did it shake, however weakly?",
-}
-WAIT = "Wait for the next vibration."
+ASKED = {Task.DIRECTION: "asked_direction", Task.INTERVAL: "asked_interval"}
 REPLIES = {"pause": PAUSE, "leave": LEAVING, "repeat": REPEAT}
 AFTER = {
-    PAUSE: "Pause. Let go of the handle.",
-    LEAVING: "Pause. Let go of the handle.",
-    TIME_OVER: "The time for this answer is over. The next vibration comes.",
+    PAUSE: "pause_let_go",
+    LEAVING: "pause_let_go",
+    TIME_OVER: "time_over",
 }
 WANTED_FOR_S = 3.0
 """A pause asked for between two trials begins with the next one within this time."""
@@ -39,20 +36,10 @@ NUM_LOCK = {"end", "down", "kp_begin"}
 """Keys that a number pad's 1 and 2 send while Num Lock is off."""
 
 
-class TrialScreen(Screen[None]):
+class TrialScreen(SpokenScreen[None]):
     """One per sitting: armed for each question, inactive in between."""
 
-    HELP = """\
-# A trial
-
-- Feel the handle as long as you like, then press 1 or 2 for the direction along which it shakes. Where two intervals
-  are asked about, press the number of the one in which it shook.
-- If you cannot tell, guess. Many trials are meant to be hard, and no answer can do harm.
-- **p** pauses: the handle stops at once, and this trial comes again afterwards.
-- **r** plays this trial again, for instance when you were disturbed. It works a few times in each run.
-- **q** pauses too, and offers to leave. What you have answered is kept.
-- **Ctrl+C** takes the force off at once and leaves.
-"""
+    PAGE = "help_trial"
     DEFAULT_CSS = """
     TrialScreen { layout: vertical; }
     TrialScreen #asked { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
@@ -75,8 +62,8 @@ class TrialScreen(Screen[None]):
 
         reply: Reply
 
-    def __init__(self, keys: AnswerKeys = DIGITS) -> None:
-        super().__init__()
+    def __init__(self, keys: AnswerKeys = DIGITS, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__(words)
         self._keys = keys
         self._presses = KeyPresses()
         self._question: Question | None = None
@@ -86,15 +73,16 @@ class TrialScreen(Screen[None]):
         self._limit: Timer | None = None
         self._trouble = ""
         self._trouble_is_old = False
-        self._verdict = ""
+        self._verdict: bool | None = None
+        """Whether the last answer was right, where that is told."""
         self._wanted: tuple[Unanswered, float] | None = None
 
     def compose(self) -> ComposeResult:
-        yield SessionBar()
+        yield SessionBar(self.words)
         yield LiteralText(id="asked")
         with Horizontal(id="answers"):
-            yield DirectionPanel(1)
-            yield DirectionPanel(2)
+            yield DirectionPanel(1, words=self.words)
+            yield DirectionPanel(2, words=self.words)
         yield LiteralText(id="said")
         yield LiteralText(id="trouble")
         yield Footer(show_command_palette=False)
@@ -105,17 +93,17 @@ class TrialScreen(Screen[None]):
     def arm(self, question: Question) -> None:
         """Accept one reply from now on."""
         self._drop_limit()
-        if self._question is not None and run_name(question) != run_name(self._question):
-            self._verdict = ""  # of practice: nothing is told about the answers that come now
+        if self._question is not None and run_key(question) != run_key(self._question):
+            self._verdict = None  # of practice: nothing is told about the answers that come now
         self._question, self._repeats_left, self._taken = question, question.repeats_left, 0
         # Its own trial ends a moment after the answer: it could not be read if it went with it.
-        last, self._verdict = self._verdict, ""
+        last, self._verdict = self._verdict, None
         if self._trouble_is_old:
             self.show_trouble("")
         self._trouble_is_old = True
         if question.time_limit_s > 0:
             self._limit = self.set_timer(question.time_limit_s, self._time_over)
-        self._show(f"Last answer: {last} " if last else "")
+        self._show("" if last is None else f"{self.words['last_right' if last else 'last_wrong']} ")
         self._armed_s = time.monotonic()
         if self._wanted is not None and self._armed_s - self._wanted[1] < WANTED_FOR_S:
             self._reply(self._wanted[0])
@@ -126,17 +114,18 @@ class TrialScreen(Screen[None]):
         self._armed_s = None
         self._drop_limit()
         if not self._taken:
-            self._say(WAIT)
+            self._say(self.words["wait"])
 
     def show_saved(self) -> None:
         """Show that the answer is on the disk."""
         if self._taken:
             self._mark("saved")
-            self._say(self._verdict_sentence() or f"{self._taken} saved. {WAIT}")
+            saved = f"{self.words.fill('answer_saved', {'answer': self._taken})} {self.words['wait']}"
+            self._say(self._verdict_sentence() or saved)
 
     def show_feedback(self, correct: bool) -> None:
         """Shown now, and with the next question."""
-        self._verdict = "right." if correct else "wrong."
+        self._verdict = correct
         self._say(self._verdict_sentence())
 
     def show_trouble(self, sentence: str) -> None:
@@ -158,17 +147,17 @@ class TrialScreen(Screen[None]):
     def on_paste(self, event: Paste) -> None:
         event.stop()
         if self._armed_s is not None:
-            self._say(f"Pasted text is no answer. {self._press()}")
+            self._say(f"{self.words['pasted']} {self._press()}")
 
     def action_reply(self, name: str) -> None:
         reply = REPLIES[name]
         if self._armed_s is not None and reply is REPEAT and self._repeats_left == 0:
-            self._say(f"{NO_REPEATS} {self._press()}")
+            self._say(f"{self.words['no_repeats']} {self._press()}")
         elif self._armed_s is not None:
             self._reply(reply)
         elif reply.pause:
             self._wanted = reply, time.monotonic()
-            self._say("A moment: the pause comes next.")
+            self._say(self.words["pause_comes"])
 
     def action_heard(self, answer: int) -> None:
         """For the footer only: the answers are handled in `on_key`."""
@@ -179,20 +168,20 @@ class TrialScreen(Screen[None]):
         if armed_s is None or at_s < armed_s:
             return
         if not is_press:
-            self._say(f"Let go of the key first. {self._press()}")
+            self._say(f"{self.words['key_held']} {self._press()}")
             return
         self._armed_s = None
         self.post_message(self.Replied(Answered(answer, at_s)))
         self._drop_limit()
         self._taken = answer
         self._mark("taken")
-        self._say(f"{answer} taken.")
+        self._say(self.words.fill("answer_taken", {"answer": answer}))
 
     def _reply(self, reply: Unanswered) -> None:
         self._armed_s = None
         self.post_message(self.Replied(reply))
         self._drop_limit()
-        self._say(AFTER.get(reply) or repeat_words(self._repeats_left))
+        self._say(self.words[AFTER[reply]] if reply in AFTER else repeat_words(self._repeats_left, self.words))
 
     def _time_over(self) -> None:
         if self._armed_s is not None:
@@ -205,13 +194,14 @@ class TrialScreen(Screen[None]):
 
     def _refuse(self, event: Key) -> None:
         if event.key in NUM_LOCK:
-            self._say("That was no answer. On a number pad, switch Num Lock on.")
+            self._say(self.words["num_lock"])
         elif event.is_printable or event.key == "enter":
-            name = {"enter": "Enter", "space": "The space bar"}.get(event.key, f"'{event.character}'")
-            self._say(f"{name} is no answer. {self._press()}")
+            key = {"enter": "enter_key", "space": "space_key"}.get(event.key)
+            typed = f"'{event.character}'" if key is None else self.words[key]
+            self._say(f"{self.words.fill('no_answer', {'typed': typed})} {self._press()}")
 
     def _verdict_sentence(self) -> str:
-        return self._verdict.capitalize()
+        return "" if self._verdict is None else self.words["right" if self._verdict else "wrong"]
 
     def _show(self, last: str = "") -> None:
         """Redraw everything: only the feedback of the last trial remains visible."""
@@ -220,15 +210,15 @@ class TrialScreen(Screen[None]):
         self.query_one("#trouble", LiteralText).update(self._trouble)
         question = self._question
         if question is None:
-            self._say(WAIT)
+            self._say(self.words["wait"])
             return
         bar = self.query_one(SessionBar)
-        bar.heading, bar.progress = heading(question), question.progress
-        self.query_one("#asked", LiteralText).update(ASKED[question.task])
+        bar.heading, bar.progress = heading(question, self.words), question.progress
+        self.query_one("#asked", LiteralText).update(self.words[ASKED[question.task]])
         for panel in self.query(DirectionPanel):
             panel.picture = question.picture if question.task is Task.DIRECTION else None
             panel.mark = ""
-        self._say(f"{last}{self._press()} If you cannot tell, guess.")
+        self._say(f"{last}{self._press()} {self.words['guess']}")
 
     @property
     def _composed(self) -> bool:
@@ -240,7 +230,7 @@ class TrialScreen(Screen[None]):
             panel.mark = mark if panel.number == self._taken else ""
 
     def _press(self) -> str:
-        return f"Press {self._keys.choice}."
+        return self.words.fill("press", {"keys": self._keys.choice(self.words)})
 
     def _say(self, sentence: str) -> None:
         if self._composed:

@@ -9,6 +9,7 @@ from textual.reactive import reactive
 from textual.strip import Strip
 from textual.widget import Widget
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import DirectionPicture
 from study.tui.drawing.direction_picture import draw_large_direction, sentence
 from study.tui.drawing.number_picture import large_number
@@ -39,15 +40,16 @@ class DirectionPanel(Widget):
     picture: reactive[DirectionPicture | None] = reactive(None)
     mark: reactive[Mark] = reactive[Mark]("")
 
-    def __init__(self, number: int, picture: DirectionPicture | None = None) -> None:
+    def __init__(self, number: int, picture: DirectionPicture | None = None, words: Words = ENGLISH_WORDS) -> None:
         super().__init__()
+        self._spoken = words
         self.number = number
         self.set_reactive(DirectionPanel.picture, picture)
 
     def watch_mark(self, before: Mark, after: Mark) -> None:
         self.remove_class(f"-{before}")
         self.set_class(bool(after), f"-{after}")
-        self.border_subtitle = f"{self.number} {after}" if after else ""
+        self.border_subtitle = f"{self.number} {self._spoken[f'mark_{after}']}" if after else ""
 
     def render_line(self, y: int) -> Strip:
         width, height = self.size
@@ -75,8 +77,8 @@ class DirectionPanel(Widget):
 
     def _words(self) -> str:
         if self.picture is None:
-            return f"{self.number}: the {'first' if self.number == 1 else 'second'} interval"
-        return sentence(self.picture, self.number)
+            return self._spoken["interval_first" if self.number == 1 else "interval_second"]
+        return sentence(self.picture, self.number, self._spoken)
 
 
 def _room(size: Size) -> Size:

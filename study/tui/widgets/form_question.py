@@ -5,8 +5,10 @@ from textual.app import ComposeResult
 from textual.containers import Vertical
 from textual.widgets import Static
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.form_entry import FieldEntry
 from study.session.views.form_views import FormField
+from study.tui.trial_words import limits_words
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.literal_text import LiteralText
 
@@ -20,10 +22,11 @@ class FormQuestion(Vertical):
     FormQuestion .written { background: $boost; }
     """
 
-    def __init__(self, number: int, field: FormField) -> None:
+    def __init__(self, number: int, field: FormField, words: Words = ENGLISH_WORDS) -> None:
         super().__init__()
         self.field = field
         self._number = number
+        self._spoken = words
 
     def compose(self) -> ComposeResult:
         yield LiteralText(f"{self._number}. {self.field.label}")
@@ -47,13 +50,15 @@ class FormQuestion(Vertical):
         if self.field.choices:
             row = self.query_one(ChoiceRow)
             row.cursor, row.at = given.marked, at
-            row.chosen = self.field.choices.index(given.answer) if given.answer else None
+            row.chosen = self.field.choices.index(given.answer) if given.answer in self.field.choices else None
         else:
             self.query_one(".written", Static).update(self._answer_text(given, at))
 
     def _answer_text(self, given: FieldEntry, at: bool) -> Text:
         if not given.answer:
-            hint = "type your answer" if self.field.needed else "type your answer, or leave it empty"
+            hint = self._spoken["form_type" if self.field.needed else "form_type_or_not"]
+            if self.field.limits is not None:
+                hint = f"{hint} ({limits_words(self.field.limits, self._spoken)})"
             text = Text(hint, "dim")
             if at:
                 text.stylize("reverse", 0, 1)

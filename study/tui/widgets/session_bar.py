@@ -6,6 +6,7 @@ from textual.reactive import reactive
 from textual.strip import Strip
 from textual.widget import Widget
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Progress
 
 DONE, LEFT = "━", "─"
@@ -18,6 +19,10 @@ class SessionBar(Widget):
 
     heading: reactive[str] = reactive("")
     progress: reactive[Progress | None] = reactive[Progress | None](None)
+
+    def __init__(self, words: Words = ENGLISH_WORDS) -> None:
+        super().__init__()
+        self._words = words
 
     def render_line(self, y: int) -> Strip:
         width = self.size.width
@@ -34,5 +39,5 @@ class SessionBar(Widget):
             return ""
         done = min(bar, round(self.progress.share_done * bar))
         minutes = self.progress.minutes_left
-        left = "" if minutes is None else f"  about {minutes} min left"
+        left = "" if minutes is None else f"  {self._words.fill('bar_left', {'minutes': minutes})}"
         return f"{DONE * done}{LEFT * (bar - done)} {self.progress.share_done:4.0%}{left}"

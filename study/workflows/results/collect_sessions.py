@@ -8,8 +8,10 @@ from analysis.wording import conjoin
 from equalizer.plant.model_quality import NOT_STORED
 from protocols.definition.study_protocol import StudyProtocol
 from study.errors import StudyError, WrongUseError
+from study.session.facts.events import FormFilled
 from study.session.state.state import SessionState
 from study.session.views.archive_views import TURNED_AWAY
+from study.store.formats.answer_table import ASKED, FilledForm
 from study.store.sessions.archive import SessionFolder, session_folders
 from study.store.sessions.event_log import LOG_NAME
 from study.workflows.results.collected import Collected
@@ -56,6 +58,17 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
         locked=_lock_words([state for _, state in entering]),
         finished=_finish(whole),
         parents=tuple(folder.log for folder, _ in entering),
+        forms=_filled_forms([(folder, session) for folder, session in whole if folder.name in names]),
+    )
+
+
+def _filled_forms(sessions: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[FilledForm, ...]:
+    """Answers to the protocol's questions, of the sessions that enter."""
+    return tuple(
+        FilledForm(folder.subject, folder.name, event.form, event.answers)
+        for folder, session in sessions
+        for event in session.contents.events
+        if isinstance(event, FormFilled) and event.form in ASKED.values()
     )
 
 

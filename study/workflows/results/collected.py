@@ -5,6 +5,7 @@ from pathlib import Path
 
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial
+from study.store.formats.answer_table import FilledForm
 from study.store.sessions.archive import SessionFolder
 
 
@@ -29,3 +30,5 @@ class Collected:
     """Results that had to be completed now, because the program had been killed, in sentences."""
     parents: tuple[Path, ...]
     """Input files."""
+    forms: tuple[FilledForm, ...] = ()
+    """Answers to the protocol's questions."""

@@ -13,6 +13,7 @@ from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.new_folder import new_folder, require_new_folder
 from study.store.disk.provenance import gather_provenance
 from study.store.formats import tidy_csv
+from study.store.formats.answer_table import answer_table
 from study.store.formats.bids_behaviour import write_bids
 from study.store.formats.psych_ds import KIND, PROTOCOL_NAME, is_psych_ds, read_psych_ds, write_psych_ds
 from study.store.formats.trials_mat import write_trials_mat
@@ -39,16 +40,17 @@ class Exported:
     """What was excluded, and why, in sentences."""
 
 
-def export_study(collected: Collected, data: Path, out: Path, form: Form) -> Exported:
-    """Write the dataset atomically. collected: the sessions of `data` that belong together. Raises StudyError."""
+def export_study(collected: Collected, data: Path, out: Path, form: Form, free_text: bool = False) -> Exported:
+    """Write the dataset atomically. collected: the sessions of `data` that belong together. free_text: with what
+    participants wrote in their own words. Raises StudyError."""
     require_new_folder(out)
-    facts = _facts(collected)
+    facts, answers = _facts(collected), answer_table(collected.protocol, collected.forms, free_text)
     with new_folder(out) as folder:
         files = WRITERS[form](
-            folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), facts
+            folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), facts, answers
         )
         names = tuple(path.relative_to(folder).as_posix() for path in files)
-    note_written(data, out)
+    note_written(data, out, always=True)
     return Exported(out, names, len(collected.trials), collected.left_out)
 
 

@@ -8,7 +8,7 @@ from study.session.state.machine import CheckDevice, FillIn, Leave, next_prepara
 from study.session.state.state import SessionState
 from study.session.views.archive_views import TURNED_AWAY
 from study.session.views.form_views import Form, FormKind
-from study.session.views.forms import confirmation_of, is_confirmed, judge_form
+from study.session.views.forms import confirmation_of, is_confirmed, judge_form, words_of
 from study.session.views.views import DeviceFinding
 from study.session.watching.requests import NoteAsked
 from study.workflows.checks.check_device import check_device
@@ -40,11 +40,13 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
         raise ValueError("whether the handle is free is logged with the reference, not as a form")
     sitting.supervisor.begin("form")
     reply = sitting.display.fill_in(form)
-    outcome = judge_form(state.protocol, form.kind, reply)
-    if not outcome.passed and not is_confirmed(sitting.display.fill_in(confirmation_of(form, reply))):
-        # A slip of the finger is possible: the question is asked once more, and the second answer holds. The first is
-        # not stored.
-        outcome = judge_form(state.protocol, form.kind, sitting.display.fill_in(form))
+    outcome = judge_form(state.protocol, form, reply)
+    if not outcome.passed:
+        confirmation = confirmation_of(form, reply, words_of(state.protocol))
+        if not is_confirmed(confirmation, sitting.display.fill_in(confirmation)):
+            # A slip of the finger is possible: the question is asked once more, and the second answer holds. The first
+            # is not stored.
+            outcome = judge_form(state.protocol, form, sitting.display.fill_in(form))
     event = FormFilled(
         utc=sitting.clock.utc(),
         form=form.kind.value,

@@ -158,4 +158,6 @@ class SimulatedDisplay:
 def _first_answer(field: FormField) -> str:
     if field.choices:
         return field.choices[0]
+    if field.limits is not None:
+        return f"{field.limits.lowest:g}"
     return "simulated" if field.needed else ""

@@ -14,7 +14,7 @@ from study.session.state.probing import Probe
 from study.session.state.state import SessionState
 from study.session.stimulus.probe_stimulus import HELD_S, probe_stimulus, reference_commands
 from study.session.views.form_views import FormKind
-from study.session.views.forms import form_of, judge_form, take_the_handle
+from study.session.views.forms import form_of, judge_form, take_the_handle, words_of
 from study.session.views.views import PlayingNotice, Unanswered
 from study.store.disk.provenance import versions
 from study.store.sessions.trial_recordings import probe_name, save_trial_recording
@@ -63,7 +63,7 @@ def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
     if held_kg is None:
         return AfterTrial(_decline(state, "what the handle weighs in the hand could not be measured", sitting))
     sitting.supervisor.begin("form")
-    if not judge_form(state.protocol, FormKind.HANDLE, sitting.display.fill_in(form)).passed:
+    if not judge_form(state.protocol, form, sitting.display.fill_in(form)).passed:
         return AfterTrial(_decline(state, "the handle was not free", sitting))
     if (ended := check_end_request(state, sitting)) is not None:
         return ended
@@ -74,7 +74,7 @@ def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
     sitting.device.simulate_hand(True)
     if not after.pause:
         sitting.supervisor.begin("form")
-        sitting.display.fill_in(take_the_handle())
+        sitting.display.fill_in(take_the_handle(words_of(state.protocol)))
     return after
 
 

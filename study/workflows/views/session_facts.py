@@ -93,12 +93,17 @@ def _log(folded: FoldedSession) -> str:
 
 
 def _forms(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
-    """Choices of the debrief; free text stays in the log file, because it may concern health."""
-    questions = {question.key: question for question in folded.state.protocol.debrief if question.choices}
+    """Answers to questions; free text stays in the log file, because it may concern health."""
+    protocol = folded.state.protocol
+    asked = {"questionnaire": protocol.before, "debrief": protocol.debrief}
     facts = []
     for event in folded.contents.events:
         if isinstance(event, FormFilled) and event.form == "consent":
             facts.append(("consent", f"{'given' if event.passed else 'not given'}, version {event.version}"))
-        if isinstance(event, FormFilled) and event.form == "debrief":
-            facts += [("said", f"{q.question} {event.answers[k]}") for k, q in questions.items() if k in event.answers]
+        if isinstance(event, FormFilled) and event.form in asked:
+            facts += [
+                ("said", f"{question.question} {event.answers[question.key]}")
+                for question in asked[event.form]
+                if question.key in event.answers and not question.is_free_text
+            ]
     return tuple(facts)

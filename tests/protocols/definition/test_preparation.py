@@ -6,6 +6,7 @@ import pytest
 
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings
+from protocols.definition.participant_text import TextSettings
 from protocols.definition.preparation import MaskingSettings, PracticeSettings
 from protocols.definition.probes import ProbeSettings
 from protocols.document.hashing import TABLES_SINCE, protocol_hash
@@ -106,6 +107,10 @@ def _other(table, threshold):
         return MaskingSettings(play=True)
     if table == "probes":
         return ProbeSettings(levels_n=(0.5,))
+    if table == "text":
+        return TextSettings(words={"rest_title": "A break"})
+    if table == "before":
+        return threshold.debrief
     if table == "limits":
         return replace(threshold.limits, longest_min=60.0)
     return getattr(threshold, table)

@@ -10,10 +10,10 @@ from study.session.facts.void_reasons import (
     SCREEN_SILENT,
     busy_sentence,
     computer_too_busy,
-    void_for_participant,
     why_screen_silent,
     why_too_many,
 )
+from study.tui.trial_words import void_words
 from study.workflows.trial.judge_trial import judge
 
 MISSED = "12.0 % of the 1 kHz ticks were missed"
@@ -38,7 +38,7 @@ def test_what_a_busy_computer_does_to_a_trial_is_counted_as_that(small_protocol)
     assert late.spoiled == MISSED
     for reason in (SCREEN_LATE, Fault.STALLED.value, late.spoiled):
         assert computer_too_busy(reason)
-        words = void_for_participant(reason)
+        words = void_words(reason)
         assert words.startswith("The computer was too busy for a moment")
         assert words.endswith("This was not your fault, and the trial is repeated.")
     for reason in (SCREEN_SILENT, Fault.LOST.value, "the participant asked for it again", ""):
@@ -79,10 +79,10 @@ def test_a_protocol_that_limits_no_late_ticks_counts_such_trials(small_protocol)
 
 
 def test_a_silent_screen_is_not_the_participants_fault_either():
-    words = void_for_participant(SCREEN_SILENT)
+    words = void_words(SCREEN_SILENT)
     assert "it was stopped, or the computer was too busy" in words
     assert words.endswith("This was not your fault, and the trial is repeated.")
-    assert void_for_participant("the handle was let go") == "It is void: the handle was let go."
+    assert void_words("the handle was let go") == "It is void: the handle was let go."
 
 
 def test_three_void_trials_end_a_sitting_for_the_reason_that_they_had():

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from protocols.definition.participant_text import Question
 from protocols.definition.preparation import (
     ConsentSettings,
-    DebriefQuestion,
     DemoSettings,
     PracticeSettings,
     SetupSettings,
@@ -23,7 +23,7 @@ def full(small_protocol):
         setup=SetupSettings(ask=True),
         demo=DemoSettings(level_n=1.0),
         practice=PracticeSettings(frequencies_hz=(25.0,), right_needed=2, of_last=3, trial_limit=4),
-        debrief=(DebriefQuestion("strategy", "How?"), DebriefQuestion("felt", "Directed?", ("yes", "no"))),
+        debrief=(Question("strategy", "How?"), Question("felt", "Directed?", ("yes", "no"))),
     )
 
 

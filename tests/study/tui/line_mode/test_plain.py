@@ -109,7 +109,7 @@ def test_practice_on_a_simulation_is_called_practice(typed):
     text = " ".join(typed.out.getvalue().split())
     assert "Practice: the device is a simulation (simulated omega.3), so nothing moves here." in text
     assert "never enter an analysis of people" in text
-    assert "Welcome back: 12 answers are on disk" in text
+    assert "Welcome back: 12 answers are on the disk" in text
 
 
 def test_after_a_void_trial_nothing_is_played_before_a_key_press(typed):
@@ -186,7 +186,7 @@ def test_the_end_is_told_finished_or_not(typed):
     typed.display.goodbye(Goodbye(finished=True, answers=7))
     typed.display.goodbye(Goodbye(finished=False, answers=3, reason="the participant left"))
     assert "Finished: 7 answers. Thank you." in typed.said
-    assert "This sitting is over: the participant left. 3 answers are on disk." in typed.said
+    assert "This sitting is over: the participant left. 3 answers are on the disk." in typed.said
 
 
 @pytest.mark.parametrize(

@@ -118,7 +118,7 @@ def test_each_finding_is_a_line_that_begins_with_its_verdict(typed):
     typed.type("")
     typed.display.device_checked(report(fine=False))
     lines = typed.out.getvalue().splitlines()
-    assert "Device: omega.3 (simulated: nothing moves)" in lines
+    assert "Device: omega.3. The device is a simulation: nothing moves." in lines
     assert "ok: sample rate, 1000 Hz" in lines
     assert "look: handle, 42 mm from its place. Bring it back." in lines
     assert "Something needs a look before you go on." in lines

@@ -63,7 +63,7 @@ def test_after_a_rest_one_can_leave(unhurried, line):
 def test_a_pause_ends_by_decision_and_withdrawing_needs_the_whole_word(typed, lines, decision):
     typed.type(*lines)
     assert typed.display.pause(PAUSE, lambda: True) is decision
-    assert "Pause (the experimenter asked for it). Nothing is played. 12 answers are on disk." in typed.said
+    assert "Pause (the experimenter asked for it). Nothing is played. 12 answers are on the disk." in typed.said
 
 
 def test_a_wrong_key_in_a_pause_is_named(typed):

@@ -9,9 +9,10 @@ from protocols.trial import TrialStatus, VoidCause
 from study.devices.device import Fault, Health
 from study.errors import DeviceError
 from study.session.facts.sensor_facts import SensorFacts
-from study.session.facts.void_reasons import computer_too_busy, void_for_participant
+from study.session.facts.void_reasons import computer_too_busy
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import read_log
+from study.tui.trial_words import void_words
 from study.workflows.session import conduct_session
 from study.workflows.trial.judge_trial import judge
 
@@ -73,7 +74,7 @@ def test_what_is_missing_above_the_limit_cannot_be_trusted(small_protocol, senso
 def test_a_participant_reads_that_the_sensor_was_not_heard(small_protocol):
     reason = judged(BAD, small_protocol, accelerometer_needed=True).spoiled
     assert reason == "10.0 % of the acceleration is missing" and not computer_too_busy(reason)
-    assert void_for_participant(reason).startswith("The sensor at the handle was not heard well enough")
+    assert void_words(reason).startswith("The sensor at the handle gave too few readings")
 
 
 def test_the_counts_stand_beside_each_trial_and_in_its_recording(sitter, heard):

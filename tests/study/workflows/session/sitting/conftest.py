@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings
+from protocols.definition.participant_text import Question
 from protocols.definition.preparation import (
     ConsentSettings,
-    DebriefQuestion,
     DemoSettings,
     PracticeSettings,
     SetupSettings,
@@ -55,5 +55,5 @@ def full(small_protocol):
         catch=CatchSettings(one_in=5),
         detection=DetectionSettings(frequencies_hz=(35.0,), trial_limit=6),
         gate=GateSettings(radius_mm=10.0),
-        debrief=(DebriefQuestion("strategy", "How?"),),
+        debrief=(Question("strategy", "How?"),),
     )

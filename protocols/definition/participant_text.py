@@ -1,0 +1,111 @@
+"""The language of the screens that a participant reads, and the questions that a laboratory asks besides."""
+
+from dataclasses import field
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from protocols.definition.problem import Problem, refuse
+from protocols.definition.staircase_rule import STRICT
+
+Sentence = Annotated[str, Field(min_length=1, max_length=500)]
+Key = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
+LONGEST_SCALE = 11
+
+
+@dataclass(frozen=True, config=STRICT)
+class TextSettings:
+    """What the participant's screens say. It counts in the hash: other words are another protocol."""
+
+    language: Annotated[
+        str,
+        Field(
+            min_length=1,
+            max_length=200,
+            description="'de' (German) or 'es' (Spanish), or the path of a TOML file with every text, from the folder "
+            "of the protocol; `hapteq protocol texts` prints one to translate. Default 'en', English.",
+        ),
+    ] = "en"
+    words: Annotated[
+        dict[str, str],
+        Field(
+            description="Single texts of one's own, by the keys that `hapteq protocol texts` lists. Where a language "
+            "is named, all its texts are filled in here as the protocol is read. Default: none."
+        ),
+    ] = field(default_factory=dict, hash=False)
+
+    @model_validator(mode="after")
+    def _resolved(self) -> Self:
+        if self.language != "en" and not self.words:
+            allowed = "the texts themselves in text.words, which `hapteq` fills in where it reads the file"
+            refuse([Problem("language", f'is "{self.language}", and its texts are missing', allowed)])
+        return self
+
+
+@dataclass(frozen=True, config=STRICT)
+class Question:
+    """Asked before the trials or after the last run. Each may stay without an answer. Free text, where neither
+    choices nor number nor scale is given."""
+
+    key: Annotated[Key, Field(description="Names the answer in the log.")]
+    question: Annotated[Sentence, Field(description="What is asked.")]
+    choices: Annotated[
+        tuple[Sentence, ...], Field(max_length=9, description="One of these. Default: none, see number and scale.")
+    ] = ()
+    codes: Annotated[
+        tuple[Annotated[str, Field(min_length=1, max_length=80)], ...],
+        Field(
+            max_length=9,
+            description="What is logged for each choice, the same in every language. Default: the choices as written.",
+        ),
+    ] = ()
+    number: Annotated[
+        tuple[float, ...],
+        Field(max_length=2, description="Lowest and highest number that is taken, such as [18, 99]. Default: none."),
+    ] = ()
+    unit: Annotated[str, Field(max_length=20, description="Of the number, for tables. Default: none.")] = ""
+    scale: Annotated[
+        tuple[int, ...],
+        Field(max_length=2, description="First and last step of a rating scale, such as [1, 7]. Default: none."),
+    ] = ()
+    ends: Annotated[
+        tuple[Annotated[str, Field(min_length=1, max_length=80)], ...],
+        Field(max_length=2, description="What the two ends of the scale mean. Default: not said."),
+    ] = ()
+
+    @property
+    def steps(self) -> tuple[str, ...]:
+        """Of the scale; empty where there is none."""
+        return tuple(str(step) for step in range(self.scale[0], self.scale[1] + 1)) if self.scale else ()
+
+    @property
+    def is_free_text(self) -> bool:
+        return not (self.choices or self.number or self.scale)
+
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> Self:
+        refuse(list(_problems(self)))
+        return self
+
+
+def _problems(question: Question) -> tuple[Problem, ...]:
+    found = []
+    if sum(map(bool, (question.choices, question.number, question.scale))) > 1:
+        found.append(Problem("choices", "stands beside number or scale", "only one of choices, number and scale"))
+    if question.codes and len(question.codes) != len(question.choices):
+        wrong = f"has {len(question.codes)} entries for {len(question.choices)} choices"
+        found.append(Problem("codes", wrong, "one for each of the choices, or none"))
+    if any(len(set(each)) < len(each) for each in (question.codes, question.choices)):
+        found.append(Problem("choices", "or its codes have an entry twice", "different entries"))
+    if question.number and not (len(question.number) == 2 and question.number[0] < question.number[1]):
+        found.append(Problem("number", f"is {list(question.number)}", "the lowest and then the highest number"))
+    scale = question.scale
+    if scale and not (len(scale) == 2 and 0 <= scale[0] < scale[1] < scale[0] + LONGEST_SCALE):
+        allowed = f"the first and the last of 2 to {LONGEST_SCALE} steps, none below 0"
+        found.append(Problem("scale", f"is {list(scale)}", allowed))
+    if question.ends and not (scale and len(question.ends) == 2):
+        found.append(Problem("ends", "does not go with the scale", "two texts, beside a scale"))
+    if question.unit and not question.number:
+        found.append(Problem("unit", "stands without a number", "empty, or beside number"))
+    return tuple(found)

@@ -1,0 +1,91 @@
+"""A protocol's values in a language: its table of texts becomes part of them, and so of the hash and of every log."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from protocols.definition.problem import Problem
+from protocols.wording.english import ENGLISH, LANGUAGES, placeholders
+from protocols.wording.english_forms import PROTOCOLS
+
+LONGEST = 4000
+"""Characters of a text."""
+
+
+def language_of(values: Mapping[str, Any]) -> str:
+    """The language that plain values of a protocol ask for. Strange values are refused elsewhere."""
+    text = values.get("text")
+    language = text.get("language", "en") if isinstance(text, dict) else "en"
+    return language if isinstance(language, str) else "en"
+
+
+def own_words(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The single texts that a protocol states itself."""
+    text = values.get("text")
+    words = text.get("words", {}) if isinstance(text, dict) else {}
+    return dict(words) if isinstance(words, dict) else {}
+
+
+def table_problems(table: Mapping[str, Any], whole: bool) -> tuple[Problem, ...]:
+    """What is wrong with a table of texts. whole: it must have every key, as that of a language has."""
+    problems = [problem for key, text in table.items() if (problem := _problem(key, text)) is not None]
+    if whole:
+        problems += [Problem(key, "is missing", f'its translation of "{_short(ENGLISH[key])}"') for key in ENGLISH
+                     if key not in table]  # fmt: skip
+    return tuple(problems)
+
+
+def in_language(values: Mapping[str, Any], table: Mapping[str, str], name: str) -> dict[str, Any]:
+    """The values with all texts in them, those that the protocol states itself first. The sentences of the shipped
+    protocols are replaced where they stand; a lab's own stay as they are written. name: of the language."""
+    sentences = {PROTOCOLS[key]: table[key] for key in PROTOCOLS if key in table}
+
+    def said(text: Any) -> Any:
+        return sentences.get(text, text) if isinstance(text, str) else text
+
+    resolved = {**values, "text": {"language": name, "words": {**table, **own_words(values)}}}
+    resolved["title"] = said(values.get("title"))
+    for kind, key in (("consent", "statements"), ("consent", "exclusions"), ("setup", "grip")):
+        if isinstance(values.get(kind), dict) and key in values[kind]:
+            resolved[kind] = {**resolved[kind], key: _each(values[kind][key], said)}
+    for kind in ("before", "debrief"):
+        if isinstance(values.get(kind), list):
+            resolved[kind] = [_question(question, said) for question in values[kind]]
+    return {key: value for key, value in resolved.items() if value is not None}
+
+
+def _question(question: Any, said: Callable[[Any], Any]) -> Any:
+    """What is logged of a choice does not change with the language."""
+    if not isinstance(question, dict):
+        return question
+    asked = {key: _each(value, said) if key in ("question", "choices", "ends") else value
+             for key, value in question.items()}  # fmt: skip
+    if question.get("choices") and not question.get("codes") and asked["choices"] != question["choices"]:
+        asked["codes"] = question["choices"]
+    return asked
+
+
+def _each(value: Any, said: Callable[[Any], Any]) -> Any:
+    return [said(each) for each in value] if isinstance(value, list) else said(value)
+
+
+def _problem(key: str, text: Any) -> Problem | None:
+    if key not in ENGLISH:
+        return Problem(key, "is no text of hapteq", "the keys that `hapteq protocol texts` lists")
+    if not isinstance(text, str) or not text.strip() or len(text) > LONGEST:
+        return Problem(key, "is no text", f"text in quotes, up to {LONGEST} characters")
+    wanted, found = placeholders(ENGLISH[key]) or frozenset(), placeholders(text)
+    if found != wanted:
+        words = " ".join(f"{{{name}}}" for name in sorted(wanted)) or "no braces"
+        has = "braces that are not in pairs" if found is None else " ".join(f"{{{name}}}" for name in sorted(found))
+        return Problem(key, f"has {has or 'no braces'}", f"each of {words}, and no other" if wanted else words)
+    return None
+
+
+def _short(text: str) -> str:
+    line = " ".join(text.split())
+    return line if len(line) <= 60 else f"{line[:59]}…"
+
+
+def known_languages() -> str:
+    """In words, for a message."""
+    return ", ".join(f'"{code}" ({name})' for code, name in LANGUAGES.items())

@@ -1,0 +1,84 @@
+"""Answers to a protocol's questions as a table, a row per session, for exported data."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from protocols.definition.participant_text import Question
+from protocols.definition.study_protocol import StudyProtocol
+from study.store.disk.csv_rows import csv_line
+
+ASKED = {"before": "questionnaire", "debrief": "debrief"}
+"""Table of a protocol, and the form by which its answers are logged."""
+
+
+@dataclass(frozen=True, slots=True)
+class FilledForm:
+    """As it was logged."""
+
+    subject: str
+    session: str
+    form: str
+    answers: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerColumn:
+    table: str
+    """Of the protocol: before or debrief."""
+    question: Question
+
+    @property
+    def name(self) -> str:
+        return f"{self.table}_{self.question.key}"
+
+    @property
+    def description(self) -> str:
+        """The question, and what its answers mean, in one line."""
+        question, meaning = self.question, "; ".join(f"{code}: {said}" for code, said in self.levels.items())
+        return f"{' '.join(question.question.split())}{f' ({meaning})' if meaning else ''}"
+
+    @property
+    def levels(self) -> dict[str, str]:
+        """What a value means, where that is not the value itself; none for numbers and free text."""
+        question = self.question
+        if question.ends:
+            return {question.steps[0]: question.ends[0], question.steps[-1]: question.ends[1]}
+        said = dict(zip(question.codes, question.choices, strict=False))
+        return {code: choice for code, choice in said.items() if code != choice}
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerTable:
+    columns: tuple[AnswerColumn, ...] = ()
+    rows: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
+    """Subject, session, and an answer for each column, empty where none was given."""
+
+    @property
+    def header(self) -> tuple[str, ...]:
+        return ("subject", "session", *(column.name for column in self.columns))
+
+    def as_csv(self) -> str:
+        lines = [self.header, *((subject, session, *answers) for subject, session, answers in self.rows)]
+        return "".join(csv_line(line) + "\n" for line in lines)
+
+
+def answer_table(protocol: StudyProtocol, filled: Sequence[FilledForm], free_text: bool) -> AnswerTable:
+    """The table; without columns where nothing is asked. free_text: with what participants wrote in their own words,
+    which may be about their health or name a person."""
+    asked = {"before": protocol.before, "debrief": protocol.debrief}
+    columns = tuple(
+        AnswerColumn(table, question)
+        for table, questions in asked.items()
+        for question in questions
+        if free_text or not question.is_free_text
+    )
+    said = {(form.subject, form.session, form.form, key): answer
+            for form in filled for key, answer in form.answers.items()}  # fmt: skip
+    sessions = dict.fromkeys((form.subject, form.session) for form in filled if form.form in ASKED.values())
+    rows = tuple(
+        (subject, session, tuple(
+            said.get((subject, session, ASKED[column.table], column.question.key), "") for column in columns
+        ))
+        for subject, session in sessions
+    )  # fmt: skip
+    return AnswerTable(columns, rows if columns else ())

@@ -1,0 +1,78 @@
+"""Tables of participants' texts: one TOML file a language, with a text for every key. Shipped ones by code, a
+laboratory's own by path."""
+
+import json
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+
+from protocols.definition.problem import Problem
+from protocols.document.dumping import dump_protocol
+from protocols.document.loading import Protocol, ProtocolError, load_protocol, protocol_from_values
+from protocols.wording.english import ENGLISH, LANGUAGES
+from protocols.wording.in_language import in_language, known_languages, language_of, own_words, table_problems
+from study.errors import WrongUseError
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.toml_text import read_toml_text
+
+KIND = "table of texts"
+
+
+def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[str, str]]:
+    """The language's name, and its texts by key. language: a code such as "de", or a file, from `folder`. Raises
+    WrongUseError (no such language), CannotReadError, UnusableFileError with every key that is missing or wrong."""
+    if language == "en":
+        return language, dict(ENGLISH)
+    if language in LANGUAGES:
+        shipped = files("protocols").joinpath("wording", f"{language}.toml")
+        return language, tomllib.loads(shipped.read_text("utf-8"))
+    path = (folder or Path()) / language
+    if not language.endswith(".toml"):
+        raise WrongUseError(
+            "There is no such language",
+            f"'{language}' is neither a shipped language nor a .toml file.",
+            f"Use one of {known_languages()}, or the path of a file; `hapteq protocol texts` prints one to translate.",
+        )
+    text = read_toml_text(path, KIND)
+    try:
+        table = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise UnusableFileError(path, KIND, (f"it is not TOML: {error}",)) from error
+    if wrong := table_problems(table, whole=True):
+        raise UnusableFileError(path, KIND, tuple(map(str, wrong)))
+    return path.stem, table
+
+
+def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Protocol, str]:
+    """A protocol with all its participants' texts in it, and the text of a file that says the same.
+
+    The latter is `text` itself where nothing had to be filled in. folder: of the protocol, None for a shipped one.
+    Raises ProtocolError, and what `read_language` raises.
+    """
+    try:
+        values = tomllib.loads(text)
+    except (ValueError, RecursionError):
+        return load_protocol(text, source), text  # which says what is wrong
+    language, words = language_of(values), own_words(values)
+    if wrong := table_problems(words, whole=False):
+        raise ProtocolError(source, tuple(problem.below("text.words") for problem in wrong))
+    if language == "en" or words.keys() >= ENGLISH.keys():
+        return load_protocol(text, source), text
+    try:
+        name, table = read_language(language, folder)
+    except WrongUseError as error:
+        allowed = f"{known_languages()}, or the path of a .toml file"
+        raise ProtocolError(source, (Problem("text.language", f'is "{language}"', allowed),)) from error
+    protocol = protocol_from_values(in_language(values, table, name), source)
+    return protocol, dump_protocol(protocol)
+
+
+def language_template(language: str) -> str:
+    """A table as TOML text, each key below its English text where the language is another."""
+    name, table = read_language(language)
+    lines = [f"# Participants' texts of hapteq, {LANGUAGES.get(name, name)}. What stands in braces is filled in."]
+    for key, english in ENGLISH.items():
+        if table[key] != english:
+            lines.append("# " + " ".join(english.split()))
+        lines.append(f"{key} = {json.dumps(table[key], ensure_ascii=False)}")
+    return "\n".join(lines) + "\n"
