@@ -1,5 +1,6 @@
 """Figures of psychometric functions: shares of right answers with Wilson's intervals, and the curves of the model."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -95,7 +96,7 @@ def _draw_shares(axes: Axes, x: Sequence[float], shares: Sequence[ObservedShare]
 
 
 def _marker_size(trials: int) -> float:
-    return _SMALLEST + (_LARGEST - _SMALLEST) * min(1.0, (trials / _MANY) ** 0.5)
+    return _SMALLEST + (_LARGEST - _SMALLEST) * math.sqrt(min(1.0, trials / _MANY))
 
 
 def _legend(curve: str) -> list[Line2D]:

@@ -59,7 +59,13 @@ def _draw_run(axes: Axes, run: Run, rule: StaircaseRule) -> None:
     axes.plot(numbers[used], levels[used], "o", markersize=8, markerfacecolor="none", markeredgecolor=BLACK)
     row = threshold_of(run, rule)
     if row.threshold_n is not None:
-        axes.plot([numbers[used[0]], numbers[-1]], [row.threshold_n] * 2, color=BLACK, linewidth=1.1, zorder=3)
+        axes.plot(
+            [numbers[used[0]] if len(used) else 1, numbers[-1]],
+            [row.threshold_n] * 2,
+            color=BLACK,
+            linewidth=1.1,
+            zorder=3,
+        )
     axes.set_yscale("log")
     axes.set_title(f"{run.frequency_hz:g} Hz{_outcome(row)}", fontsize=10, loc="left")
 

@@ -91,7 +91,7 @@ def _unit_tables(analysis: StudyAnalysis) -> list[ThresholdTable]:
 
 def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
     """Psychometric functions of all people together and of each."""
-    fit = analysis.primary
+    fit = analysis.primary or analysis.single
     answers = count_answers(analysis.trials, fit.frequencies_hz) if fit is not None else None
     if fit is None or answers is None:
         return []
@@ -99,22 +99,28 @@ def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
         f"Points: shares of right answers in bins of {BIN_DB:g} dB, with Wilson's 95 % intervals; the larger, the more "
         "trials. "
     )
-    together = Picture(
+    primary = analysis.primary
+    together = primary and Picture(
         name="psychometric",
         title="Psychometric functions, all people together",
         caption=f"{points}Levels are taken re each person's threshold by the model of all answers, whose curve is "
         "drawn. A staircase stops going down where answers happen to be wrong, so the lowest points lie somewhat "
         "below the curve of a model that is right.",
-        figure=draw_people_curves(answers, fit),
+        figure=draw_people_curves(answers, primary),
     )
     return [
-        together,
+        *([together] if together else []),
         *(
             Picture(
                 name=f"psychometric-{number}-{_file_name(subject)}",
                 title=f"Psychometric functions of {subject}",
-                caption=f"{points}Curves: the model of all answers; it draws a person's threshold towards those of the "
-                "others where the person's own answers say little.",
+                caption=points
+                + (
+                    "Curves: the model of all answers; it draws a person's threshold towards those of the others where "
+                    "the person's own answers say little."
+                    if primary
+                    else "Curves: the most probable ones of this person."
+                ),
                 figure=draw_person_curves(answers, fit, number - 1, analysis.protocol.staircase.cap_n),
                 folded=True,
             )

@@ -131,7 +131,7 @@ def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Se
         tables=(one_way_table(analysis), *pairs, within_table(analysis)),
     )
     model = replace(
-        primary_section(analysis.primary, analysis.compared, analysis.mean_contrasts),
+        primary_section(analysis),
         pictures=tuple(picture for name, picture in by_name.items() if name.startswith("psychometric")),
     )
     return [thresholds, model, comparison]

@@ -46,6 +46,8 @@ TIMING_SINCE: dict[str, Untouched] = {"measurement.late_ticks_limit": 1.0, "meas
 
 SETUP_SINCE: dict[str, Untouched] = {"setup.daily_check_needed": False}
 
+PLACEMENT_SINCE: dict[str, Untouched] = {"staircase.bayesian": {"trials": 0, "spread_db": 0.0}}
+
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
     "study": {
         "trial.device_buttons": [],
@@ -54,6 +56,7 @@ FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
         **SAFETY_SINCE,
         **TIMING_SINCE,
         **SETUP_SINCE,
+        **PLACEMENT_SINCE,
     },
     "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
 }
