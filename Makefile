@@ -33,10 +33,11 @@ tested-real_time tested-screens: GIVE_WAY :=
 GIVE_WAY := nice -n 10
 CASES ?= 600
 SEED ?= 95000
+STUDIES ?= 400
 BANK ?= bank-$(SEED)
 
 .DEFAULT_GOAL := help
-.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank prove-browser prove-formats docs site clean \
+.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank prove-browser prove-formats coverage docs site clean \
 	types imports compiled $(TESTED)
 
 help: ## Show what can be made
@@ -97,6 +98,9 @@ prove-browser: $(VENV)/.installed-test ## A whole session in headless Chromium (
 prove-formats: $(VENV)/.installed-test ## Exported datasets before the validator of BIDS, which is installed first (120 MB)
 	$(PIP) install --quiet -c constraints.txt -e '.[validators]'
 	$(BIN)/python -m pytest tests/study/cli/test_format_validators.py
+
+coverage: $(VENV)/.installed-test ## Coverage of every interval of a report near the cap, counted anew (STUDIES=400)
+	$(BIN)/python tests/references/coverage_of_analyses.py $(STUDIES)
 
 docs: $(VENV)/.installed ## Make docs/formats.md and the schemas again from the code
 	$(BIN)/python -m study.workflows.files.format_docs docs

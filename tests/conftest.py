@@ -217,7 +217,7 @@ def sketched(monkeypatch) -> None:
 
     def sketch(picture) -> tuple[str, bytes]:
         svg = f'<svg xmlns="http://www.w3.org/2000/svg" id="{picture.name}"><path d="M0 0L9 9"/></svg>'
-        return svg, b"" if picture.folded else b"a sketch"
+        return svg, b"a sketch" if picture.bitmap else b""
 
     monkeypatch.setattr("study.workflows.picture_files._draw_files", sketch)
 

@@ -7,10 +7,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.figures.style import BLUE, GREY, VERMILLION, new_figure, newton_ticks, plain_axes, say_nothing_to_draw
+from analysis.figures.style import (
+    BLUE,
+    GREY,
+    PAGE_IN,
+    VERMILLION,
+    name_panel_axes,
+    new_figure,
+    newton_ticks,
+    panel_grid,
+    plain_axes,
+    say_nothing_to_draw,
+)
 from protocols.trial import Trial
 
-_COLUMNS = 3
 _RASTER_FROM = 400
 """Number of points from which they are rasterised, because each adds a line of text to the page."""
 
@@ -19,13 +29,9 @@ def draw_delivered(trials: Sequence[Trial]) -> Figure:
     """Acceleration amplitude along and off the direction against the commanded level, one panel per frequency."""
     measured = [trial for trial in trials if trial.counts and trial.delivered_mps2]
     if not measured:
-        return say_nothing_to_draw(new_figure(8.6, 2.0), "No trial has a measured acceleration.")
+        return say_nothing_to_draw(new_figure(PAGE_IN, 2.0), "No trial has a measured acceleration.")
     frequencies = sorted({trial.frequency_hz for trial in measured})
-    columns = min(_COLUMNS, len(frequencies) + 1)
-    lines = -(-(len(frequencies) + 1) // columns)
-    figure = new_figure(8.6, 2.5 * lines)
-    grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
-    panels = [panel for line in grid for panel in line]
+    figure, panels = panel_grid(len(frequencies), 2.3, sharex=True)
     levels = [trial.level_n for trial in measured]
     panels[0].set_xscale("log")
     panels[0].set_xlim(0.8 * min(levels), 1.25 * max(levels))
@@ -33,16 +39,8 @@ def draw_delivered(trials: Sequence[Trial]) -> Figure:
         _draw_frequency(panel, [trial for trial in measured if trial.frequency_hz == frequency])
         newton_ticks(panel.xaxis, min(levels), max(levels))
         panel.set_title(f"{frequency:g} Hz", fontsize=10, loc="left")
-    for panel in panels[len(frequencies) :]:
-        panel.axis("off")
     panels[-1].legend(handles=_legend(), loc="center", fontsize=9, frameon=False)
-    for line in grid:
-        line[0].set_ylabel("Measured (m/s²)")
-    for column in range(columns):
-        below = [index for index in range(column, len(frequencies), columns)]
-        if below:
-            panels[below[-1]].set_xlabel("Level (N)")
-            panels[below[-1]].tick_params(labelbottom=True)
+    name_panel_axes(panels, len(frequencies), "Level (N)", "Measured (m/s²)")
     return figure
 
 

@@ -60,6 +60,8 @@ class Picture:
     figure: Figure
     folded: bool = False
     """Shown in a report only when asked for."""
+    bitmap: bool = True
+    """Also written as PNG. Diagnoses do without for the many that are folded."""
     alternative: str = ""
     """Description for screen readers; the title alone where empty."""
     drawn: list[str] = field(default_factory=list)

@@ -11,9 +11,12 @@ from analysis.figures.style import (
     BLACK,
     BLUE,
     GREY,
+    PAGE_IN,
     VERMILLION,
+    name_panel_axes,
     new_figure,
     newton_ticks,
+    panel_grid,
     plain_axes,
     say_nothing_to_draw,
 )
@@ -21,32 +24,23 @@ from analysis.psychophysics.runs import Run
 from analysis.psychophysics.thresholds import RunEnd, Threshold, threshold_of
 from protocols.definition.staircase_rule import StaircaseRule
 
-_COLUMNS = 3
+_LINE_IN = 2.2
+"""Height of a line of panels."""
 
 
 def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
     """One panel per run, by frequency. runs: of one participant."""
     if not runs:
-        return say_nothing_to_draw(new_figure(8.6, 2.0), "There is no run to draw.")
+        return say_nothing_to_draw(new_figure(PAGE_IN, 2.0), "There is no run to draw.")
     lowest_n = 0.75 * min([trial.staircase_n for run in runs for trial in run.answered], default=rule.start_n)
-    columns = min(_COLUMNS, len(runs) + 1)
-    lines = -(-(len(runs) + 1) // columns)
-    figure = new_figure(8.6, 2.3 * lines)
-    grid = figure.subplots(lines, columns, sharey=True, squeeze=False)
     ordered = sorted(runs, key=lambda run: (run.frequency_hz, run.session, run.run))
-    panels = [panel for line in grid for panel in line]
+    figure, panels = panel_grid(len(ordered), _LINE_IN)
     for panel, run in zip(panels, ordered, strict=False):
         _draw_run(panel, run, rule)
         panel.set_ylim(lowest_n, 1.25 * rule.cap_n)
         newton_ticks(panel.yaxis, lowest_n, rule.cap_n)
-    for panel in panels[len(ordered) :]:
-        panel.axis("off")
-    panels[-1].legend(handles=_legend(rule), loc="center", fontsize=9, frameon=False)
-    for line in grid:
-        line[0].set_ylabel("Level (N)")
-    for column in range(columns):
-        lowest = max(index for index in range(column, len(ordered), columns)) if column < len(ordered) else column
-        panels[lowest].set_xlabel("Trial")
+    name_panel_axes(panels, len(ordered), "Trial", "Level (N)")
+    panels[-1].legend(handles=_legend(rule), loc="center", fontsize=8.5, frameon=False)
     return figure
 
 
@@ -65,7 +59,13 @@ def _draw_run(axes: Axes, run: Run, rule: StaircaseRule) -> None:
     axes.plot(numbers[used], levels[used], "o", markersize=8, markerfacecolor="none", markeredgecolor=BLACK)
     row = threshold_of(run, rule)
     if row.threshold_n is not None:
-        axes.plot([numbers[used[0]], numbers[-1]], [row.threshold_n] * 2, color=BLACK, linewidth=1.1, zorder=3)
+        axes.plot(
+            [numbers[used[0]] if len(used) else 1, numbers[-1]],
+            [row.threshold_n] * 2,
+            color=BLACK,
+            linewidth=1.1,
+            zorder=3,
+        )
     axes.set_yscale("log")
     axes.set_title(f"{run.frequency_hz:g} Hz{_outcome(row)}", fontsize=10, loc="left")
 

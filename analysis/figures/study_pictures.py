@@ -6,10 +6,16 @@ from collections.abc import Sequence
 from analysis.figures.delivered import draw_delivered
 from analysis.figures.ellipsoids import draw_ellipsoids
 from analysis.figures.picture import Picture
+from analysis.figures.psychometric import draw_people_curves, draw_person_curves
 from analysis.figures.staircases import draw_staircases
 from analysis.figures.thresholds import draw_thresholds
+from analysis.figures.units import draw_units
+from analysis.psychophysics.detection import above_detection
 from analysis.psychophysics.ellipsoid import EllipsoidResult
+from analysis.psychophysics.hierarchy.answers import count_answers
+from analysis.psychophysics.hierarchy.observed_shares import BIN_DB
 from analysis.psychophysics.study_analysis import StudyAnalysis
+from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
 
 
 def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult] = ()) -> tuple[Picture, ...]:
@@ -17,6 +23,8 @@ def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult
     pictures = []
     if any(row.complete for row in analysis.thresholds):
         pictures.append(_thresholds_picture(analysis))
+        pictures += _units_pictures(analysis)
+    pictures += _curve_pictures(analysis)
     if any(trial.counts and trial.delivered_mps2 for trial in analysis.trials):
         pictures.append(_delivered_picture(analysis))
     pictures += _staircase_pictures(analysis)
@@ -50,6 +58,81 @@ def _thresholds_picture(analysis: StudyAnalysis) -> Picture:
     )
 
 
+def _units_pictures(analysis: StudyAnalysis) -> list[Picture]:
+    """None where there is no other unit than newtons."""
+    tables = [table for table in _unit_tables(analysis) if any(v is not None for row in table.values for v in row)]
+    if len(tables) < 2:
+        return []
+    return [
+        Picture(
+            name="units",
+            title="Thresholds in every unit that was measured",
+            caption="The same runs in each panel, people joined by lines; bar: median of what is shown. Hollow markers "
+            "with an arrow are cut by the cap: medians over them are too low. Acceleration and displacement are what "
+            "was measured along the direction in the trials of the averaged reversals."
+            + (
+                " Above detection: over the level from which the same participant felt the vibration at all."
+                if tables[-1].quantity == "above_detection_db"
+                else ""
+            ),
+            figure=draw_units(tables),
+        )
+    ]
+
+
+def _unit_tables(analysis: StudyAnalysis) -> list[ThresholdTable]:
+    frequencies_hz = analysis.table.frequencies_hz
+    measured = [
+        threshold_table(analysis.thresholds, frequencies_hz, quantity)
+        for quantity in ("threshold_mps2", "threshold_mm")
+    ]
+    return [analysis.table, *measured, above_detection(analysis.table, analysis.detection_table)]
+
+
+def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
+    """Psychometric functions of all people together and of each."""
+    fit = analysis.primary or analysis.single
+    answers = count_answers(analysis.trials, fit.frequencies_hz) if fit is not None else None
+    if fit is None or answers is None:
+        return []
+    points = (
+        f"Points: shares of right answers in bins of {BIN_DB:g} dB, with Wilson's 95 % intervals; the larger, the more "
+        "trials. "
+    )
+    primary = analysis.primary
+    together = primary and Picture(
+        name="psychometric",
+        title="Psychometric functions, all people together",
+        caption=f"{points}Levels are taken re each person's threshold by the model of all answers, whose curve is "
+        "drawn. A staircase stops going down where answers happen to be wrong, so the lowest points lie somewhat "
+        "below the curve of a model that is right.",
+        figure=draw_people_curves(answers, primary),
+    )
+    return [
+        *([together] if together else []),
+        *(
+            Picture(
+                name=f"psychometric-{number}-{_file_name(subject)}",
+                title=f"Psychometric functions of {subject}",
+                caption=points
+                + (
+                    "Curves: the model of all answers; it draws a person's threshold towards those of the others where "
+                    "the person's own answers say little."
+                    if primary
+                    else "Curves: the most probable ones of this person."
+                ),
+                figure=draw_person_curves(answers, fit, number - 1, analysis.protocol.staircase.cap_n),
+                folded=True,
+            )
+            for number, subject in enumerate(answers.subjects, start=1)
+        ),
+    ]
+
+
+def _file_name(subject: str) -> str:
+    return re.sub(r"[^A-Za-z0-9]+", "-", subject).strip("-")
+
+
 def _delivered_picture(analysis: StudyAnalysis) -> Picture:
     return Picture(
         name="delivered",
@@ -65,7 +148,7 @@ def _staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
     subjects = dict.fromkeys(run.subject for run in analysis.runs)
     return [
         Picture(
-            name=f"staircases-{index}-{re.sub(r'[^A-Za-z0-9]+', '-', subject).strip('-')}",
+            name=f"staircases-{index}-{_file_name(subject)}",
             title=f"Staircases of {subject}",
             caption="Level of every counted trial, right and wrong answers, and the reversals; the black ones are "
             "averaged into the threshold (solid line).",

@@ -21,6 +21,9 @@ _STEPS = ((1.5, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)), (3.0, (1.0, 2.0, 5.0)), (4.0, (
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
+PAGE_IN = 7.2
+"""Width of a figure over both columns of a paper (183 mm); text of 8 to 10 points needs no scaling there."""
+
 
 def new_figure(width_in: float, height_in: float) -> Figure:
     return Figure(figsize=(width_in, height_in), facecolor="white", layout="constrained")
@@ -33,6 +36,38 @@ def plain_axes(axes: Axes) -> None:
     axes.tick_params(labelsize=9)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
+
+
+def participant_colour(number: int) -> str:
+    return COLOURS[number % len(COLOURS)]
+
+
+def participant_marker(number: int) -> str:
+    """Participants differ in their markers, too, so that a print in grey tells them apart."""
+    return MARKERS[number % len(MARKERS)]
+
+
+def panel_grid(panels: int, height_in: float, sharex: bool = False) -> tuple[Figure, list[Axes]]:
+    """A page-wide figure of up to three columns, and its axes, at least one more than panels, for the legend; those
+    without a panel are off. height_in: of a line of panels."""
+    columns = min(3, panels + 1)
+    lines = -(-(panels + 1) // columns)
+    figure = new_figure(PAGE_IN, height_in * lines)
+    grid = figure.subplots(lines, columns, sharex=sharex, sharey=True, squeeze=False)
+    places = [axes for line in grid for axes in line]
+    for axes in places[panels:]:
+        axes.axis("off")
+    return figure, places
+
+
+def name_panel_axes(places: list[Axes], panels: int, below: str, left: str) -> None:
+    """Labels below the lowest panel of each column and left of each line of `panel_grid`."""
+    columns = min(3, panels + 1)
+    for number in range(0, panels, columns):
+        places[number].set_ylabel(left)
+    for number in range(max(0, panels - columns), panels):
+        places[number].set_xlabel(below)
+        places[number].tick_params(labelbottom=True)
 
 
 def newton_ticks(axis: Axis, lowest_n: float, highest_n: float) -> None:

@@ -7,11 +7,12 @@ from matplotlib.lines import Line2D
 
 from analysis.figures.style import (
     BLACK,
-    COLOURS,
     CUT_MARKER,
     GREY,
-    MARKERS,
+    PAGE_IN,
     new_figure,
+    participant_colour,
+    participant_marker,
     plain_axes,
     say_nothing_to_draw,
 )
@@ -30,7 +31,7 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
 
     table: thresholds in newtons. comparisons: of the same table; without intervals plain means are drawn.
     """
-    figure = new_figure(8.6, 4.8)
+    figure = new_figure(PAGE_IN, 4.2)
     if not table.subjects:
         return say_nothing_to_draw(figure, "There is no completed run to draw.")
     axes = figure.add_subplot()
@@ -59,20 +60,20 @@ def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
     for index, row in enumerate(table.values):
         at = np.arange(len(row)) + places[index]
         values = np.array([np.nan if value is None else value for value in row], dtype=float)
-        axes.plot(at, values, "-", color=_colour(index), linewidth=0.7, alpha=0.45, zorder=1)
+        axes.plot(at, values, "-", color=participant_colour(index), linewidth=0.7, alpha=0.45, zorder=1)
         for x, value, cut in zip(at, row, table.censored[index], strict=True):
             if value is not None:
-                _draw_threshold(axes, x, value, index, cut)
+                draw_threshold(axes, x, value, index, cut)
 
 
-def _draw_threshold(axes: Axes, x: float, value_n: float, participant: int, cut: bool) -> None:
+def draw_threshold(axes: Axes, x: float, value: float, participant: int, cut: bool) -> None:
     """Hollow with an arrow above where the cap cut; marker and colour identify the participant."""
-    colour = _colour(participant)
-    axes.plot(x, value_n, _marker(participant), color=colour, markersize=6, alpha=0.85,
+    colour = participant_colour(participant)
+    axes.plot(x, value, participant_marker(participant), color=colour, markersize=6, alpha=0.85,
               markerfacecolor="white" if cut else colour, markeredgecolor=colour if cut else "white",
               markeredgewidth=1.1 if cut else 0.5)  # fmt: skip
     if cut:
-        axes.annotate("", (x, value_n), xytext=(0, 13), textcoords="offset points", zorder=2,
+        axes.annotate("", (x, value), xytext=(0, 13), textcoords="offset points", zorder=2,
                       arrowprops={"arrowstyle": "<-", "color": colour, "linewidth": 0.9, "shrinkB": 3.5,
                                   "shrinkA": 0})  # fmt: skip
 
@@ -83,8 +84,8 @@ def _draw_stopped(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
     for index, row in enumerate(table.stopped):
         for at, stopped in enumerate(row):
             if stopped:
-                axes.plot(at + places[index], _STOPPED_AT * cap_n, _marker(index), color=_colour(index), markersize=6,
-                          markerfacecolor="none")  # fmt: skip
+                axes.plot(at + places[index], _STOPPED_AT * cap_n, participant_marker(index), markersize=6,
+                          color=participant_colour(index), markerfacecolor="none")  # fmt: skip
 
 
 def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons) -> None:
@@ -130,15 +131,9 @@ def _legend(table: ThresholdTable, comparisons: Comparisons) -> list[Line2D]:
         )
     if len(table.subjects) <= _LEGEND_LIMIT:
         handles += [
-            Line2D([], [], color=_colour(index), marker=_marker(index), linewidth=0, label=subject)
+            Line2D(
+                [], [], color=participant_colour(index), marker=participant_marker(index), linewidth=0, label=subject
+            )
             for index, subject in enumerate(table.subjects)
         ]
     return handles
-
-
-def _colour(index: int) -> str:
-    return COLOURS[index % len(COLOURS)]
-
-
-def _marker(index: int) -> str:
-    return MARKERS[index % len(MARKERS)]

@@ -15,6 +15,7 @@ from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import Threshold, threshold_of
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.procedure.run_rules import staircase_rule
+from protocols.procedure.staircase import to_db
 from protocols.trial import Phase, Trial
 
 
@@ -37,6 +38,30 @@ def detection_thresholds(trials: Iterable[Trial], protocol: StudyProtocol) -> tu
     rows = (threshold_of(run, rule) for run in recompute_runs(trials, rule, Phase.DETECTION))
     # Two looks at the same thing: the difference of the intervals has twice the variance.
     return tuple(row if row.d_prime is None else replace(row, d_prime=row.d_prime / math.sqrt(2)) for row in rows)
+
+
+def above_detection(direction: ThresholdTable, detection: ThresholdTable) -> ThresholdTable:
+    """Thresholds of direction in dB above those of detection, of the same participants and frequencies. Both tables in
+    newtons. Cut where the cap cut either."""
+    values, cut = [], []
+    for subject, row, bounds in zip(direction.subjects, direction.values, direction.censored, strict=True):
+        felt = [_felt(detection, subject, frequency_hz) for frequency_hz in direction.frequencies_hz]
+        values.append(
+            tuple(
+                None if told is None or from_n is None else to_db(told) - to_db(from_n)
+                for told, (from_n, _) in zip(row, felt, strict=True)
+            )
+        )
+        cut.append(tuple(told or bound for told, (_, bound) in zip(bounds, felt, strict=True)))
+    return replace(direction, quantity="above_detection_db", values=tuple(values), censored=tuple(cut), notes=())
+
+
+def _felt(detection: ThresholdTable, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
+    """Threshold of detection (N), and whether the cap cut it."""
+    if subject not in detection.subjects or frequency_hz not in detection.frequencies_hz:
+        return None, False
+    row, column = detection.subjects.index(subject), detection.frequencies_hz.index(frequency_hz)
+    return detection.values[row][column], detection.censored[row][column]
 
 
 def directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[BelowDetection, ...]:

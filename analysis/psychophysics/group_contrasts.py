@@ -36,8 +36,8 @@ class Contrast:
     p: float
     p_holm: float
     """Holm's, over all contrasts of the family: together wrong in at most 5 %."""
-    effect_size: float
-    """Mean over standard deviation of the differences (Cohen's d_z)."""
+    effect_size: float | None
+    """Mean over standard deviation of the differences (Cohen's d_z); None where the differences are not known."""
     p_equivalence: float | None
     """Two one-sided tests against +-2 dB; None where equivalence was not asked."""
     p_spread: float | None

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from protocols.definition.staircase_rule import StaircaseRule
-from protocols.procedure.staircase import StaircaseState, begin, is_finished, level_n, step, to_db
+from protocols.procedure.staircase import StaircaseState, begin, is_complete, is_finished, level_n, step, to_db
 from protocols.trial import AT_WILL, Phase, Trial, TrialStatus
 
 LEVEL_TOLERANCE = 1e-4
@@ -35,7 +35,7 @@ class Run:
     state: StaircaseState
     """Level of the staircase after the last of them."""
     complete: bool
-    """Whether the run has all reversals of its rule; one that ran out of trials has not."""
+    """Whether the run has a threshold by its rule; one that ran out of trials has not."""
     presentations: int = 0
     """Void ones and catch trials included."""
     repeats_at_will: int = 0
@@ -77,7 +77,7 @@ def _recompute(rows: list[Trial], rule: StaircaseRule, rove_db: float) -> Run:
         answered=tuple(trial for trial in counted if trial.phase is not Phase.CATCH),
         spoiled_trials=sum(trial.status is TrialStatus.SPOILED for trial in steering),
         state=state,
-        complete=state.reversals >= rule.reversals,
+        complete=is_complete(rule, state),
         presentations=len(rows),
         repeats_at_will=sum(trial.void_cause in AT_WILL for trial in rows),
     )

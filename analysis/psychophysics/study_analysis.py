@@ -17,6 +17,7 @@ from analysis.psychophysics.equalized_delivery import deliveries, delivery_warni
 from analysis.psychophysics.group_contrasts import Contrast, contrasts
 from analysis.psychophysics.hierarchy.answers import count_answers
 from analysis.psychophysics.hierarchy.primary import CONFIDENCE, PrimaryAnalysis, primary_analysis
+from analysis.psychophysics.hierarchy.single_persons import SinglePersons, fit_single_persons
 from analysis.psychophysics.population import Population, split_by_population
 from analysis.psychophysics.repeated_measures import Friedman, RepeatedMeasures, friedman, repeated_measures
 from analysis.psychophysics.repeated_trials import repeat_warning
@@ -24,6 +25,7 @@ from analysis.psychophysics.runs import Run, recompute_runs
 from analysis.psychophysics.study_warnings import side_warnings, study_warnings
 from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
 from analysis.psychophysics.thresholds import Threshold, threshold_of
+from analysis.psychophysics.tobit import tobit_contrasts
 from analysis.psychophysics.two_analyses import comparison_text, declaration_text
 from analysis.wording import f_text, p_text
 from equalizer.signals.summary import Summarised, Summary
@@ -100,8 +102,12 @@ class StudyAnalysis(Summarised):
     study."""
     primary: PrimaryAnalysis | None
     """The hierarchical model of all answers. None below two participants, and below two frequencies with answers."""
+    single: SinglePersons | None
+    """Each person's thresholds by likelihood, where there is no hierarchical model to give them."""
     mean_contrasts: tuple[Contrast, ...]
     """Reversal means in dB against the lowest frequency with answers, within participants."""
+    tobit: tuple[Contrast, ...]
+    """The same by Tobit's model, a sensitivity analysis; empty where nothing is cut."""
     declared: str
     """The protocol's declaration before the data, in words."""
     declared_result: DeclaredResult
@@ -148,8 +154,8 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
     detection, catches = detection_thresholds(trials, protocol), catch_tallies(trials)
     detection_table = threshold_table(detection, protocol.detection.frequencies_hz)
     anova, within = one_way_anova(table.groups()), repeated_measures(table.subjects, table.values)
-    comparisons, primary = compare_all(anova, CONFIDENCE), _model(tested, protocol)
-    means, cues, gaps = _mean_contrasts(rows, primary, protocol), cue_findings(tested), cue_gaps(tested)
+    comparisons, (primary, single) = compare_all(anova, CONFIDENCE), _models(tested, protocol)
+    (means, tobit), cues, gaps = _mean_contrasts(rows, primary, protocol), cue_findings(tested), cue_gaps(tested)
     return StudyAnalysis(
         protocol=protocol,
         population=population,
@@ -163,7 +169,9 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
         ranks=friedman(table.values),
         difference=design_difference(anova, within),
         primary=primary,
+        single=single,
         mean_contrasts=means,
+        tobit=tobit,
         declared=declaration_text(protocol.analysis),
         declared_result=declared_result(protocol.analysis, primary, comparisons, table, left_out),
         compared=comparison_text(primary, means, comparisons, table, rule),
@@ -191,20 +199,25 @@ def _single_population(trials: Sequence[Trial]) -> Population | None:
     return next(iter(parts), None)
 
 
-def _model(trials: Sequence[Trial], protocol: StudyProtocol) -> PrimaryAnalysis | None:
-    answers = count_answers(trials, protocol.stimulus.frequencies_hz)
-    return primary_analysis(answers, protocol.staircase.cap_n, declared_hz=protocol.analysis.contrast_hz)
+def _models(trials: Sequence[Trial], protocol: StudyProtocol) -> tuple[PrimaryAnalysis | None, SinglePersons | None]:
+    """The hierarchical model, or where there is nothing to compare, everyone's numbers for themselves."""
+    answers, cap_n = count_answers(trials, protocol.stimulus.frequencies_hz), protocol.staircase.cap_n
+    primary = primary_analysis(answers, cap_n, declared_hz=protocol.analysis.contrast_hz)
+    return primary, fit_single_persons(answers, cap_n) if primary is None and answers is not None else None
 
 
 def _mean_contrasts(
     rows: Sequence[Threshold], primary: PrimaryAnalysis | None, protocol: StudyProtocol
-) -> tuple[Contrast, ...]:
-    """At the frequencies of the model where there is one, so that both compare with the same lowest frequency."""
+) -> tuple[tuple[Contrast, ...], tuple[Contrast, ...]]:
+    """Of reversal means, and by Tobit's model of them. At the frequencies of the model where there is one, so that all
+    compare with the same lowest frequency."""
     frequencies_hz = primary.frequencies_hz if primary is not None else protocol.stimulus.frequencies_hz
     table = threshold_table(rows, frequencies_hz, "threshold_db")
     if not table.subjects or not table.frequencies_hz:
-        return ()
-    return contrasts(table.frequencies_hz, np.array(table.values, dtype=np.float64), CONFIDENCE)
+        return (), ()
+    values = np.array(table.values, dtype=np.float64)
+    means = contrasts(table.frequencies_hz, values, CONFIDENCE)
+    return means, tobit_contrasts(table.frequencies_hz, values, np.array(table.censored), CONFIDENCE)
 
 
 def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
@@ -226,7 +239,9 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "friedman": asdict(analysis.ranks),
         "difference": analysis.difference,
         "primary": asdict(analysis.primary) if analysis.primary else None,
+        "single_persons": asdict(analysis.single) if analysis.single else None,
         "mean_contrasts_db": [asdict(contrast) for contrast in analysis.mean_contrasts],
+        "tobit_contrasts_db": [asdict(contrast) for contrast in analysis.tobit],
         "declared": asdict(analysis.protocol.analysis),
         "declared_result": _declared_document(analysis.declared_result),
         "compared": analysis.compared,

@@ -36,7 +36,7 @@ def study_warnings(
         return ("No test trial is there, so there is no threshold of direction.",)
     candidates = (
         _stopped_warning(rows, protocol.staircase),
-        _incomplete_warning(rows, protocol.staircase.reversals),
+        _incomplete_warning(rows, protocol.staircase),
         _missing_warning(table),
         _censored_warning(table, protocol.staircase.cap_n),
         _few_participants_warning(table),
@@ -71,9 +71,11 @@ def side_warnings(
     return tuple(sentence for sentence in candidates if sentence)
 
 
-def _incomplete_warning(rows: Sequence[Threshold], reversals: int) -> str:
+def _incomplete_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     cut = [
-        f"{_run_text(row)} ({row.reversals} of {reversals} reversals)"
+        f"{_run_text(row)} ({row.trials} trials)"
+        if rule.is_bayesian
+        else f"{_run_text(row)} ({row.reversals} of {rule.reversals} reversals)"
         for row in rows
         if not row.complete and row.ended is not RunEnd.TRIAL_LIMIT
     ]

@@ -7,7 +7,7 @@ from typing import Literal
 
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 
-Quantity = Literal["threshold_n", "threshold_db", "threshold_mps2", "threshold_mm"]
+Quantity = Literal["threshold_n", "threshold_db", "threshold_mps2", "threshold_mm", "above_detection_db"]
 
 
 @dataclass(frozen=True, slots=True)

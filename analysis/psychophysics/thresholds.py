@@ -9,7 +9,8 @@ from analysis.psychophysics.bias import response_bias
 from analysis.psychophysics.repeated_trials import is_often
 from analysis.psychophysics.runs import Run, recompute_runs
 from protocols.definition.staircase_rule import StaircaseRule
-from protocols.procedure.staircase import is_finished, to_newton
+from protocols.procedure.psi import estimate, posterior
+from protocols.procedure.staircase import is_finished, to_db, to_newton
 from protocols.trial import Phase, Trial
 
 
@@ -17,7 +18,7 @@ class RunEnd(StrEnum):
     """Reason for the end of a run."""
 
     REVERSALS = "reversals"
-    """All reversals of the rule: there is a threshold."""
+    """All reversals of the rule, or all that Psi was to find out: there is a threshold."""
     TRIAL_LIMIT = "trial_limit"
     """The protocol's `trial_limit`. The run has no threshold, and is more often that of a high threshold: under a
     limit of 100 trials 58 % of guessers and 0.1 % of people with a threshold of 1 N end so."""
@@ -80,22 +81,19 @@ def thresholds(trials: Iterable[Trial], rule: StaircaseRule, rove_db: float = 0.
 
 
 def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
+    found = _from_posterior(run, rule) if rule.is_bayesian else _from_reversals(run, rule)
     state = run.state
-    averaged_db = state.reversal_levels_db[-rule.averaged_reversals :]
-    averaged_n = [min(to_newton(level), rule.cap_n) for level in averaged_db]
-    turned = [run.answered[index] for index in state.reversal_trials[-rule.averaged_reversals :]]
-    cap_reversals = sum(level >= rule.cap_n * (1.0 - _SAME_LEVEL) for level in averaged_n)
     correct = [bool(trial.correct) for trial in run.answered]
     bias = response_bias([trial.direction_shown for trial in run.answered], correct)
     return Threshold(
         subject=run.subject,
         frequency_hz=run.frequency_hz,
-        threshold_n=fmean(averaged_n) if run.complete else None,
-        threshold_db=fmean(averaged_db) if run.complete else None,
-        censored=is_censored(cap_reversals),
+        threshold_n=found.newton if run.complete else None,
+        threshold_db=found.db if run.complete else None,
+        censored=found.censored,
         reversals=state.reversals,
         trials=state.trials,
-        cap_reversals=cap_reversals,
+        cap_reversals=found.cap_reversals,
         trials_at_cap=state.trials_at_cap,
         pushes_against_cap=state.pushes_against_cap,
         complete=run.complete,
@@ -105,13 +103,13 @@ def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
         d_prime=bias.d_prime if bias else None,
         criterion=bias.criterion if bias else None,
         spoiled_trials=run.spoiled_trials,
-        threshold_mps2=_mean_of_measured([_at_level(trial, trial.delivered_mps2) for trial in turned])
+        threshold_mps2=_mean_of_measured([_at_level(t, t.delivered_mps2, n) for t, n in found.measured])
         if run.complete
         else None,
-        threshold_mm=_mean_of_measured([_at_level(trial, trial.displacement_mm) for trial in turned])
+        threshold_mm=_mean_of_measured([_at_level(t, t.displacement_mm, n) for t, n in found.measured])
         if run.complete
         else None,
-        measured_reversals=sum(trial.delivered_mps2 is not None for trial in turned),
+        measured_reversals=sum(trial.delivered_mps2 is not None for trial, _ in found.measured),
         ended=_run_end(run, rule),
         repeats_at_will=run.repeats_at_will,
         repeat_rate=run.repeats_at_will / run.presentations if run.presentations else 0.0,
@@ -119,9 +117,48 @@ def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
     )
 
 
-def _at_level(trial: Trial, measured: float | None) -> float | None:
-    """Measured value scaled to the staircase's level, where that level was roved."""
-    return None if measured is None else measured * trial.staircase_n / trial.level_n
+@dataclass(frozen=True, slots=True)
+class _Found:
+    newton: float | None
+    db: float | None
+    censored: bool
+    cap_reversals: int
+    measured: tuple[tuple[Trial, float], ...]
+    """Trials that say what the threshold is in other units, and the level (N) to which each is taken in proportion."""
+
+
+def _from_reversals(run: Run, rule: StaircaseRule) -> _Found:
+    state = run.state
+    averaged_db = state.reversal_levels_db[-rule.averaged_reversals :]
+    averaged_n = [min(to_newton(level), rule.cap_n) for level in averaged_db]
+    turned = [run.answered[index] for index in state.reversal_trials[-rule.averaged_reversals :]]
+    cap_reversals = sum(level >= rule.cap_n * (1.0 - _SAME_LEVEL) for level in averaged_n)
+    return _Found(
+        newton=fmean(averaged_n) if averaged_n else None,
+        db=fmean(averaged_db) if averaged_db else None,
+        censored=is_censored(cap_reversals),
+        cap_reversals=cap_reversals,
+        measured=tuple((trial, trial.staircase_n) for trial in turned),
+    )
+
+
+def _from_posterior(run: Run, rule: StaircaseRule) -> _Found:
+    """Posterior mean, never above the cap; cut where the threshold is as likely as not to be above it, or nearly."""
+    cap_db = to_db(rule.cap_n)
+    found = estimate(posterior(run.state.answered, cap_db), cap_db)
+    db = min(found.mean_db, cap_db)
+    latest = run.answered[-rule.averaged_reversals :]
+    newton = min(to_newton(db), rule.cap_n)
+    return _Found(newton, db, found.above_cap > MAYBE_ABOVE, 0, tuple((trial, newton) for trial in latest))
+
+
+def _at_level(trial: Trial, measured: float | None, level_n: float) -> float | None:
+    """What was measured, as it would be at another level: in proportion. So are levels that were roved."""
+    return None if measured is None else measured * level_n / trial.level_n
+
+
+MAYBE_ABOVE = 0.1
+"""Probability, by Psi's posterior, of a threshold above the cap from which a run is marked as cut."""
 
 
 def is_censored(cap_reversals: int) -> bool:

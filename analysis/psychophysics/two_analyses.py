@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 
 from analysis.psychophysics.comparisons import Comparisons
+from analysis.psychophysics.coverage_words import coverage_sentence
 from analysis.psychophysics.group_contrasts import Contrast
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
+from analysis.psychophysics.measured_coverage import MEASURED
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
 from analysis.wording import conjoin, p_text, signed_number
 from protocols.definition.declared_analysis import AnalysisSettings
@@ -13,18 +15,13 @@ from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 NOTABLE_DB = 1.0
 """A difference between the two analyses that is worth a sentence: the small step of the staircase."""
 SIMULATED_RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
-"""The published staircase and cap: `NEAR_PUBLISHED_CAP` was simulated with it and holds for no other."""
+"""The published staircase and cap: what `measured_coverage` counted was simulated with it and holds for no other."""
 NOTHING_DECLARED = (
     "The protocol declares no primary analysis, contrast, sample size or exclusions; the hierarchical model is put "
     "first because it needs the fewest excuses near the cap, and a choice made after the data is no declaration."
 )
 NEAR_CAP = (
     'Near the cap the published intervals do not hold what they say, and the published "not significant" says little.'
-)
-NEAR_PUBLISHED_CAP = (
-    "With this staircase and cap, for true thresholds of 3 N at 35 Hz and 4 N at 45 Hz, simulated, reversal means lose "
-    "5 dB of the difference to 5 Hz, their interval covers 3 %, Tukey's 0 %; and one-way analysis finds a difference "
-    "that is not there in 0.4 % of studies instead of 5 %."
 )
 
 
@@ -67,8 +64,16 @@ def comparison_text(
         )
     missing = [f"{frequency_hz:g} Hz" for frequency_hz in primary.missing_hz]
     left_out = f"The model leaves {conjoin(missing)} out, where there is no answer yet." if missing else ""
-    cut = [NEAR_CAP, NEAR_PUBLISHED_CAP if rule == SIMULATED_RULE else ""] if table.cut else []
+    cut = [NEAR_CAP, *coverage_notes(("means", "tukey", "one-way"), table, rule)] if table.cut else []
     return " ".join(filter(None, [left_out, _sizes_text(primary, means), _verdict_text(primary, comparisons), *cut]))
+
+
+def coverage_notes(analyses: Sequence[str], table: ThresholdTable, rule: StaircaseRule) -> tuple[str, ...]:
+    """What was measured of these (names of `coverage_words.NAMES`), where the cap cut into the data; nothing of another
+    staircase than the one that was simulated."""
+    if not table.coverage or rule != SIMULATED_RULE:
+        return ()
+    return tuple(filter(None, (coverage_sentence(MEASURED, name) for name in analyses)))
 
 
 def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast]) -> str:

@@ -1,5 +1,6 @@
 """The methods of a study in words, with the numbers of its protocol."""
 
+from analysis.psychophysics.thresholds import MAYBE_ABOVE
 from analysis.wording import conjoin, typeset
 from protocols.definition.preparation import DemoSettings, PracticeSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepChange
@@ -108,6 +109,15 @@ def _schedule(protocol: StudyProtocol) -> str:
 
 
 def _staircase(rule: StaircaseRule) -> str:
+    if rule.is_bayesian:
+        early = f", or once its standard deviation was below {rule.bayesian.spread_db:g} dB"
+        return (
+            f"The level began at {rule.start_n:g} N; each later one was that which was expected to tell most of "
+            "threshold and slope, from all answers of the run before it (Psi: Kontsevich and Tyler 1999; Weibull "
+            f"curve, 2 % lapses, flat prior). It never passed {rule.cap_n:g} N. "
+            f"A run ended after {rule.bayesian.trials} trials"
+            f"{early if rule.bayesian.spread_db else ''}."
+        )
     phases = conjoin([f"{phase.step_db:g} dB for {phase.reversals} reversals" for phase in rule.steps])
     up = "every wrong answer" if rule.up_after_wrong == 1 else f"{rule.up_after_wrong} wrong answers in a row"
     down = "every right answer" if rule.down_after_right == 1 else f"{rule.down_after_right} right answers in a row"
@@ -126,6 +136,12 @@ def _staircase(rule: StaircaseRule) -> str:
 
 
 def _threshold(rule: StaircaseRule) -> str:
+    if rule.is_bayesian:
+        return (
+            "The threshold is the mean of its posterior in dB, at most the cap. It was recomputed from the answers, "
+            "and every level on record was checked against the rule. It is marked as cut by the cap where it lies "
+            f"above it with a probability over {MAYBE_ABOVE:g}."
+        )
     return (
         "The threshold is the arithmetic mean, in newtons, of the levels at the last "
         f"{rule.averaged_reversals} reversals. It was recomputed from the answers, and every level on record was "

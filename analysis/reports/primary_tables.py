@@ -1,11 +1,14 @@
 """The tables of the primary analysis in a study report."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
 from analysis.psychophysics.hierarchy.inference import MedianThreshold
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, newton_or_none
+from analysis.psychophysics.study_analysis import StudyAnalysis
+from analysis.psychophysics.two_analyses import coverage_notes
 from analysis.reports.page import Section, Table
 from analysis.wording import NONE, number, p_text, p_value, signed_number
 
@@ -17,23 +20,55 @@ MEANING = (
     "79.37 %."
 )
 
+RUN_MEANING = (
+    "From the answers at this frequency alone, with the person's slope and criterion and the lapse rate of the model. "
+    "Above the cap, or below the levels played (right answers only): no size, a one-sided bound."
+)
+SINGLE_MEANING = (
+    "From the answers at this frequency alone. What a run does not tell is averaged over usual people: slopes within a "
+    "factor of 1.5, likings for one answer within 0.3 d', few lapses. Above the cap, or below the levels played (right "
+    "answers only): no size, a one-sided bound."
+)
+TOBIT_MEANING = (
+    "A mean that the cap cut counts as at least this. A sensitivity analysis: reversal means near the cap are too low "
+    "before they are cut, and a cut mean is no clean bound. Wald's intervals, t with n − 1 degrees of freedom."
+)
 
-def primary_section(primary: PrimaryAnalysis | None, compared: str, means: Sequence[Contrast]) -> Section:
-    """compared: where the analyses differ, in words."""
+
+def primary_section(analysis: StudyAnalysis) -> Section:
+    primary, means = analysis.primary, analysis.mean_contrasts
     if primary is None:
-        return Section("All answers in one model", paragraphs=(compared,))
+        return _single_section(analysis)
+    by_means = [_contrasts("Differences by reversal means (dB)", means, (), _measured(analysis, "means"))]
+    if analysis.tobit:
+        notes = (TOBIT_MEANING, *_measured(analysis, "tobit"))
+        by_means.append(_contrasts("Sensitivity: differences by Tobit's model (dB)", analysis.tobit, (), notes))
+    model = _measured(analysis, "model")
     return Section(
         "All answers in one model",
-        paragraphs=(MEANING, compared, _overall(primary), limit_words(primary)),
+        paragraphs=(MEANING, analysis.compared, _overall(primary), limit_words(primary)),
         tables=(
             _medians(primary),
-            _contrasts("Differences by the model (dB)", primary.contrasts, primary.medians),
-            *([_contrasts("Differences by reversal means (dB)", means, ())] if means else []),
-            _runs(primary),
+            _contrasts("Differences by the model (dB)", primary.contrasts, primary.medians, model),
+            *(by_means if means else []),
+            _runs(primary.runs, primary.confidence, (RUN_MEANING, *_measured(analysis, "run"))),
             _persons(primary),
             _goodness(primary),
         ),
     )
+
+
+def _single_section(analysis: StudyAnalysis) -> Section:
+    single = analysis.single
+    if single is None:
+        return Section("All answers in one model", paragraphs=(analysis.compared,))
+    notes = (SINGLE_MEANING, *_measured(analysis, "single"))
+    table = _runs(single.runs, single.confidence, notes)
+    return Section("Thresholds by likelihood", paragraphs=(analysis.compared,), tables=(replace(table, folded=False),))
+
+
+def _measured(analysis: StudyAnalysis, name: str) -> tuple[str, ...]:
+    return coverage_notes((name,), analysis.table, analysis.protocol.staircase)
 
 
 def _overall(primary: PrimaryAnalysis) -> str:
@@ -92,7 +127,9 @@ def interval_words(lower: float | None, upper: float | None, digits: int = 2) ->
     return f"above {number(lower, digits)}" if upper is None else f"{number(lower, digits)} to {number(upper, digits)}"
 
 
-def _contrasts(caption: str, rows: Sequence[Contrast], medians: Sequence[MedianThreshold]) -> Table:
+def _contrasts(
+    caption: str, rows: Sequence[Contrast], medians: Sequence[MedianThreshold], notes: Sequence[str]
+) -> Table:
     above = {median.frequency_hz for median in medians if median.above_cap}
     return Table(
         caption=caption,
@@ -115,23 +152,17 @@ def _contrasts(caption: str, rows: Sequence[Contrast], medians: Sequence[MedianT
             f"Within participants, t with n − 1 degrees of freedom. Equivalent: two one-sided tests within "
             f"±{EQUIVALENCE_DB:g} dB. Spread: Pitman and Morgan, whether people differ equally much at both.",
             *(("* The median is above the cap: only the lower end of the interval is known.",) if above else ()),
+            *notes,
         ),
     )
 
 
-def _runs(primary: PrimaryAnalysis) -> Table:
-    percent = f"{100 * primary.confidence:g} %"
-    rows = []
-    for run in primary.runs:
-        rows.append((run.subject, f"{run.frequency_hz:g} Hz", str(run.trials), *run_words(run)))
+def _runs(runs: Sequence[RunLikelihood], confidence: float, notes: tuple[str, ...]) -> Table:
     return Table(
         caption="Single thresholds by maximum likelihood (N)",
-        header=("Participant", "Frequency", "Trials", "Threshold", f"{percent} profile interval"),
-        rows=tuple(rows),
-        notes=(
-            "From the answers at this frequency alone, with the person's slope and criterion and the lapse rate of the "
-            "model. Above the cap, or below the levels played (right answers only): no size, a one-sided bound.",
-        ),
+        header=("Participant", "Frequency", "Trials", "Threshold", f"{100 * confidence:g} % likelihood interval"),
+        rows=tuple((run.subject, f"{run.frequency_hz:g} Hz", str(run.trials), *run_words(run)) for run in runs),
+        notes=notes,
         folded=True,
     )
 

@@ -1,6 +1,7 @@
 """Report of a study as a self-contained page."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from analysis.figures.picture import Picture
 from analysis.psychophysics.ellipsoid import EllipsoidResult
@@ -121,7 +122,7 @@ def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Se
     pairs = (pair_table(analysis),) if analysis.comparisons.pairs else ()
     thresholds = Section(
         "Thresholds",
-        pictures=(by_name["thresholds"],) if "thresholds" in by_name else (),
+        pictures=tuple(by_name[name] for name in ("thresholds", "units") if name in by_name),
         tables=(threshold_table_text(analysis), group_table(analysis)),
     )
     comparison = Section(
@@ -129,7 +130,10 @@ def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Se
         paragraphs=(analysis.difference,),
         tables=(one_way_table(analysis), *pairs, within_table(analysis)),
     )
-    model = primary_section(analysis.primary, analysis.compared, analysis.mean_contrasts)
+    model = replace(
+        primary_section(analysis),
+        pictures=tuple(picture for name, picture in by_name.items() if name.startswith("psychometric")),
+    )
     return [thresholds, model, comparison]
 
 

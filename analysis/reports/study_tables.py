@@ -7,6 +7,7 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.repeated_trials import OFTEN_WORDS
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.thresholds import RunEnd, Threshold
+from analysis.psychophysics.two_analyses import coverage_notes
 from analysis.reports.page import Table
 from analysis.wording import CUT_NOTE, NONE, count, mark_cut, number, p_value, signed_number
 
@@ -83,7 +84,7 @@ def one_way_table(analysis: StudyAnalysis) -> Table:
         caption="One-way analysis of variance, as published",
         header=("Source", "Sum of squares", "df", "Mean square", "F", "p"),
         rows=rows,
-        notes=effect + anova.notes,
+        notes=effect + anova.notes + coverage_notes(("one-way",), analysis.table, analysis.protocol.staircase),
     )
 
 
@@ -102,7 +103,11 @@ def pair_table(analysis: StudyAnalysis) -> Table:
             )
             for pair in comparisons.pairs
         ),
-        notes=(*comparisons.notes, *_coverage(analysis)),
+        notes=(
+            *comparisons.notes,
+            *_coverage(analysis),
+            *coverage_notes(("tukey",), analysis.table, analysis.protocol.staircase),
+        ),
     )
 
 

@@ -32,6 +32,30 @@ class StepPhase:
 
 
 @dataclass(frozen=True, config=STRICT)
+class BayesianPlacement:
+    """Levels by the Psi method in place of the up-down rule, which `protocols.procedure.psi` describes."""
+
+    trials: Annotated[
+        int,
+        Field(
+            ge=0,
+            le=500,
+            description="Trials of a run whose levels are chosen by Psi, from the cap downwards in steps of 1 dB; 0: "
+            "by the up-down rule. The first trial is at start_n in either case. Default: 0, as published.",
+        ),
+    ] = 0
+    spread_db: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=20,
+            description="End a run earlier, once the standard deviation of its threshold's posterior is this small, in "
+            "dB. Default: 0, never.",
+        ),
+    ] = 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
 class StaircaseRule:
     """A transformed up-down rule. All numbers without a default are the experimenter's to state."""
 
@@ -95,6 +119,18 @@ class StaircaseRule:
         ),
     ] = 0
 
+    bayesian: Annotated[
+        BayesianPlacement,
+        Field(
+            description="Levels that tell most, in place of the up-down rule (Kontsevich and Tyler 1999). Steps and "
+            "reversals above are then not used, and the threshold is the posterior mean. Default: off, as published."
+        ),
+    ] = BayesianPlacement()
+
+    @property
+    def is_bayesian(self) -> bool:
+        return self.bayesian.trials > 0
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         problems = []
@@ -117,5 +153,8 @@ class StaircaseRule:
                     "phases whose reversals add up to the number in reversals",
                 )
             )
+        if self.bayesian.spread_db and not self.is_bayesian:
+            wrong = f"is {self.bayesian.spread_db} dB, but bayesian.trials is 0"
+            problems.append(Problem("bayesian.spread_db", wrong, "0, or a number of trials in bayesian.trials"))
         refuse(problems)
         return self

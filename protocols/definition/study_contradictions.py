@@ -30,6 +30,9 @@ def _levels(protocol: StudyProtocol) -> list[Problem]:
         room_n = roved_up_n(protocol.safety.stimulus_cap_n, -protocol.stimulus.rove_db)
         allowed = f"at most {math.floor(1000 * room_n) / 1000:g} N, so that none is above safety.stimulus_cap_n"
         problems.append(Problem("staircase.cap_n", wrong, allowed))
+    if protocol.stimulus.rove_db and protocol.staircase.is_bayesian:
+        wrong = f"is {protocol.stimulus.rove_db:g} dB, but Psi takes the levels of its answers as they are planned"
+        problems.append(Problem("stimulus.rove_db", wrong, "0, or 0 in staircase.bayesian.trials"))
     levels = {
         "demo.level_n": _highest_n(protocol.demo),
         "practice.level_n": _highest_n(protocol.practice) if protocol.practice.frequencies_hz else 0.0,

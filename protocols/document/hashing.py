@@ -61,6 +61,7 @@ QUESTIONS_SINCE: dict[str, Untouched] = {
     "debrief.scale": [],
     "debrief.ends": [],
 }
+PLACEMENT_SINCE: dict[str, Untouched] = {"staircase.bayesian": {"trials": 0, "spread_db": 0.0}}
 
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
     "study": {
@@ -72,6 +73,7 @@ FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
         **SENSOR_SINCE,
         **SETUP_SINCE,
         **QUESTIONS_SINCE,
+        **PLACEMENT_SINCE,
     },
     "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
 }

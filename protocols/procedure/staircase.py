@@ -1,7 +1,8 @@
 """Transformed up-down staircase: the next level, and the end of a run.
 
-Read `step` first: it is the whole rule. The state is a value: `begin` makes it, `step` returns the next one. Levels are
-kept in dB re 1 N, because after contact with the cap they leave the 1 dB grid.
+Read `step` first: it is the whole rule, but for runs whose levels Psi chooses (`psi`). The state is a value: `begin`
+makes it, `step` returns the next one. Levels are kept in dB re 1 N, because after contact with the cap they leave the
+1 dB grid.
 
 Source: H. Levitt, Transformed up-down methods in psychoacoustics, J. Acoust. Soc. Am. 49 (1971), 467-477.
 """
@@ -11,6 +12,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from protocols.definition.staircase_rule import StaircaseRule, StepChange
+from protocols.procedure.psi import Answered, estimate, next_level_db, posterior
 
 
 class Heading(Enum):
@@ -37,6 +39,10 @@ class StaircaseState:
     pushes_against_cap: int = 0
     """Number of times the rule asked for a level above the cap."""
     reversals_at_cap: int = 0
+    answered: tuple[Answered, ...] = ()
+    """Of a run whose levels Psi chooses: all its answers. None otherwise."""
+    spread_db: float = math.inf
+    """Of such a run: standard deviation of the threshold's posterior."""
 
     @property
     def reversals(self) -> int:
@@ -58,6 +64,8 @@ def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Staircase
     if is_finished(rule, state):
         raise ValueError("this run is finished: no answer can follow")
     counted = _count(rule, state, correct)
+    if rule.is_bayesian:
+        return _place(rule, counted, correct)
     if counted.wrong_in_a_row >= _wrong_needed(rule, state):
         return _move(rule, counted, Heading.UP)
     if counted.right_in_a_row >= _right_needed(rule, state):
@@ -66,9 +74,16 @@ def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Staircase
 
 
 def is_finished(rule: StaircaseRule, state: StaircaseState) -> bool:
-    """Whether the run has all its reversals or has reached its trial limit."""
+    """Whether the run is complete or has reached its trial limit."""
     out_of_trials = rule.trial_limit > 0 and state.trials >= rule.trial_limit
-    return state.reversals >= rule.reversals or out_of_trials
+    return is_complete(rule, state) or out_of_trials
+
+
+def is_complete(rule: StaircaseRule, state: StaircaseState) -> bool:
+    """Whether the run has a threshold: all its reversals, or what Psi was to find out."""
+    if rule.is_bayesian:
+        return state.trials >= rule.bayesian.trials or state.spread_db <= rule.bayesian.spread_db
+    return state.reversals >= rule.reversals
 
 
 def level_n(rule: StaircaseRule, state: StaircaseState) -> float:
@@ -94,6 +109,14 @@ def _count(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Stairca
         trials=state.trials + 1,
         trials_at_cap=state.trials_at_cap + _at_cap(rule, state.level_db),
     )
+
+
+def _place(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
+    """The level that Psi chooses after this answer."""
+    cap_db, answered = to_db(rule.cap_n), (*state.answered, (state.level_db, correct))
+    probability = posterior(answered, cap_db)
+    level_db = min(next_level_db(probability, cap_db), cap_db)
+    return replace(state, level_db=level_db, answered=answered, spread_db=estimate(probability, cap_db).sd_db)
 
 
 def _move(rule: StaircaseRule, state: StaircaseState, heading: Heading) -> StaircaseState:

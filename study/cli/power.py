@@ -16,6 +16,7 @@ from study.errors import WrongUseError
 if TYPE_CHECKING:
     from analysis.psychophysics.power.felt_delivery import FeltDelivery
     from analysis.psychophysics.power.simulated_study import Crowd
+    from protocols.definition.staircase_rule import StaircaseRule
     from protocols.definition.study_protocol import StudyProtocol
     from study.workflows.planning.simulate_power import PowerPlan
 
@@ -40,6 +41,14 @@ PeopleOption = Annotated[
     ),
 ]
 
+CompareOption = Annotated[
+    bool,
+    typer.Option(
+        "--compare",
+        help="Compare rules instead: one run of each of --studies people at --threshold-n, under the protocol's "
+        "staircase with each reading of its steps and under Psi, on the same draws; prints the error per trial.",
+    ),
+]
 DeliveredOption = Annotated[
     Path | None,
     typer.Option(
@@ -63,6 +72,7 @@ def power(
     lapse: LapseOption = 0.02,
     people: PeopleOption = "attentive",
     delivered: DeliveredOption = None,
+    compare: CompareOption = False,
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of all draws.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -76,6 +86,9 @@ def power(
     chosen = read_study_protocol(protocol, Path()).protocol
     crowd = _with_habits(_crowd(chosen, threshold_n, effect_db), people, curve, lapse, chosen.trial.repeats_per_run)
     crowd = replace(crowd, delivery=_delivery(delivered, crowd.frequencies_hz))
+    if compare:
+        _compare(crowd, chosen.staircase, studies, seed, as_json)
+        return
     sizes = sample_sizes(subjects)
     plan = PowerPlan(crowd, chosen.staircase, sizes, studies, seed, chosen.analysis.contrast_hz)
     title = f"{studies} studies of each of {len(sizes)} sizes"
@@ -86,6 +99,23 @@ def power(
         typer.echo(json.dumps([asdict(point) for point in points], indent=2))
         return
     typer.echo("\n".join((*power_lines(points), "", _judged_words(plan), f"Figure: {out / 'figures' / 'power.png'}")))
+
+
+def _compare(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: int, as_json: bool) -> None:
+    """Print what each rule makes of the same people. Their habits, and what they feel, are left out."""
+    from analysis.psychophysics.power.compare_rules import compare_rules, compared_rules
+
+    results = compare_rules(crowd, compared_rules(rule), people, seed)
+    if as_json:
+        typer.echo(json.dumps([asdict(result) for result in results], indent=2))
+        return
+    typer.echo(f"{'rule':42}{'trials':>7}{'bias':>8}{'sd':>7}{'error':>8}  error x sqrt(trials), dB")
+    for row in results:
+        numbers = (
+            f"{row.trials:7.1f}{row.bias_db:+8.2f}{row.sd_db:7.2f}{row.error_db:8.2f}{row.error_per_trial_db:10.1f}"
+        )
+        typer.echo(f"{row.rule:42}{numbers}")
+    typer.echo(f"{people} people, the same under every rule; errors of single runs in dB, root mean square.")
 
 
 def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":

@@ -16,8 +16,7 @@ FIGURE_DPI = 150
 
 
 def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
-    """Write into `folder`, which is created. Folded pictures are too many for slides and written as SVG only. Raises
-    CannotWriteError."""
+    """Write into `folder`, which is created: SVG, and PNG where the picture asks for it. Raises CannotWriteError."""
     drawn = map_forked(draw_picture, pictures)
     for picture, each in zip(pictures, drawn, strict=True):
         picture.drawn[:] = each.picture.drawn
@@ -41,7 +40,7 @@ def draw_picture(picture: Picture) -> DrawnPicture:
 
 
 def _draw_files(picture: Picture) -> tuple[str, bytes]:
-    return picture_svg(picture), b"" if picture.folded else _png(picture)
+    return picture_svg(picture), _png(picture) if picture.bitmap else b""
 
 
 def write_drawn(folder: Path, drawn: Iterable[DrawnPicture]) -> None:

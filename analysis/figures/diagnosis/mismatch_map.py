@@ -67,6 +67,7 @@ def mismatch_map_picture(maps: Maps, number: int, unit: str) -> Picture:
         f"a number: below {_NUMBERED:g}." + _group_text(maps, input_),
         figure=draw_mismatch_map(maps, input_, unit),
         folded=number > 0,
+        bitmap=number == 0,
         alternative=_alternative_text(maps, input_),
     )
 

@@ -67,6 +67,7 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
                     + " Dashed: the re-tuned model alone.",
                     figure=draw_rivals(tried, retuned, held),
                     folded=not held,
+                    bitmap=held,
                     alternative=" ".join(_alternative_text(each) for each in tried),
                 )
             )

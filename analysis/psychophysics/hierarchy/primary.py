@@ -8,7 +8,7 @@ import numpy as np
 from analysis.psychophysics.group_contrasts import Contrast, contrasts, pair_contrast
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
-from analysis.psychophysics.hierarchy.fit import HierarchicalFit, fit_hierarchy
+from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.goodness import GoodnessOfFit, goodness_of_fit
 from analysis.psychophysics.hierarchy.inference import (
     DirectionLimit,
@@ -17,8 +17,9 @@ from analysis.psychophysics.hierarchy.inference import (
     median_thresholds,
     pseudo_thresholds,
 )
-from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, run_likelihoods
+from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, run_likelihoods
 from analysis.psychophysics.repeated_measures import RepeatedMeasures, repeated_measures
+from equalizer.signals.signal import FloatArray
 from protocols.procedure.staircase import to_db
 
 CONFIDENCE = 0.95
@@ -79,7 +80,7 @@ def primary_analysis(
     frequencies of the declared contrast, first minus second, or none."""
     if answers is None or answers.persons < 2:
         return None
-    asked_hz, answers = answers.frequencies_hz, _at_played_frequencies(answers)
+    asked_hz, answers = answers.frequencies_hz, at_played_frequencies(answers)
     if len(answers.frequencies_hz) < 2:
         return None
     fit = fit_hierarchy(answers, family)
@@ -95,9 +96,13 @@ def primary_analysis(
         overall=repeated_measures(answers.subjects, pseudo.tolist()),
         contrasts=contrasts(frequencies, pseudo, confidence),
         limit=direction_limit(frequencies, pseudo, cap_db, confidence),
-        persons=(persons := _persons(fit, cap_db)),
+        persons=(persons := estimate_persons(answers.subjects, fit.latent, cap_db)),
         runs=run_likelihoods(
-            answers, [(person.slope, person.criterion) for person in persons], fit.lapse, cap_db, family, confidence
+            answers,
+            [Nuisance(person.slope, person.criterion, (fit.lapse,)) for person in persons],
+            cap_db,
+            family,
+            confidence,
         ),
         person_sd_db=float(sds[0]),
         frequency_sd_db=float(sds[1]),
@@ -112,7 +117,7 @@ def primary_analysis(
     )
 
 
-def _at_played_frequencies(answers: Answers) -> Answers:
+def at_played_frequencies(answers: Answers) -> Answers:
     """The same answers without the frequencies that have none: a mean without data would have no estimate."""
     k = len(answers.frequencies_hz)
     played, place = np.unique(answers.run % k, return_inverse=True)
@@ -120,15 +125,15 @@ def _at_played_frequencies(answers: Answers) -> Answers:
     return replace(answers, frequencies_hz=frequencies_hz, run=answers.run // k * len(played) + place)
 
 
-def _persons(fit: HierarchicalFit, cap_db: float) -> tuple[PersonEstimate, ...]:
-    k = fit.layout.k
+def estimate_persons(subjects: Sequence[str], latent: FloatArray, cap_db: float) -> tuple[PersonEstimate, ...]:
+    """latent: (n, k + 2), thresholds in dB, log-slope, criterion."""
     return tuple(
         PersonEstimate(
             subject=subject,
-            thresholds_n=tuple(float(10.0 ** (db / 20.0)) for db in row[:k]),
-            above_cap=tuple(bool(db > cap_db) for db in row[:k]),
-            slope=float(np.exp(row[k])),
-            criterion=float(row[k + 1]),
+            thresholds_n=tuple(float(10.0 ** (db / 20.0)) for db in row[:-2]),
+            above_cap=tuple(bool(db > cap_db) for db in row[:-2]),
+            slope=float(np.exp(row[-2])),
+            criterion=float(row[-1]),
         )
-        for subject, row in zip(fit.answers.subjects, fit.latent, strict=True)
+        for subject, row in zip(subjects, latent, strict=True)
     )

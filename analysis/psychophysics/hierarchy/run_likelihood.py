@@ -1,7 +1,8 @@
-"""Maximum-likelihood threshold of each single run, with a profile interval.
+"""Maximum-likelihood threshold of each single run, with a likelihood interval.
 
 One run of some 60 trials does not tell a slope: slope, criterion and lapse rate are the person's from the model of all
-answers. The threshold is the run's alone, not drawn towards anything, and so is the interval.
+answers, or are averaged over a distribution of each (`Nuisance`). The threshold is the run's alone, not drawn towards
+anything, and so is the interval.
 
 A run with only right answers has no most probable threshold: the lower, the more probable. It gets no size and only an
 upper bound, as a run whose most probable threshold is above the cap gets only a lower one.
@@ -14,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import logsumexp
 from scipy.stats import chi2, norm
 
 from analysis.psychophysics.hierarchy.answers import Answers
@@ -22,8 +24,23 @@ from equalizer.signals.signal import FloatArray
 
 GRID_DB, BEYOND_DB = 0.1, 30.0
 """Step of the threshold grid, and how far it reaches below the levels played and above them and the cap."""
+NODES = 7
+"""Of an average over slopes, or over criteria."""
 SAME_HEIGHT = 1e-9
 """Log-likelihoods closer than this differ by rounding alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Nuisance:
+    """What a run itself does not tell."""
+
+    slope: float
+    criterion: float
+    lapses: tuple[float, ...]
+    """Equally probable lapse rates."""
+    slope_log_sd: float = 0.0
+    criterion_sd: float = 0.0
+    """Of normal distributions around the first two; 0: known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,34 +65,48 @@ class RunLikelihood:
 
 def run_likelihoods(
     answers: Answers,
-    people: Sequence[tuple[float, float]],
-    lapse: float,
+    people: Sequence[Nuisance],
     cap_db: float,
     family: Family = Family.WEIBULL,
     confidence: float = 0.95,
 ) -> tuple[RunLikelihood, ...]:
-    """people: (slope, criterion) of every person, in the order of the answers."""
+    """people: in the order of the answers."""
     k = len(answers.frequencies_hz)
     found = []
     for run in np.unique(answers.run):
         person, place = divmod(int(run), k)
-        grid, height = _profile_likelihood(answers, int(run), people[person], lapse, cap_db, family)
+        grid, height = _likelihood(answers, int(run), people[person], cap_db, family)
         trials = int((answers.right + answers.wrong)[answers.run == run].sum())
         ends = _profile_interval(grid, height, cap_db, confidence)
         found.append(RunLikelihood(answers.subjects[person], answers.frequencies_hz[place], trials, *ends))
     return tuple(found)
 
 
-def _profile_likelihood(
-    answers: Answers, run: int, person: tuple[float, float], lapse: float, cap_db: float, family: Family
+def _likelihood(
+    answers: Answers, run: int, person: Nuisance, cap_db: float, family: Family
 ) -> tuple[FloatArray, FloatArray]:
-    """Thresholds (g,) in dB, and the log-likelihood at each."""
+    """Thresholds (g,) in dB, and the log-likelihood at each, averaged over what is not known."""
     cells = answers.run == run
-    level = answers.level_db[cells]
+    level, side = answers.level_db[cells], answers.side[cells]
     grid = np.arange(level.min() - BEYOND_DB, max(level.max(), cap_db) + BEYOND_DB, GRID_DB)
-    t = AT_THRESHOLD[family] + person[0] * NEPER_PER_DB * (level[None, :] - grid[:, None])
-    p = share_right(sensitivity(t, family)[0] - answers.side[cells] * person[1], lapse)
-    return grid, np.log(p) @ answers.right[cells] + np.log1p(-p) @ answers.wrong[cells]
+    heights, weights = [], []
+    for u, by_slope in _nodes(person.slope_log_sd):
+        t = AT_THRESHOLD[family] + person.slope * math.exp(u) * NEPER_PER_DB * (level[None, :] - grid[:, None])
+        q = sensitivity(t, family)[0]
+        for c, by_criterion in _nodes(person.criterion_sd):
+            for lapse in person.lapses:
+                p = share_right(q - side * (person.criterion + c), lapse)
+                heights.append(np.log(p) @ answers.right[cells] + np.log1p(-p) @ answers.wrong[cells])
+                weights.append(by_slope * by_criterion / len(person.lapses))
+    return grid, logsumexp(heights, axis=0, b=np.array(weights)[:, None])
+
+
+def _nodes(sd: float) -> list[tuple[float, float]]:
+    """Places and weights of Gauss and Hermite's rule for a normal distribution."""
+    if sd == 0.0:
+        return [(0.0, 1.0)]
+    places, weights = np.polynomial.hermite_e.hermegauss(NODES)
+    return list(zip(sd * places, weights / weights.sum(), strict=True))
 
 
 def _profile_interval(

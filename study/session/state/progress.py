@@ -34,7 +34,8 @@ def _usual_trials(state: SessionState, run: Run) -> float:
     protocol = state.protocol
     if run.practice:
         return protocol.practice.of_last
-    usual = protocol.staircase.reversals * USUAL_PER_REVERSAL
+    rule = protocol.staircase
+    usual = rule.bayesian.trials if rule.is_bayesian else rule.reversals * USUAL_PER_REVERSAL
     limit = protocol.training.trial_limit if run.phase is Phase.TRAINING else 0
     return min(usual, limit) if limit else usual
 

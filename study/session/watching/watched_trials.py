@@ -1,7 +1,6 @@
 """Trials and runs of a followed session, as shown to the experimenter. Part of `study.session.watching.watching`."""
 
 from protocols.procedure.practice import PracticeState, practice_passed, right_of_last
-from protocols.procedure.run_rules import staircase_rule
 from protocols.procedure.schedule import Run
 from protocols.procedure.staircase import level_n
 from protocols.trial import Phase, Trial, TrialStatus
@@ -45,14 +44,14 @@ def next_level_n(state: SessionState, shown: int | None) -> float | None:
 
 
 def run_line(state: SessionState, run: Run) -> WatchedRun:
-    counted = _select_counted(state, run.index)
+    counted, rule = _select_counted(state, run.index), state.protocol.staircase
     return WatchedRun(
         run=run.index,
         phase="practice" if run.practice else run.phase.value,
         frequency_hz=run.frequency_hz,
         status="present" if run.index == state.run else "done" if run.index < state.run else "to come",
         reversals=sum(trial.reversal for trial in counted),
-        reversals_needed=0 if run.practice else staircase_rule(state.protocol, run.phase).reversals,
+        reversals_needed=0 if run.practice or rule.is_bayesian else rule.reversals,
         trials=len(counted),
     )
 

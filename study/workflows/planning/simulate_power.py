@@ -63,6 +63,12 @@ def simulate_power(
 
     Raises StudyError where `out` belongs to another plan, and CannotWriteError.
     """
+    if plan.rule.is_bayesian:
+        raise WrongUseError(
+            "Whole studies are simulated with an up-down staircase",
+            "The protocol lets Psi choose the levels (staircase.bayesian).",
+            "Set staircase.bayesian.trials to 0 here; hapteq power --compare weighs Psi against the staircase.",
+        )
     if plan.rule.trial_limit:
         raise WrongUseError(
             "This staircase has a trial limit",

@@ -93,7 +93,7 @@ def analysis_names(folder: Path, subject: str) -> bool | None:
     said.append(_statistics_name(folder / "anova.json", subject))
     if any(said):
         return True
-    figure = re.compile(rf"staircases-\d+-{re.escape(subject)}\.(svg|png)")
+    figure = re.compile(rf"(staircases|psychometric)-\d+-{re.escape(subject)}\.(svg|png)")
     if any(figure.fullmatch(path.name) for path in analysis_outputs(folder)):
         return True
     return None if all(each is None for each in said) else False

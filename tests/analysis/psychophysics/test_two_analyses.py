@@ -1,10 +1,13 @@
 """The published and the primary analysis beside each other, in words, in the page and in the document."""
 
+import html
 import json
 from dataclasses import replace
 
 import pytest
 
+from analysis.psychophysics.coverage_words import coverage_sentence
+from analysis.psychophysics.measured_coverage import MEASURED
 from analysis.psychophysics.study_analysis import analyse_study, anova_document
 from analysis.psychophysics.two_analyses import SIMULATED_RULE, comparison_text, declaration_text
 from analysis.reports.study_report import render_study_report
@@ -23,7 +26,8 @@ def test_what_the_cap_hides_is_reported(analysis):
     assert by_model.difference_db > by_means.difference_db + 3.0
     assert "are apart: at " in analysis.compared
     assert "45 Hz" in analysis.compared
-    assert "their interval covers 3 %" in analysis.compared
+    for name in ("means", "tukey", "one-way"):
+        assert coverage_sentence(MEASURED, name) in analysis.compared
 
 
 def test_numbers_simulated_with_the_published_rule_are_said_of_no_other(analysis):
@@ -32,7 +36,7 @@ def test_numbers_simulated_with_the_published_rule_are_said_of_no_other(analysis
     for other in (replace(SIMULATED_RULE, cap_n=2.0), replace(SIMULATED_RULE, down_after_right=2)):
         said = comparison_text(*parts, other)
         assert "Near the cap the published intervals do not hold" in said
-        assert "covers 3 %" not in said and "0.4 %" not in said
+        assert "Measured near the cap" not in said
 
 
 def test_a_missing_lower_bound_is_reported_on_the_page_and_in_the_terminal(analysis):
@@ -45,10 +49,19 @@ def test_a_missing_lower_bound_is_reported_on_the_page_and_in_the_terminal(analy
         assert "no lower bound" not in shown(analysis)
 
 
+def test_each_interval_near_the_cap_carries_the_coverage_that_was_measured_for_it(analysis, protocol, simulate_study):
+    page = render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z")
+    for name in ("model", "means", "tobit", "tukey", "run", "one-way"):
+        assert coverage_sentence(MEASURED, name) in html.unescape(page)
+    assert [contrast.frequency_hz for contrast in analysis.tobit] == [15.0, 25.0, 35.0] and "Tobit" in page
+    low = analyse_study(simulate_study(true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
+    assert low.tobit == () and "Tobit" not in render_study_report(low, (), {}, "2026-01-02T03:04:05Z")
+
+
 def test_far_below_the_cap_the_two_agree(simulate_study, protocol):
     low = analyse_study(simulate_study(true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
     assert "agree within 1 dB" in low.compared
-    assert "covers 3 %" not in low.compared
+    assert "Measured near the cap" not in low.compared
 
 
 def test_one_participant_leaves_the_published_analysis_alone(simulate_study, protocol):

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.psychophysics.hierarchy.answers import tally
 from analysis.psychophysics.hierarchy.curve import Family
-from analysis.psychophysics.hierarchy.run_likelihood import newton_or_none, run_likelihoods
+from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, newton_or_none, run_likelihoods
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.reports.primary_tables import run_words
 from tests.analysis.conftest import PUBLISHED
@@ -16,7 +16,7 @@ SAME = {"person_sd_db": 0.0, "frequency_sd_db": 0.0, "slope_log_sd": 0.0, "crite
 
 def runs(true_n, people=300):
     study = simulate_study(Crowd((35.0,), (true_n,), **SAME), PUBLISHED, people, (8,))
-    return run_likelihoods(study.answers, [(2.0, 0.0)] * people, 0.02, CAP_DB)
+    return run_likelihoods(study.answers, [Nuisance(2.0, 0.0, (0.02,))] * people, CAP_DB)
 
 
 @pytest.mark.parametrize("true_n", [0.3, 1.0])
@@ -47,7 +47,7 @@ def one_run(levels_n, right, family=Family.WEIBULL, slope=2.0):
     levels_db, n = 20 * np.log10(np.asarray(levels_n)), len(levels_n)
     side = np.where(np.arange(n) % 2, 1.0, -1.0)
     answers = tally(("a",), (35.0,), np.zeros(n, dtype=np.intp), levels_db, side, np.asarray(right))
-    (run,) = run_likelihoods(answers, [(slope, 0.1)], 0.02, CAP_DB, family)
+    (run,) = run_likelihoods(answers, [Nuisance(slope, 0.1, (0.02,))], CAP_DB, family)
     return run
 
 

@@ -1,0 +1,110 @@
+"""Figures of psychometric functions: shares of right answers with Wilson's intervals, and the curves of the model."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from analysis.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    name_panel_axes,
+    new_figure,
+    newton_ticks,
+    panel_grid,
+    plain_axes,
+    say_nothing_to_draw,
+)
+from analysis.psychophysics.hierarchy.answers import Answers
+from analysis.psychophysics.hierarchy.curve import TARGET
+from analysis.psychophysics.hierarchy.observed_shares import (
+    FittedCurves,
+    ObservedShare,
+    people_curve,
+    person_curve,
+    shares_of_people,
+    shares_of_person,
+)
+from protocols.procedure.staircase import to_db
+
+_LINE_IN = 2.2
+_SMALLEST, _LARGEST = 2.5, 7.5
+"""Marker sizes in points: of a single trial, and of `_MANY` or more."""
+_MANY = 100
+
+
+def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:
+    """All people together, one panel per frequency, over the level re each person's threshold."""
+    k = len(fit.frequencies_hz)
+    figure, places = panel_grid(k, _LINE_IN, sharex=True)
+    shown = [shares_of_people(answers, fit, place) for place in range(k)]
+    levels = [share.level_db for shares in shown for share in shares]
+    above_db = np.linspace(min(levels) - 1.0, max(levels) + 1.0, 200)
+    for place, (axes, shares) in enumerate(zip(places, shown, strict=False)):
+        _draw_shares(axes, [share.level_db for share in shares], shares)
+        axes.plot(above_db, 100 * people_curve(above_db, answers, fit, place), color=BLACK, linewidth=1.4, zorder=2)
+        axes.axvline(0.0, color=GREY, linestyle=":", linewidth=1.0)
+        axes.set_title(f"{fit.frequencies_hz[place]:g} Hz", fontsize=10, loc="left")
+    name_panel_axes(places, k, "Level re threshold (dB)", "Right (%)")
+    places[-1].legend(
+        handles=_legend("curve of the model,\nmean of the people"), loc="center", fontsize=8.5, frameon=False
+    )
+    return figure
+
+
+def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: float) -> Figure:
+    """One person, one panel per frequency that was played, over the level in newtons. person: number in the answers."""
+    estimate, k = fit.persons[person], len(fit.frequencies_hz)
+    played = [(place, shares) for place in range(k) if (shares := shares_of_person(answers, person, place))]
+    if not played:
+        return say_nothing_to_draw(new_figure(4.0, 2.0), "There is no answer to draw.")
+    figure, places = panel_grid(len(played), _LINE_IN)
+    for axes, (place, shares) in zip(places, played, strict=False):
+        levels = [10.0 ** (share.level_db / 20.0) for share in shares]
+        low_n, high_n = 0.8 * min(levels), 1.15 * max(*levels, cap_n)
+        level_n = np.geomspace(low_n, high_n, 200)
+        above_db = 20.0 * np.log10(level_n) - to_db(estimate.thresholds_n[place])
+        _draw_shares(axes, levels, shares)
+        axes.plot(level_n, 100 * person_curve(above_db, estimate, fit), color=BLACK, linewidth=1.4, zorder=2)
+        axes.axvline(cap_n, color=GREY, linestyle="--", linewidth=1.0)
+        if not estimate.above_cap[place]:
+            axes.axvline(estimate.thresholds_n[place], color=GREY, linestyle=":", linewidth=1.0)
+        axes.set_xscale("log")
+        newton_ticks(axes.xaxis, low_n, high_n)
+        axes.set_xlim(low_n, high_n)
+        size = "above the cap" if estimate.above_cap[place] else f"{estimate.thresholds_n[place]:.2f} N"
+        axes.set_title(f"{fit.frequencies_hz[place]:g} Hz: {size}", fontsize=10, loc="left")
+    name_panel_axes(places, len(played), "Level (N)", "Right (%)")
+    cap = Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {cap_n:g} N")
+    places[-1].legend(handles=[*_legend("curve of the model"), cap], loc="center", fontsize=8.5, frameon=False)
+    return figure
+
+
+def _draw_shares(axes: Axes, x: Sequence[float], shares: Sequence[ObservedShare]) -> None:
+    plain_axes(axes)
+    axes.axhline(100 * TARGET, color=GREY, linestyle=":", linewidth=1.0)
+    for at, share in zip(x, shares, strict=True):
+        axes.plot([at, at], [100 * share.lower, 100 * share.upper], color=BLUE, linewidth=0.8, zorder=1)
+        axes.plot(at, 100 * share.share, "o", color=BLUE, markersize=_marker_size(share.trials), zorder=3,
+                  markeredgecolor="white", markeredgewidth=0.4)  # fmt: skip
+    axes.set_ylim(0, 104)
+    axes.set_yticks([0, 25, 50, 75, 100])
+
+
+def _marker_size(trials: int) -> float:
+    return _SMALLEST + (_LARGEST - _SMALLEST) * math.sqrt(min(1.0, trials / _MANY))
+
+
+def _legend(curve: str) -> list[Line2D]:
+    return [
+        *(
+            Line2D([], [], marker="o", color=BLUE, linewidth=0.8, markersize=_marker_size(trials), label=label)
+            for trials, label in ((5, "5 trials, 95 % interval"), (_MANY, f"{_MANY} trials or more"))
+        ),
+        Line2D([], [], color=BLACK, linewidth=1.4, label=curve),
+        Line2D([], [], color=GREY, linestyle=":", linewidth=1.0, label=f"threshold, {100 * TARGET:.1f} % right"),
+    ]

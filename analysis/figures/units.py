@@ -1,0 +1,84 @@
+"""Thresholds in every unit that was measured, side by side: commanded force, acceleration, displacement, and above
+detection."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from analysis.figures.style import (
+    BLACK,
+    CUT_MARKER,
+    GREY,
+    PAGE_IN,
+    new_figure,
+    participant_colour,
+    participant_marker,
+    plain_axes,
+    ratio_ticks,
+)
+from analysis.figures.thresholds import draw_threshold
+from analysis.psychophysics.threshold_table import Quantity, ThresholdTable
+
+_LABELS: dict[Quantity, str] = {
+    "threshold_n": "Commanded (N)",
+    "threshold_mps2": "Delivered (m/s²)",
+    "threshold_mm": "Displacement (mm)",
+    "above_detection_db": "Above detection (dB)",
+}
+_SPREAD = 0.4
+"""Width taken by the participants of one frequency, in steps between frequencies."""
+
+
+def draw_units(tables: Sequence[ThresholdTable]) -> Figure:
+    """One panel per table with any value, at least one. Tables: the same participants and frequencies."""
+    columns = 2 if len(tables) > 1 else 1
+    lines = -(-len(tables) // columns)
+    figure = new_figure(PAGE_IN, 2.5 * lines + 0.4)
+    places = [axes for line in figure.subplots(lines, columns, squeeze=False) for axes in line]
+    for axes, table in zip(places, tables, strict=False):
+        _draw_table(axes, table)
+    for axes in places[len(tables) :]:
+        axes.axis("off")
+    figure.legend(handles=_legend(tables), loc="outside upper center", ncols=3, fontsize=8.5, frameon=False)
+    return figure
+
+
+def _draw_table(axes: Axes, table: ThresholdTable) -> None:
+    plain_axes(axes)
+    values = np.array([[np.nan if value is None else value for value in row] for row in table.values])
+    offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(values)) if len(values) > 1 else np.zeros(1)
+    for person, row in enumerate(values):
+        at = np.arange(len(row)) + offsets[person]
+        axes.plot(at, row, "-", color=participant_colour(person), linewidth=0.7, alpha=0.5, zorder=1)
+        for x, value, cut in zip(at, row, table.censored[person], strict=True):
+            if np.isfinite(value):
+                draw_threshold(axes, float(x), float(value), person, cut)
+    for place, column in enumerate(values.T):
+        if np.isfinite(column).any():
+            median = float(np.nanmedian(column))
+            axes.plot([place - 0.32, place + 0.32], [median, median], color=BLACK, linewidth=2.2, zorder=4)
+    axes.set_xticks(range(len(table.frequencies_hz)), [f"{f:g}" for f in table.frequencies_hz])
+    axes.set_xlabel("Frequency (Hz)", fontsize=9)
+    axes.set_ylabel(_LABELS[table.quantity], fontsize=9)
+    if table.quantity == "above_detection_db":
+        axes.axhline(0.0, color=GREY, linewidth=0.9)
+        axes.margins(y=0.12)
+        return
+    axes.set_yscale("log")
+    low, high = 0.8 * float(np.nanmin(values)), 1.35 * float(np.nanmax(values))
+    axes.set_ylim(low, high)
+    ratio_ticks(axes.yaxis, low, high)
+
+
+def _legend(tables: Sequence[ThresholdTable]) -> list[Line2D]:
+    handles = [
+        Line2D([], [], color=GREY, marker=participant_marker(0), linewidth=0.7, label="a participant"),
+        Line2D([], [], color=BLACK, linewidth=2.2, label="median of what is shown"),
+    ]
+    if any(table.cut for table in tables):
+        cut = Line2D([], [], color=GREY, marker=CUT_MARKER, linewidth=0, markersize=9, label="cut by the cap (hollow)")
+        handles.append(cut)
+    return handles

@@ -1,0 +1,70 @@
+"""What was measured of each interval near the cap, as sentences beside the interval and as a table."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from analysis.psychophysics.catch_trials import wilson_interval
+from analysis.wording import conjoin, number, signed_number
+
+CASES_HZ = {25.0: "0.85 N", 35.0: "3 N, the cap", 45.0: "4 N, above the cap"}
+"""Frequencies of the simulated studies that are reported, and the median threshold there; at 5 Hz it is 0.35 N."""
+NAMES = {
+    "model": "difference to 5 Hz by the model of all answers, dB",
+    "means": "difference to 5 Hz by reversal means, paired, dB",
+    "tobit": "difference to 5 Hz by reversal means, Tobit, dB",
+    "tukey": "difference to 5 Hz by reversal means, as published (Tukey), N",
+    "run": "single threshold by likelihood, with the model's slopes",
+    "single": "single threshold by likelihood, one participant alone",
+    "one-way": "type-1 error of the one-way analysis at equal medians of 2.2 N:",
+}
+ONLY_BELOW = ("run", "single")
+"""Have a size only where it is below the cap: near it, their mean error says how such sizes are chosen."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredCoverage:
+    """Simulated: ten people (single: one), published staircase, cap of 3 N."""
+
+    analysis: str
+    frequency_hz: float
+    """0 where all frequencies are judged together."""
+    bias_db: float | None
+    """Mean error of what has a size."""
+    covered: int
+    """Intervals of 95 % that held the truth; of a type-1 error, studies that found a difference."""
+    intervals: int
+
+    @property
+    def percent(self) -> str:
+        lower, upper = wilson_interval(self.covered, self.intervals)
+        share = 100 * self.covered / self.intervals
+        return f"{number(share, 1)} % ({number(100 * lower, 1)} to {number(100 * upper, 1)})"
+
+
+def coverage_lines(rows: Sequence[MeasuredCoverage]) -> list[str]:
+    """A table in Markdown."""
+    lines = ["| interval | median threshold | bias (dB), of what has a size | holds the truth |", "|---|---|---|---|"]
+    for name, said in NAMES.items():
+        for row in rows:
+            if row.analysis == name:
+                bias = "" if row.bias_db is None else signed_number(row.bias_db)
+                lines.append(f"| {said} | {CASES_HZ.get(row.frequency_hz, '')} | {bias} | {row.percent} |")
+    return lines
+
+
+def coverage_sentence(rows: Sequence[MeasuredCoverage], analysis: str) -> str:
+    """Coverage and bias of one analysis, at each median threshold. Empty where nothing was measured."""
+    said = []
+    for row in rows:
+        if row.analysis == analysis and row.frequency_hz:
+            known = row.bias_db is not None and analysis not in ONLY_BELOW
+            bias = f" (off by {signed_number(row.bias_db or 0.0, 1)} dB)" if known else ""
+            said.append(f"{number(100 * row.covered / row.intervals, 0)} % at {CASES_HZ[row.frequency_hz]}{bias}")
+        elif row.analysis == analysis:
+            return f"{_SIMULATED}, {NAMES[analysis]} {row.percent}, where it says 5 %."
+    if not said:
+        return ""
+    return f"{_SIMULATED}, the 95 % intervals of the {NAMES[analysis]}, held the truth: {conjoin(said)}."
+
+
+_SIMULATED = "Measured near the cap, simulated with the published staircase"

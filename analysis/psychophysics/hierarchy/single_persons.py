@@ -1,0 +1,62 @@
+"""Thresholds of persons who cannot be compared with others: one participant alone, or people at a single frequency.
+
+Nothing is drawn towards anybody else's numbers. What a run of some 60 trials does not tell comes from fixed priors in
+place of a population's: the slope is that of usual people within a factor of 1.5, the liking for one answer within 0.3
+d', the lapse rate as in `fit.Prior`. Then each run has the profile interval of `run_likelihood`.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.special import expit
+from scipy.stats import beta
+
+from analysis.psychophysics.hierarchy.answers import Answers
+from analysis.psychophysics.hierarchy.curve import USUAL_SLOPE, Family
+from analysis.psychophysics.hierarchy.fit import LAPSE_BOUNDS, Objective, Prior
+from analysis.psychophysics.hierarchy.primary import CONFIDENCE, PersonEstimate, at_played_frequencies, estimate_persons
+from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, run_likelihoods
+from protocols.procedure.staircase import to_db
+
+SLOPE_LOG_SD, CRITERION_SD = 0.4, 0.3
+"""Of the priors: twice what the simulated people of `hapteq power` differ by."""
+LAPSE_QUANTILES = (1 / 6, 1 / 2, 5 / 6)
+FREE_DB = 30.0
+"""SD of the prior of each threshold around the levels played: it holds those that the answers do not."""
+
+
+@dataclass(frozen=True, slots=True)
+class SinglePersons:
+    family: Family
+    frequencies_hz: tuple[float, ...]
+    """Those with answers, in ascending order."""
+    confidence: float
+    persons: tuple[PersonEstimate, ...]
+    lapse: float
+    runs: tuple[RunLikelihood, ...]
+
+
+def fit_single_persons(
+    answers: Answers, cap_n: float, family: Family = Family.WEIBULL, confidence: float = CONFIDENCE
+) -> SinglePersons:
+    """Most probable thresholds, slopes and criteria, at the most probable lapse rate."""
+    answers, cap_db = at_played_frequencies(answers), to_db(cap_n)
+    objective = Objective(answers, family, prior := Prior())
+    numbers, layout = objective.begin.copy(), objective.layout
+    numbers[: layout.k] = np.average(answers.level_db, weights=answers.right + answers.wrong)
+    numbers[layout.log_sds] = [0.0, math.log(FREE_DB), math.log(SLOPE_LOG_SD), math.log(CRITERION_SD)]
+
+    def cost(logit_lapse: float) -> float:
+        numbers[layout.lapse] = logit_lapse
+        return objective(numbers)[0]
+
+    numbers[layout.lapse] = minimize_scalar(cost, bounds=LAPSE_BOUNDS, method="bounded", options={"xatol": 1e-3}).x
+    objective(numbers)
+    lapse = float(expit(numbers[layout.lapse]))
+    persons = estimate_persons(answers.subjects, objective.marginal.latent, cap_db)
+    lapses = tuple(float(lapse) for lapse in beta.ppf(LAPSE_QUANTILES, prior.lapse_wrong, prior.lapse_right))
+    unknown = Nuisance(USUAL_SLOPE[family], 0.0, lapses, SLOPE_LOG_SD, CRITERION_SD)
+    runs = run_likelihoods(answers, [unknown] * answers.persons, cap_db, family, confidence)
+    return SinglePersons(family, answers.frequencies_hz, confidence, persons, lapse, runs)

@@ -1,0 +1,118 @@
+"""Rules that choose levels, compared by their error per trial, on the same simulated people with the same draws.
+
+Each person takes one run under every rule. The draws of a person belong to the person: trial 7 has the same random
+number under every rule, so that rules are compared pairwise.
+
+Source of the measure: M. M. Taylor, C. D. Creelman, J. Acoust. Soc. Am. 41 (1967), 782-787: variance times trials,
+their "sweat factor"; here its root, the error that a single trial's worth of such answers would leave.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+
+import numpy as np
+
+from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, USUAL_SLOPE, sensitivity
+from analysis.psychophysics.power.simulated_study import Crowd
+from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS
+from equalizer.signals.signal import FloatArray
+from protocols.definition.staircase_rule import BayesianPlacement, StaircaseRule, StepChange
+from protocols.procedure.psi import estimate, posterior
+from protocols.procedure.staircase import StaircaseState, begin, is_complete, is_finished, level_n, step, to_db
+
+_KEY = 0x9517
+"""Separates these draws from those of whole studies."""
+
+
+@dataclass(frozen=True, slots=True)
+class RuleResult:
+    rule: str
+    runs: int
+    """With a threshold."""
+    trials: float
+    """Mean of a run."""
+    bias_db: float
+    sd_db: float
+    """Of the errors of a run."""
+    error_db: float
+    """Root of the mean square error of a run."""
+    error_per_trial_db: float
+    """Times the root of the mean number of trials."""
+    highest_n: float
+    """Of all levels."""
+
+
+def compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
+    """The protocol's up-down rule with each reading of its steps, and Psi with as many trials as such a run takes."""
+    names = {
+        StepChange.AFTER_REVERSAL: "staircase, new step after the reversal",
+        StepChange.AT_REVERSAL: "staircase, new step at the reversal",
+        StepChange.AT_NEXT_REVERSAL: "staircase, one reversal later",
+    }
+    up_down = replace(rule, bayesian=BayesianPlacement())
+    found = {name: replace(up_down, step_change=change) for change, name in names.items()}
+    for trials in (30, 60):
+        found[f"Psi, {trials} trials"] = replace(rule, bayesian=BayesianPlacement(trials))
+    return found
+
+
+def compare_rules(crowd: Crowd, rules: Mapping[str, StaircaseRule], people: int, seed: int) -> tuple[RuleResult, ...]:
+    """One run of each of so many people, drawn from the crowd's first frequency, under every rule."""
+    return tuple(_result(name, rule, crowd, people, seed) for name, rule in rules.items())
+
+
+def _result(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed: int) -> RuleResult:
+    errors, trials, highest = [], [], 0.0
+    for number in range(people):
+        true_db, state, top_n = play(crowd, rule, (seed, _KEY, number))
+        trials.append(state.trials)
+        highest = max(highest, top_n)
+        if is_complete(rule, state):
+            errors.append(estimated_db(rule, state) - true_db)
+    found = np.array(errors) if errors else np.array([math.nan])
+    error = float(np.sqrt((found**2).mean()))
+    return RuleResult(
+        rule=name,
+        runs=len(errors),
+        trials=float(np.mean(trials)),
+        bias_db=float(found.mean()),
+        sd_db=float(found.std()),
+        error_db=error,
+        error_per_trial_db=error * math.sqrt(float(np.mean(trials))),
+        highest_n=highest,
+    )
+
+
+def play(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> tuple[float, StaircaseState, float]:
+    """True threshold (dB), the run's last state, and the highest level played (N)."""
+    random = np.random.default_rng(key)
+    spread = crowd.frequency_sd_db if isinstance(crowd.frequency_sd_db, float) else crowd.frequency_sd_db[0]
+    true_db = to_db(crowd.medians_n[0]) + math.hypot(crowd.person_sd_db, spread) * random.standard_normal()
+    slope = (crowd.slope or USUAL_SLOPE[crowd.family]) * math.exp(crowd.slope_log_sd * random.standard_normal())
+    criterion = crowd.criterion_sd * random.standard_normal()
+    draws = random.random((MOST_TRIALS, 2))
+    state, highest = begin(rule), 0.0
+    while not is_finished(rule, state) and state.trials < MOST_TRIALS:
+        played_n = level_n(rule, state)
+        highest = max(highest, played_n)
+        above_db = to_db(played_n) - true_db
+        state = step(rule, state, _is_right(crowd, slope * above_db, criterion, draws[state.trials]))
+    return float(true_db), state, highest
+
+
+def _is_right(crowd: Crowd, steps: float, criterion: float, draw: FloatArray) -> bool:
+    """steps: slope times dB above the threshold."""
+    q = float(sensitivity(np.array([AT_THRESHOLD[crowd.family] + NEPER_PER_DB * steps]), crowd.family)[0][0])
+    side = 1.0 if draw[0] < 0.5 else -1.0
+    right = crowd.lapse + (1.0 - 2.0 * crowd.lapse) * NormalDist().cdf(q - side * criterion)
+    return bool(draw[1] < right)
+
+
+def estimated_db(rule: StaircaseRule, state: StaircaseState) -> float:
+    """Of a complete run: as the analysis of a session has it."""
+    if rule.is_bayesian:
+        cap_db = to_db(rule.cap_n)
+        return min(estimate(posterior(state.answered, cap_db), cap_db).mean_db, cap_db)
+    return float(np.mean(state.reversal_levels_db[-rule.averaged_reversals :]))

@@ -1,0 +1,101 @@
+"""Psi: the level that is expected to tell most of threshold and slope, from all answers of the run so far.
+
+A grid holds the probability of every threshold and slope. Before each trial, the entropy that would be left is
+computed for every level, averaged over a right and a wrong answer; the level with the least is played. The next level
+is a fixed function of the answers before it, so a log folds to the same levels, and the likelihood of the answers needs
+no correction. Levels end at the cap; thresholds of the grid go beyond it, so that the answers can say so.
+
+Source: L. L. Kontsevich, C. W. Tyler, Vision Res. 39 (1999), 2729-2737.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+LEVEL_STEP_DB, LOWEST_DB = 1.0, -34.0
+"""Levels: from the cap down to this below it."""
+BEYOND_DB = 12.0
+"""Thresholds of the grid end this far above the cap and below the lowest level."""
+SLOPES = tuple(float(slope) for slope in np.geomspace(0.8, 5.0, 7))
+"""Of a Weibull curve over newtons; equally probable. Usual people have 2."""
+LAPSE = 0.02
+"""Share of inattentive answers, half of them wrong, as in the other analyses: without it a single lapse at a high level
+could never be undone."""
+TARGET = 0.5 ** (1 / 3)
+"""Share of right answers at the threshold, that of the published staircase."""
+SAME_BITS = 1e-9
+"""Entropies closer than this are equal, and the lower level is played: rounding must not choose."""
+
+Answered = tuple[float, bool]
+"""Level in dB re 1 N, and whether the answer was right."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Of the threshold, in dB re 1 N."""
+
+    mean_db: float
+    sd_db: float
+    above_cap: float
+    """Probability that it lies above the cap."""
+
+
+@cache
+def levels_db(cap_db: float) -> FloatArray:
+    """Ascending; the last is the cap itself."""
+    below = np.arange(round(-LOWEST_DB / LEVEL_STEP_DB), -1, -1, dtype=np.float64)
+    return cap_db - LEVEL_STEP_DB * below
+
+
+@cache
+def thresholds_db(cap_db: float) -> FloatArray:
+    levels = levels_db(cap_db)
+    return np.arange(float(levels[0]) - BEYOND_DB, cap_db + BEYOND_DB + LEVEL_STEP_DB / 2, LEVEL_STEP_DB)
+
+
+def share_right(level_db: FloatArray, cap_db: float) -> FloatArray:
+    """P(right) of every threshold and slope (..., thresholds, slopes) at levels of any shape (...)."""
+    t0 = math.log(-math.log(2.0 - 2.0 * TARGET))
+    above = np.asarray(level_db)[..., None, None] - thresholds_db(cap_db)[:, None]
+    rest = 0.5 * np.exp(-np.exp(t0 + np.array(SLOPES) * (math.log(10.0) / 20.0) * above))
+    return LAPSE / 2 + (1.0 - LAPSE) * (1.0 - rest)
+
+
+def posterior(answered: tuple[Answered, ...], cap_db: float) -> FloatArray:
+    """Probability of every threshold and slope (thresholds, slopes), after a flat prior."""
+    log_p = np.zeros((len(thresholds_db(cap_db)), len(SLOPES)))
+    for level_db, right in answered:
+        p = share_right(np.array(level_db), cap_db)
+        log_p += np.log(p if right else 1.0 - p)
+    weight = np.exp(log_p - log_p.max())
+    share: FloatArray = weight / weight.sum()
+    return share
+
+
+def next_level_db(probability: FloatArray, cap_db: float) -> float:
+    """Never above the cap, whose level is the last of those that are weighed."""
+    levels, right = levels_db(cap_db), _table(cap_db)
+    left = np.zeros(len(levels))
+    for table in (right, 1.0 - right):
+        joint = table * probability
+        chance = joint.sum(axis=(1, 2))
+        # Entropy of the posterior times its chance: -sum of joint log(joint / chance).
+        left -= (joint * np.log(np.maximum(joint, 1e-300))).sum(axis=(1, 2)) - chance * np.log(chance)
+    return float(levels[int(np.flatnonzero(left <= left.min() + SAME_BITS)[0])])
+
+
+def estimate(probability: FloatArray, cap_db: float) -> Estimate:
+    thresholds, by_threshold = thresholds_db(cap_db), probability.sum(axis=1)
+    mean = float((by_threshold * thresholds).sum())
+    variance = float((by_threshold * (thresholds - mean) ** 2).sum())
+    return Estimate(mean, math.sqrt(variance), float(by_threshold[thresholds > cap_db].sum()))
+
+
+@cache
+def _table(cap_db: float) -> FloatArray:
+    return share_right(levels_db(cap_db), cap_db)
