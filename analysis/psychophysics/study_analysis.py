@@ -157,15 +157,8 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
     comparisons, (primary, single) = compare_all(anova, CONFIDENCE), _models(tested, protocol)
     (means, tobit), cues, gaps = _mean_contrasts(rows, primary, protocol), cue_findings(tested), cue_gaps(tested)
     return StudyAnalysis(
-        protocol=protocol,
-        population=population,
-        trials=tested,
-        runs=runs,
-        thresholds=rows,
-        table=table,
-        anova=anova,
-        comparisons=comparisons,
-        within=within,
+        protocol=protocol, population=population, trials=tested, runs=runs, thresholds=rows, table=table,
+        anova=anova, comparisons=comparisons, within=within,
         ranks=friedman(table.values),
         difference=design_difference(anova, within),
         primary=primary,
@@ -180,13 +173,9 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
             *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested)), *cue_warnings(cues, gaps)]),
             *side_warnings(catches, detection, table, detection_table),
         ),
-        detection=detection,
-        detection_table=detection_table,
-        catches=catches,
-        practice=practice_runs(trials, protocol),
-        cues=cues,
-        cue_gaps=gaps,
-    )
+        detection=detection, detection_table=detection_table, catches=catches,
+        practice=practice_runs(trials, protocol), cues=cues, cue_gaps=gaps,
+    )  # fmt: skip
 
 
 def _single_population(trials: Sequence[Trial]) -> Population | None:

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from analysis.psychophysics.comparisons import Comparisons
-from analysis.psychophysics.coverage_words import coverage_sentence
+from analysis.psychophysics.coverage.coverage_words import coverage_sentence
+from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from analysis.psychophysics.group_contrasts import Contrast
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
-from analysis.psychophysics.measured_coverage import MEASURED
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
 from analysis.wording import conjoin, p_text, signed_number
 from protocols.definition.declared_analysis import AnalysisSettings

@@ -1,4 +1,6 @@
-"""Sentences that the session itself makes, and logs in English whatever is shown. What stands in braces is filled in.
+"""Sentences that the session itself makes, and logs in English, in any language that is shown.
+
+What stands in braces is filled in.
 
 A participant reads them in the language of the protocol; sentences for the experimenter alone are not among them.
 """

@@ -20,18 +20,18 @@ import numpy as np
 
 from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.comparisons import compare_all
-from analysis.psychophysics.coverage_words import CASES_HZ, MeasuredCoverage, coverage_lines
+from analysis.psychophysics.coverage.coverage_words import CASES_HZ, MeasuredCoverage, coverage_lines
+from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from analysis.psychophysics.group_contrasts import contrasts
 from analysis.psychophysics.hierarchy.primary import primary_analysis
 from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood
 from analysis.psychophysics.hierarchy.single_persons import fit_single_persons
-from analysis.psychophysics.measured_coverage import MEASURED
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.psychophysics.tobit import tobit_contrasts
 from analysis.psychophysics.two_analyses import SIMULATED_RULE
 
 ROOT = Path(__file__).parents[2]
-MODULE, PAGE = ROOT / "analysis/psychophysics/measured_coverage.py", ROOT / "docs/statistics.md"
+MODULE, PAGE = ROOT / "analysis/psychophysics/coverage/measured_coverage.py", ROOT / "docs/statistics.md"
 BEGIN, END = "<!-- coverage: make coverage -->", "<!-- end of coverage -->"
 HZ, MEDIANS_N, NULL_N, PEOPLE, CAP_N = (5.0, 15.0, 25.0, 35.0, 45.0), (0.35, 0.6, 0.85, 3.0, 4.0), 2.2, 10, 3.0
 CROWD, NULL = Crowd(HZ, MEDIANS_N), Crowd(HZ, (NULL_N,) * 5)
@@ -105,7 +105,7 @@ def module_text(rows: list[MeasuredCoverage]) -> str:
     )
     return (
         '"""Counted by `make coverage` (tests/references/coverage_of_analyses.py), not written by hand."""\n\n'
-        "from analysis.psychophysics.coverage_words import MeasuredCoverage\n\n"
+        "from analysis.psychophysics.coverage.coverage_words import MeasuredCoverage\n\n"
         f"MEASURED = (\n{lines}\n)\n"
     )
 

@@ -1,7 +1,7 @@
 """The counts that reports print are those of the page, and say what the simulation says."""
 
-from analysis.psychophysics.coverage_words import CASES_HZ, NAMES, coverage_lines, coverage_sentence
-from analysis.psychophysics.measured_coverage import MEASURED
+from analysis.psychophysics.coverage.coverage_words import CASES_HZ, NAMES, coverage_lines, coverage_sentence
+from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from tests.references.coverage_of_analyses import BEGIN, END, PAGE, judge, measure, module_text
 
 

@@ -76,8 +76,8 @@ def primary_analysis(
     confidence: float = CONFIDENCE,
     declared_hz: Sequence[float] = (),
 ) -> PrimaryAnalysis | None:
-    """None below two persons or two frequencies with answers: there is nothing to compare. declared_hz: the two
-    frequencies of the declared contrast, first minus second, or none."""
+    """None below two persons or two frequencies with answers. declared_hz: the declared contrast's, first minus second,
+    or none."""
     if answers is None or answers.persons < 2:
         return None
     asked_hz, answers = answers.frequencies_hz, at_played_frequencies(answers)
@@ -85,8 +85,9 @@ def primary_analysis(
         return None
     fit = fit_hierarchy(answers, family)
     pseudo, cap_db, frequencies = pseudo_thresholds(fit), to_db(cap_n), answers.frequencies_hz
-    numbers, k = fit.numbers, fit.layout.k
-    sds = np.exp(numbers[fit.layout.log_sds])
+    numbers, k, sds = fit.numbers, fit.layout.k, np.exp(fit.numbers[fit.layout.log_sds])
+    persons = estimate_persons(answers.subjects, fit.latent, cap_db)
+    nuisances = [Nuisance(person.slope, person.criterion, (fit.lapse,)) for person in persons]
     return PrimaryAnalysis(
         family=family,
         trials=answers.trials,
@@ -96,16 +97,9 @@ def primary_analysis(
         overall=repeated_measures(answers.subjects, pseudo.tolist()),
         contrasts=contrasts(frequencies, pseudo, confidence),
         limit=direction_limit(frequencies, pseudo, cap_db, confidence),
-        persons=(persons := estimate_persons(answers.subjects, fit.latent, cap_db)),
-        runs=run_likelihoods(
-            answers,
-            [Nuisance(person.slope, person.criterion, (fit.lapse,)) for person in persons],
-            cap_db,
-            family,
-            confidence,
-        ),
-        person_sd_db=float(sds[0]),
-        frequency_sd_db=float(sds[1]),
+        persons=persons,
+        runs=run_likelihoods(answers, nuisances, cap_db, family, confidence),
+        person_sd_db=float(sds[0]), frequency_sd_db=float(sds[1]),
         slope=float(np.exp(numbers[k + 2])),
         slope_log_sd=float(sds[2]),
         criterion_sd=float(sds[3]),
@@ -114,7 +108,7 @@ def primary_analysis(
         converged=fit.converged,
         missing_hz=tuple(frequency_hz for frequency_hz in asked_hz if frequency_hz not in frequencies),
         declared_contrast=pair_contrast(frequencies, pseudo, declared_hz, confidence),
-    )
+    )  # fmt: skip
 
 
 def at_played_frequencies(answers: Answers) -> Answers:

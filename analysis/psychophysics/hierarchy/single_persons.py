@@ -1,6 +1,6 @@
 """Thresholds of persons who cannot be compared with others: one participant alone, or people at a single frequency.
 
-Nothing is drawn towards anybody else's numbers. What a run of some 60 trials does not tell comes from fixed priors in
+No estimate is drawn towards another person's. What a run of some 60 trials does not tell comes from fixed priors in
 place of a population's: the slope is that of usual people within a factor of 1.5, the liking for one answer within 0.3
 d', the lapse rate as in `fit.Prior`. Then each run has the profile interval of `run_likelihood`.
 """

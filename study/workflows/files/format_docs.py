@@ -38,8 +38,7 @@ from study.workflows.files.importing_docs import importing_markdown
 
 
 def event_schema() -> dict[str, Any]:
-    """Each event may carry the checksum that the log adds."""
-    schema = EVENTS.json_schema()
+    schema = EVENTS.json_schema()  # each event may carry the checksum that the log adds
     for event in schema["$defs"].values():
         if "event" in event.get("properties", {}):
             event["properties"]["chain"] = {"type": "string", "pattern": f"^[0-9a-f]{{{log_chain.DIGITS}}}$"}

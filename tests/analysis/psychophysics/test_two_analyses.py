@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.psychophysics.coverage_words import coverage_sentence
-from analysis.psychophysics.measured_coverage import MEASURED
+from analysis.psychophysics.coverage.coverage_words import coverage_sentence
+from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from analysis.psychophysics.study_analysis import analyse_study, anova_document
 from analysis.psychophysics.two_analyses import SIMULATED_RULE, comparison_text, declaration_text
 from analysis.reports.study_report import render_study_report

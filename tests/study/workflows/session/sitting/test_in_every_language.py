@@ -34,7 +34,7 @@ CHOSEN = {"tired": 5, "hearing": 4, "hand_hidden": 1, "handedness": 1, "grip_cha
 
 
 class Scripted(Person):
-    """Chooses by place, as a hand on the number keys does, whatever the words are."""
+    """Chooses by place, as a hand on the number keys does, in any language."""
 
     def fill_in(self, form):
         self.calls.append(form.kind)

@@ -1,6 +1,6 @@
 """Counted by `make coverage` (tests/references/coverage_of_analyses.py), not written by hand."""
 
-from analysis.psychophysics.coverage_words import MeasuredCoverage
+from analysis.psychophysics.coverage.coverage_words import MeasuredCoverage
 
 MEASURED = (
     MeasuredCoverage("means", 25.0, -0.75, 4, 4),
