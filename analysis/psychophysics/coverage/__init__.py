@@ -1,1 +1,1 @@
-"""Coverage of a report's intervals near the cap: counted by simulation (`measured_coverage`), said (`coverage_words`)."""
+"""Coverage of intervals near the cap: counted by simulation (`measured_coverage`), then in words (`coverage_words`)."""
