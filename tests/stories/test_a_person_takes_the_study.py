@@ -66,7 +66,7 @@ def test_from_the_code_to_the_report_with_a_kill_in_the_middle(study, small_file
     again = study("P07_001", command="resume")
     again.wait_for("The device is ready.*Enter goes on")
     again.type("\n")
-    assert "3 answers are on disk" in again.wait_for("Press Enter to begin")
+    assert "3 answers are on the disk" in again.wait_for("Press Enter to begin")
     again.type("\n")
     answer_until_finished(again)
     assert again.end() == 0
@@ -119,6 +119,6 @@ def test_a_closed_terminal_loses_nothing(study, small_file, tmp_path):
     again = study("P07_001", command="resume")
     again.wait_for("The device is ready.*Enter goes on")
     again.type("\n")
-    assert "1 answer is on disk" in again.wait_for("Press Enter to begin")
+    assert "1 answer is on the disk" in again.wait_for("Press Enter to begin")
     again.type("q\n")
     assert again.end() == 130

@@ -56,6 +56,10 @@ def decided_command(recording: Recording) -> Signal:
     return excitation if len(known) and np.ptp(known, axis=0).max() > 0 else recording.command
 
 
+HUGE = 1e100
+"""Values that no signal has, but a damaged file may."""
+
+
 def exact_period(command: FloatArray) -> int:
     """Period in samples after which the command (n, m) repeats exactly; 0 where it does not, or not often enough. An
     odd multiple of the shortest period where that is too short to be of use."""
@@ -73,6 +77,9 @@ def exact_period(command: FloatArray) -> int:
 def find_period(command: FloatArray) -> int:
     """The shortest period in samples after which the command (n, m) nearly repeats, by autocorrelation; 0 = none."""
     used = command[:MOST_SAMPLES]
+    most = float(np.abs(used).max(initial=0.0))
+    if HUGE < most < np.inf:
+        used = used / most  # whose squares would overflow
     sizes = np.std(used, axis=0) if used.size else np.zeros(command.shape[1])
     if not np.isfinite(used).all() or not (sizes > 0).any() or len(used) < 2 * SHORTEST:
         return 0

@@ -130,16 +130,16 @@ def search_effects(
 def _find_beyond(
     first: SearchResult, opened: SearchResult, adds: bool, beyond: Callable[[SearchResult], SearchResult]
 ) -> SearchResult:
-    """What is found beyond the catalogue without and with the opened samples, or what these alone added to it."""
+    """What is found beyond the catalogue without the opened samples, or with them."""
     tried = beyond(first)
     if tried.judgement.named:
         return tried
-    if adds:
-        return replace(opened, unconfirmed=tried.unconfirmed)
-    there = beyond(replace(opened, judgement=replace(opened.judgement, named=False)))
+    judged = opened.judgement if adds else replace(opened.judgement, named=False)
+    there = beyond(replace(opened, judgement=judged, remarks=()))
+    unconfirmed = (*tried.unconfirmed, *there.unconfirmed)
     if there.judgement.named:
-        return replace(there, remarks=(*opened.remarks, *there.remarks))
-    judged, unconfirmed = replace(first.judgement, verdict="unexplained"), (*tried.unconfirmed, *there.unconfirmed)
+        return replace(there, remarks=(*opened.remarks, *there.remarks), unconfirmed=unconfirmed)
+    judged = replace(first.judgement, verdict="unexplained")
     return replace(tried, judgement=judged, remarks=(NOT_SHOWN, *tried.remarks), unconfirmed=unconfirmed)
 
 

@@ -45,20 +45,25 @@ def build_omega3(
         changed = free != held
         packed[changed] = (held if on_handle and hand else free)[changed]
 
-    info = DeviceInfo(
-        name=named if friction else f"{named} without friction",
-        simulated=True,
-        sample_rate_hz=1.0 / TICK_S,
-        max_force_n=MAX_FORCE_N,
-        effective_mass_kg=effective_mass_kg(parameters, packed),
-        details=f"{set_words}, {'with' if hand else 'without'} a hand, sensor noise from seed {seed}",
-    )
+    details = f"{set_words}, {'with' if hand else 'without'} a hand, sensor noise from seed {seed}"
+    mass_kg = effective_mass_kg(parameters, packed)
     return CompiledRig(
-        info=info,
+        info=omega3_info(named if friction else f"{named} without friction", mass_kg, details),
         state=state_at_rest(packed, place_m),
         parameters=packed,
         noise=np.array(np.random.SeedSequence(seed).generate_state(1, np.uint64), dtype=np.uint64),
         sense=sense,
         advance=advance,
         simulate_hand=simulate_hand,
+    )
+
+
+def omega3_info(name: str, effective_mass_kg: float, details: str) -> DeviceInfo:
+    return DeviceInfo(
+        name=name,
+        simulated=True,
+        sample_rate_hz=1.0 / TICK_S,
+        max_force_n=MAX_FORCE_N,
+        effective_mass_kg=effective_mass_kg,
+        details=details,
     )

@@ -16,8 +16,8 @@ from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
 from study.devices.simulated import layout
 from study.devices.simulated.compiled import pose
-from study.devices.simulated.omega3 import build_omega3
-from study.devices.simulated.packing import isotropic_depth_m, pack_parameters
+from study.devices.simulated.omega3 import NAME, omega3_info
+from study.devices.simulated.packing import effective_mass_kg, isotropic_depth_m, pack_parameters
 from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Masses, Omega3Parameters
 
 MOST_MISFIT = 0.1
@@ -64,7 +64,9 @@ class FittedLinkage:
 
 
 def simulated_linkage() -> SimulatedLinkage:
-    return SimulatedLinkage(Omega3Parameters(), build_omega3(0, hand=False).info)
+    parameters = Omega3Parameters()
+    mass_kg = effective_mass_kg(parameters, pack_parameters(parameters, False, (0.0, 0.0, 0.0)))
+    return SimulatedLinkage(parameters, omega3_info(NAME, mass_kg, "parameter set 1, without a hand"))
 
 
 def fit_linkage(calibration: LinkageCalibration) -> FittedLinkage:

@@ -53,6 +53,8 @@ def found_in(recording):
         (DRAG, "p0*abs(vx)**1.5*sign(vx)"),
         (law("-p0*x**3", 1e5), "p0*x**3"),
         (law("p0*fx*sin(2*pi*x/p1)", 0.2, 0.013), "p0*fx*sin(2*pi*x/p1 + p2)"),
+        # The fitted stretches travel 26.5 mm, at most 14 mm to one side: just one pitch.
+        (law("p0*fx*sin(2*pi*x/p1)", 0.3, 0.026), "p0*fx*sin(2*pi*x/p1 + p2)"),
         (law("p0*lag(x, p1)", 40.0, 0.05), "p0*lag(x, p1)"),
     ],
 )

@@ -37,6 +37,11 @@ def opened(board: Board):
         yield sensor
 
 
+def newest_of(sensor: Accelerometer) -> np.ndarray:
+    time.sleep(0.01)
+    return sensor.latest()[0]
+
+
 @pytest.mark.parametrize(
     ("rate_hz", "drift_ppm"), [(2000.0, 150.0), pytest.param(4000.0, -150.0, marks=pytest.mark.slow), (10_000.0, 40.0)]
 )
@@ -47,7 +52,8 @@ def test_a_tone_comes_out_with_its_phase_on_the_ticks(rate_hz, drift_ppm):
         time.sleep(2.5)
         tick_s = time.monotonic() - 1.5 + np.arange(1500) / 1000
         sensed = sensor.sensed(tick_s[0], tick_s, 1000.0)
-        newest = np.array([sensor.latest()[0]])
+        # Late on a busy computer: its thread and the board's share this process.
+        newest = next((found for _ in range(200) if np.isfinite(found := newest_of(sensor)).all()), newest_of(sensor))
     assert isinstance(sensor, SensesApart) and np.isfinite(newest).all()
     health = sensed.health
     assert (health.ticks, health.unplaced_ticks, health.lost, health.restarts) == (1500, 0, 0, 0)

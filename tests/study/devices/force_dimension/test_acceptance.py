@@ -117,6 +117,7 @@ CAPS = {
 
 
 @pytest.mark.real_time
+@pytest.mark.may_be_late
 @pytest.mark.parametrize("said", CAPS)
 def test_a_device_that_gets_more_than_its_cap_is_not_accepted(locked, patient, rigs, monkeypatch, said):
     """Each layer by itself; and one that tells of no force proves nothing."""

@@ -163,7 +163,7 @@ def test_hdf5_of_others_is_reported(tmp_path):
         assert validate_file(tmp_path / "a.h5").problems[0].startswith("It ")
         file.attrs["format"] = "nwb"
     assert validate_file(tmp_path / "a.h5").problems == (
-        "It calls itself 'nwb'; known formats are hapteq-recording and hapteq-model.",
+        "It calls itself 'nwb'; known formats are hapteq-recording, hapteq-model and hapteq-calibration.",
     )
 
 

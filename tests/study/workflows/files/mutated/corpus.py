@@ -8,9 +8,6 @@ import h5py
 import numpy as np
 from scipy.io import savemat
 
-from study.store.formats.calibration_file import write_calibration
-from tests.equalizer.linkage.truth import calibration, readings
-
 FROZEN = Path(__file__).parents[4] / "frozen" / "v0_1"
 LIVE = {
     "format": "hapteq-live", "version": 1, "utc": "2026-01-01T00:00:00+00:00", "activity": "answer",
@@ -53,7 +50,6 @@ def corpus(folder: Path) -> list[Path]:
                 file[f"run/{key}"] = value
             file.create_dataset("run/packed", data=u, compression="gzip", chunks=(50, 2))
             file["note"] = "text"
-    write_calibration(folder / "cal.h5", calibration(readings()[:20]))
     (folder / "live.json").write_text(json.dumps(LIVE))
     (folder / "note-1.json").write_text(json.dumps(REQUEST))
     return sorted(folder.iterdir())

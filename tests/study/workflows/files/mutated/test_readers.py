@@ -10,7 +10,6 @@ import pytest
 from study.errors import StudyError
 from study.importing.arrays.arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
-from study.store.formats.calibration_file import read_calibration
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.protocol_files import read_protocol
@@ -35,8 +34,6 @@ def read(path: Path, beside: Path) -> None:
     if path.name.endswith((".npz", ".npy", ".mat")) or path.name == "foreign.h5":
         read_arrays(path, CsvMap())
         read_foreign((path,), None)
-    elif path.name == "cal.h5":
-        read_calibration(path)
     elif path.name.endswith(".h5") and path.name != "model.h5":
         write_recording(path.with_name("again.h5"), read_recording(path), overwrite=True)
     else:

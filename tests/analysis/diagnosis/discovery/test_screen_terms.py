@@ -1,0 +1,63 @@
+"""The screen of terms: bounds of the model's own numbers, and slopes of a frequency over a long recording."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from analysis.diagnosis.discovery.fit_sum import fit_sum
+from analysis.diagnosis.discovery.grammar import Term
+from analysis.diagnosis.discovery.matched_filter import View, views_of
+from analysis.diagnosis.discovery.screen_terms import products_of, solve, solve_within
+from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.settings import RETUNING_BOUND
+from tests.lawful import arena_of, law, recorded
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_batch_is_solved_within_its_bounds_as_a_peer_solves_each(seed):
+    rng = np.random.default_rng(seed)
+    columns, wanted = rng.standard_normal((7, 60, 4)), rng.standard_normal((7, 60))
+    low, high = np.array([-0.05, -np.inf, -np.inf, -np.inf]), np.array([0.05, np.inf, np.inf, np.inf])
+    squares, right = np.einsum("tsk,tsl->tkl", columns, columns), np.einsum("tsk,ts->tk", columns, wanted)
+    found = solve_within(squares, right, low, high)
+    for a, b, own in zip(columns, wanted, found, strict=True):
+        assert own == pytest.approx(lsq_linear(a, b, (low, high), method="bvls", tol=1e-14).x, abs=1e-9)
+    assert np.isclose(np.abs(found[:, 0]), 0.05).any()
+    free = solve_within(squares, right, np.full(4, -np.inf), np.full(4, np.inf))
+    assert free == pytest.approx(np.linalg.solve(squares, right[:, :, None])[:, :, 0])
+
+
+def test_a_barred_weight_is_zero_and_the_others_as_without_it():
+    rng = np.random.default_rng(7)
+    a, b = rng.standard_normal((40, 3)), rng.standard_normal(40)
+    squares = (a.T @ a)[None]
+    squares[0, 1, 1] = np.inf
+    found = solve_within(squares, (a.T @ b)[None], np.full(3, -np.inf), np.full(3, np.inf))[0]
+    assert found[1] == pytest.approx(0, abs=1e-12)
+    assert found[[0, 2]] == pytest.approx(np.linalg.lstsq(a[:, [0, 2]], b, rcond=None)[0])
+
+
+@pytest.fixture(scope="module")
+def pumped() -> View:
+    context, known = arena_of(recorded((law("p0*x*sin(2*pi*p1*t)", 60.0, 3.371),), 1))
+    whole = known.retuned.fitted
+    fitted = evaluate_fit(context.measure, context.tuning, whole.deviations, whole.hypothesis)
+    return views_of(context.measure, context.tuning, fitted)[0]
+
+
+def test_the_models_numbers_stay_within_the_bounds_of_re_tuning(pumped):
+    """A residual that half of the mass gone would explain, and more."""
+    mass = pumped.parameter_columns[0]
+    gone = replace(pumped, residual=-50 * mass)
+    moved = solve(products_of(gone)).weights[0] - gone.pull[0]
+    assert moved == pytest.approx(-RETUNING_BOUND)
+
+
+@pytest.mark.parametrize("off_hz", [0.02, -0.02])
+def test_a_frequency_is_found_from_a_start_that_is_out_of_phase_at_the_end(pumped, off_hz):
+    term = Term("x*sin(2*pi*p0*t + p1)", (3.371 + off_hz, 0.0), ((2.0, 5.0), (-20.0, 20.0)), (), (1,))
+    found = fit_sum(products_of(pumped), (term,))
+    assert found is not None
+    assert found.terms[0].numbers[0] == pytest.approx(3.371, abs=2e-4)

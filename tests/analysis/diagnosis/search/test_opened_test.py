@@ -1,0 +1,60 @@
+"""What is opened of the held-out samples where only they show a mismatch, and what stays sealed. Compiles."""
+
+import pytest
+
+from analysis.diagnosis.data.observed import observe
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.search.search import MILDER_TEST_USED
+from tests.diagnosed import device
+from tests.lawful import arena_of, law, recorded
+
+CUBIC = law("-p0*x**3", 4e5)
+SWEEP_AND_LOUDER = (*(("multisine", level, "fit") for level in (0.1, 0.15, 0.2)), ("sweep", 1.5, "test"),
+                    ("multisine", 3.0, "test"))  # fmt: skip
+ONE_LEVEL = (*(("multisine", level, "fit") for level in (0.1, 0.15, 0.2)), ("multisine", 3.0, "test"))
+
+
+@pytest.fixture(scope="module")
+def shown():
+    return recorded((CUBIC,), 3, plan=SWEEP_AND_LOUDER)
+
+
+def test_all_but_the_loudest_is_opened_and_the_loudest_stays_sealed(shown):
+    context, known = arena_of(shown)
+    opened = context.open_milder(known.retuned)
+    assert opened is not None
+    sweep, loud = (slice(s.start, s.stop) for s in shown.segments[-2:])
+    record = opened.whole.records[0]
+    assert not record.test[sweep].any() and (record.fit | record.choose)[sweep].all()
+    assert record.test[loud].all() and not (record.fit | record.choose)[loud].any()
+    assert len(opened.measure.records[0].fit) <= loud.start
+
+
+def test_nothing_is_opened_of_a_test_of_one_level_or_where_the_milder_part_shows_nothing(shown):
+    context, known = arena_of(recorded((CUBIC,), 3, plan=ONE_LEVEL))
+    assert context.open_milder(known.retuned) is None
+    context, known = arena_of(recorded((), 3, plan=SWEEP_AND_LOUDER))
+    assert context.open_milder(known.retuned) is None
+
+
+def test_opened_samples_are_to_fit_and_the_last_third_to_choose_by(shown):
+    record = observe(shown, 1)
+    opened = record.unseal(record.first_halves())
+    both = opened.fit | opened.choose
+    assert not (both & opened.test).any()
+    assert (both | opened.test).sum() == (record.fit | record.choose | record.test).sum()
+    added = both & record.test
+    assert added.sum() == pytest.approx(record.test.sum() / 2, abs=2)
+    assert (opened.choose & record.test).sum() == pytest.approx(added.sum() / 3, abs=2)
+
+
+def test_a_law_that_only_the_test_shows_is_named_and_proved_by_the_loudest(shown):
+    settings = DiagnosisSettings(discovery=True, without=("hardening_stiffness", "softening_stiffness", "end_stop"))
+    found = diagnose([shown], device(1), settings, map, lambda what, share: None)
+    effects = found.diagnosis.effects
+    assert found.diagnosis.verdict == "explained"
+    assert [effect.effect for effect in effects] == ["discovered_law"]
+    assert effects[0].law.expression.endswith("*x**3")
+    assert effects[0].parameters["p0"].value == pytest.approx(-4e5, rel=0.05)
+    assert MILDER_TEST_USED in found.remarks
