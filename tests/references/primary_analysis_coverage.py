@@ -16,8 +16,9 @@ from scipy.stats import t as student
 from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.group_contrasts import contrasts
 from analysis.psychophysics.hierarchy.curve import Family
-from analysis.psychophysics.hierarchy.fit import Prior, fit_hierarchy
+from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.inference import lower_bound, pseudo_thresholds
+from analysis.psychophysics.hierarchy.objective import Prior
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.psychophysics.repeated_measures import repeated_measures
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase

@@ -55,6 +55,20 @@ def sensitivity(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, 
     return q, -mills * h1, mills * (q * mills - 1.0) * h1**2 - mills * h2
 
 
+def evidence_at(t: FloatArray, family: Family) -> FloatArray:
+    """q(t) alone, in a quarter of the time."""
+    t = np.minimum(t, SUREST)
+    match family:
+        case Family.WEIBULL:
+            log_rest = -np.exp(t)
+        case Family.LOGISTIC:
+            log_rest = -np.logaddexp(0.0, t)
+        case Family.GAUSS:
+            log_rest = log_ndtr(-t)
+    q: FloatArray = -ndtri_exp(log_rest - math.log(2.0))
+    return q
+
+
 def share_right(evidence: FloatArray, lapse: float) -> FloatArray:
     """P(right) in the shape of evidence, the mean q(t) - side * criterion in units of d'; half of all lapses are right
     by chance."""

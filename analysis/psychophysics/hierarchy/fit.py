@@ -2,31 +2,14 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.optimize import OptimizeResult, minimize
-from scipy.special import expit, logit
+from scipy.special import expit
 
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.curve import USUAL_SLOPE, Family
-from analysis.psychophysics.hierarchy.likelihood import TrialLikelihood
-from analysis.psychophysics.hierarchy.marginal import Layout, Marginal
+from analysis.psychophysics.hierarchy.curve import Family
+from analysis.psychophysics.hierarchy.marginal import Layout
+from analysis.psychophysics.hierarchy.objective import Objective, Prior, maximise
+from analysis.psychophysics.hierarchy.refine import refine
 from equalizer.signals.signal import FloatArray
-
-
-@dataclass(frozen=True, slots=True)
-class Prior:
-    """Prior distributions of the population parameters, and their reasons."""
-
-    lapse_right: float = 40.0
-    lapse_wrong: float = 1.0
-    """Beta distribution of the lapse rate on the scale of its logit: as if one lapse in 41 sure trials had been seen.
-    Attentive adults lapse in 0 to 5 %; some hundred trials above threshold outweigh it."""
-    spread: float = 1.0
-    """Added log SD of each spread: keeps it off 0, about one standard error of an estimate that would be 0. Y. Chung
-    et al., Psychometrika 78 (2013), 685-709: gamma distribution of shape 2, rate towards 0."""
-    mean_sd_db: float = 30.0
-    """SD of a normal distribution of each mean around the average level played. Holds a mean that the answers do not
-    (all guess at the cap) at a finite place; a mean 10 dB away from that level moves by 0.01 dB."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,96 +40,18 @@ class HierarchicalFit:
         return float(expit(self.numbers[self.layout.lapse]))
 
 
-LOG_SD_BOUNDS = (-5.0, 3.5)
-"""Bounds of the logarithm of all spreads: 0.007 to 33, in dB, log units and d'. At the lower bound persons do not
-differ, at the upper one they have nothing in common."""
-CURVATURE_STEP = 1e-3
-"""In dB and in logarithms: far above the error of a gradient, far below what a spread or mean is known to."""
-LAPSE_BOUNDS = (float(logit(1e-4)), float(logit(0.3)))
-
-
-class Objective:
-    """Minus the penalized log marginal likelihood, for a search."""
-
-    def __init__(self, answers: Answers, family: Family, prior: Prior) -> None:
-        self.prior, self.layout = prior, Layout(len(answers.frequencies_hz))
-        begin = starting_numbers(answers, family)
-        k = self.layout.k
-        latent = np.tile(np.concatenate([begin[:k], [begin[self.layout.slope], 0.0]]), (answers.persons, 1))
-        self.marginal = Marginal(TrialLikelihood(answers, family), latent)
-        self.begin = begin
-        self._middle_db = float(np.average(answers.level_db, weights=answers.right + answers.wrong))
-
-    def __call__(self, numbers: FloatArray) -> tuple[float, FloatArray]:
-        value, scores = self.marginal.evaluate(numbers)
-        penalty, slope = self.penalty(numbers)
-        return -float(value.sum()) - penalty, -scores.sum(axis=0) - slope
-
-    def penalty(self, numbers: FloatArray) -> tuple[float, FloatArray]:
-        """Log density of the prior, and its gradient."""
-        layout, prior = self.layout, self.prior
-        lapse = float(expit(numbers[layout.lapse]))
-        slope = np.zeros(layout.size)
-        slope[layout.log_sds] = prior.spread
-        away = numbers[: layout.k] - self._middle_db
-        slope[: layout.k] = -away / prior.mean_sd_db**2
-        slope[layout.lapse] = prior.lapse_wrong * (1.0 - lapse) - prior.lapse_right * lapse
-        value = prior.lapse_wrong * np.log(lapse) + prior.lapse_right * np.log1p(-lapse)
-        value -= 0.5 * float(away @ away) / prior.mean_sd_db**2
-        return float(value + prior.spread * numbers[layout.log_sds].sum()), slope
-
-    @property
-    def bounds(self) -> list[tuple[float | None, float | None]]:
-        bounds: list[tuple[float | None, float | None]] = [(None, None)] * self.layout.size
-        for place in self.layout.log_sds:
-            bounds[place] = LOG_SD_BOUNDS
-        bounds[self.layout.lapse] = LAPSE_BOUNDS
-        return bounds
-
-
-def starting_numbers(answers: Answers, family: Family) -> FloatArray:
-    """Starting values of the population parameters: means from the levels played, usual spreads."""
-    k = len(answers.frequencies_hz)
-    trials = answers.right + answers.wrong
-    place = answers.run % k
-    played = np.bincount(place, weights=trials, minlength=k)
-    total = np.bincount(place, weights=trials * answers.level_db, minlength=k)
-    means = np.where(played > 0, total / np.maximum(played, 1), total.sum() / played.sum())
-    return np.concatenate([means, [0.9, 0.7, np.log(USUAL_SLOPE[family]), -1.2, -1.6, logit(0.02)]])
-
-
 def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prior | None = None) -> HierarchicalFit:
-    """Maximum a posteriori fit of the population parameters, with all persons' latent parameters integrated out. Needs
-    two persons."""
+    """Maximum a posteriori fit of the population parameters, with all persons' latent parameters integrated out: first
+    by Laplace's method, then by quadrature. Needs two persons."""
     objective = Objective(answers, family, prior or Prior())
-    found = maximise(objective, objective.begin)
-    value, scores = objective.marginal.evaluate(found.x)
+    found = refine(objective, maximise(objective, objective.begin).x)
     return HierarchicalFit(
         answers=answers,
         family=family,
-        numbers=found.x,
-        latent=objective.marginal.latent,
-        log_likelihood=float(value.sum()),
-        scores=scores,
-        curvature=_curvature(objective, found.x),
-        converged=bool(found.success),
+        numbers=found.numbers,
+        latent=objective.marginal.centres(found.numbers)[0],
+        log_likelihood=found.log_likelihood,
+        scores=found.scores,
+        curvature=found.curvature,
+        converged=found.converged,
     )
-
-
-def maximise(objective: Objective, begin: FloatArray, held: int | None = None) -> OptimizeResult:
-    """Maximise the penalised likelihood; with `held`, that parameter is fixed at its value in `begin` (profile)."""
-    bounds = objective.bounds
-    if held is not None:
-        bounds[held] = (float(begin[held]), float(begin[held]))
-    # A profile asks for the height alone, which is flat at its top: a thousandth of it is enough.
-    options = {"maxiter": 300, "ftol": 1e-11 if held is None else 1e-7, "gtol": 1e-4, "maxcor": 20}
-    begin = np.clip(begin, *np.array([(-np.inf if a is None else a, np.inf if b is None else b) for a, b in bounds]).T)
-    return minimize(objective, begin, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
-
-
-def _curvature(objective: Objective, numbers: FloatArray) -> FloatArray:
-    """Hessian of the objective from differences of its exact gradient."""
-    steps = CURVATURE_STEP * np.eye(len(numbers))
-    rows = [(objective(numbers + step)[1] - objective(numbers - step)[1]) / (2.0 * CURVATURE_STEP) for step in steps]
-    hessian: FloatArray = np.array(rows)
-    return (hessian + hessian.T) / 2.0

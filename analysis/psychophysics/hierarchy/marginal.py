@@ -68,7 +68,7 @@ class Marginal:
     def evaluate(self, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Log marginal likelihood of each person (n,), and its gradient (n, size)."""
         layout, k = self.layout, self.layout.k
-        precision, centre = _precision(numbers, k), _centre(numbers, k)
+        precision, centre = prior_precision(numbers, k), _centre(numbers, k)
         lapse = float(expit(numbers[layout.lapse]))
         found = self._find_modes(precision, centre, lapse)
         deviation = self.latent - centre
@@ -98,6 +98,12 @@ class Marginal:
             found.by_lapse - 0.5 * by_lapse - 0.5 * np.einsum("na,na->n", adjoint, found.first_by_lapse)
         )
         return value, scores
+
+    def centres(self, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mode of each person (n, k + 2), and the information of the answers there (n, k + 2, k + 2)."""
+        k, lapse = self.layout.k, float(expit(numbers[self.layout.lapse]))
+        found = self._find_modes(prior_precision(numbers, k), _centre(numbers, k), lapse)
+        return self.latent, found.information
 
     def _find_modes(self, precision: FloatArray, centre: FloatArray, lapse: float) -> Derivatives:
         """Newton's method for all persons at once; a step that does not gain is halved for that person alone."""
@@ -144,7 +150,7 @@ def _centre(numbers: FloatArray, k: int) -> FloatArray:
     return np.concatenate([numbers[:k], [numbers[k + 2], 0.0]])
 
 
-def _precision(numbers: FloatArray, k: int) -> FloatArray:
+def prior_precision(numbers: FloatArray, k: int) -> FloatArray:
     """Inverse covariance of the latent parameters, (k + 2, k + 2): a person has a deviation shared by all frequencies,
     and another at each frequency."""
     shared, own = math.exp(2.0 * numbers[k]), math.exp(2.0 * numbers[k + 1])

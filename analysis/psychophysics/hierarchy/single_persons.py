@@ -2,7 +2,7 @@
 
 No estimate is drawn towards another person's. What a run of some 60 trials does not tell comes from fixed priors in
 place of a population's: the slope is that of usual people within a factor of 1.5, the liking for one answer within 0.3
-d', the lapse rate as in `fit.Prior`. Then each run has the profile interval of `run_likelihood`.
+d', the lapse rate as in `objective.Prior`. Then each run has the profile interval of `run_likelihood`.
 """
 
 import math
@@ -15,7 +15,7 @@ from scipy.stats import beta
 
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import USUAL_SLOPE, Family
-from analysis.psychophysics.hierarchy.fit import LAPSE_BOUNDS, Objective, Prior
+from analysis.psychophysics.hierarchy.objective import LAPSE_BOUNDS, Objective, Prior
 from analysis.psychophysics.hierarchy.primary import CONFIDENCE, PersonEstimate, at_played_frequencies, estimate_persons
 from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, run_likelihoods
 from protocols.procedure.staircase import to_db
