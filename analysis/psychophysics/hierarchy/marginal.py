@@ -28,8 +28,9 @@ from equalizer.signals.signal import FloatArray
 NEWTON_STEPS = 60
 SETTLED = 1e-11
 """Newton decrement of the log-likelihood at which a mode is found: then the gradient is right to some six digits."""
-LOWEST_CURVATURE = 1e-3
-"""Least curvature of a Newton step, per dB squared: below it the step length is undetermined."""
+LOWEST_CURVATURE = 1e-5
+"""Least curvature of a Newton step, per dB squared: below it the step length is undetermined. Where people have nothing
+in common, that of a threshold without answers is 1e-3."""
 LONGEST_STEP_DB, LONGEST_STEP_SLOPE, LONGEST_STEP_D = 6.0, 0.7, 1.0
 """Largest Newton step in a threshold, a log-slope and a criterion: the model is not quadratic over larger ones."""
 

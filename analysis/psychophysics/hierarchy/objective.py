@@ -29,9 +29,9 @@ class Prior:
     (all guess at the cap) at a finite place; a mean 10 dB away from that level moves by 0.01 dB."""
 
 
-LOG_SD_BOUNDS = (-5.0, 3.5)
-"""Bounds of the logarithm of all spreads: 0.007 to 33, in dB, log units and d'. At the lower bound persons do not
-differ, at the upper one they have nothing in common."""
+LOG_SD_BOUNDS = ((-5.0, 3.5), (-5.0, 3.5), (-5.0, 0.7), (-5.0, 1.1))
+"""Bounds of the logarithm of each spread, in the order of `Layout.log_sds`: 0.007 to 33 dB, to 2 in log-slopes, to 3 in
+d'. At the lower bound persons do not differ, at the upper one they have nothing in common."""
 LAPSE_BOUNDS = (float(logit(1e-4)), float(logit(0.3)))
 
 
@@ -77,8 +77,8 @@ class Objective:
     @property
     def bounds(self) -> list[tuple[float | None, float | None]]:
         bounds: list[tuple[float | None, float | None]] = [(None, None)] * self.layout.size
-        for place in self.layout.log_sds:
-            bounds[place] = LOG_SD_BOUNDS
+        for place, both in zip(self.layout.log_sds, LOG_SD_BOUNDS, strict=True):
+            bounds[place] = both
         bounds[self.layout.lapse] = LAPSE_BOUNDS
         return bounds
 
