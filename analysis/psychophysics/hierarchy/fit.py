@@ -8,7 +8,7 @@ from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.marginal import Layout
 from analysis.psychophysics.hierarchy.objective import Objective, Prior, maximise
-from analysis.psychophysics.hierarchy.refine import refine
+from analysis.psychophysics.hierarchy.refine import Refinement
 from equalizer.signals.signal import FloatArray
 
 
@@ -44,7 +44,7 @@ def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prio
     """Maximum a posteriori fit of the population parameters, with all persons' latent parameters integrated out: first
     by Laplace's method, then by quadrature. Needs two persons."""
     objective = Objective(answers, family, prior or Prior())
-    found = refine(objective, maximise(objective, objective.begin).x)
+    found = Refinement(objective).maximum(maximise(objective, objective.begin).x)
     return HierarchicalFit(
         answers=answers,
         family=family,

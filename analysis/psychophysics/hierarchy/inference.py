@@ -16,8 +16,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit
-from analysis.psychophysics.hierarchy.objective import Objective, Prior, maximise
-from analysis.psychophysics.hierarchy.refine import refine
+from analysis.psychophysics.hierarchy.objective import Objective, Prior
+from analysis.psychophysics.hierarchy.refine import Refinement
 from equalizer.signals.signal import FloatArray
 
 BOUND_ROOT, BOUND_STEPS = 0.03, 8
@@ -103,24 +103,21 @@ def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prio
 
     None where no bound is found within `FAR_DB` below the estimate.
     """
-    objective = Objective(fit.answers, fit.family, prior)
-    best = -fit.log_likelihood - objective.penalty(fit.numbers)[0]
+    search = Refinement(Objective(fit.answers, fit.family, prior))
+    best = search.lowest_cost(fit.numbers)
     wanted = float(student.ppf(confidence, fit.answers.persons - 1))
     unit = np.eye(len(fit.numbers))[place]
     along = np.linalg.solve(fit.curvature, unit)
     along = along / along[place]
-
-    def lowest_cost(begin: FloatArray) -> float:
-        return refine(objective, maximise(objective, begin, held=place).x, held=place).cost
 
     def root(below_db: float) -> float:
         """Signed root of the likelihood ratio: of a quadratic likelihood, a straight line."""
         # The other numbers begin where a quadratic likelihood would have them; where that ends too low to go on, also
         # where they are at the estimate, for with few answers the cost has several minima, and a profile is the
         # lowest of them.
-        cost = lowest_cost(fit.numbers - below_db * along)
+        cost = search.lowest_cost(fit.numbers - below_db * along, held=place)
         if math.sqrt(max(0.0, 2.0 * (cost - best))) >= wanted:
-            cost = min(cost, lowest_cost(fit.numbers - below_db * unit))
+            cost = min(cost, search.lowest_cost(fit.numbers - below_db * unit, held=place))
         return math.sqrt(max(0.0, 2.0 * (cost - best)))
 
     near, near_root, far = 0.0, 0.0, 2.0

@@ -20,6 +20,7 @@ from scipy.special import expit
 from analysis.psychophysics.hierarchy.marginal import prior_precision
 from equalizer.signals.signal import FloatArray
 
+
 @dataclass(frozen=True, slots=True)
 class Counts:
     """How many nodes there are of each kind."""
@@ -30,8 +31,9 @@ class Counts:
     threshold: int
 
 
-COARSE, FINE, FINEST = Counts(3, 5, 3, 5), Counts(5, 5, 3, 7), Counts(7, 9, 3, 9)
-"""The fine nodes put medians within 0.03 dB of where twice as many of each kind do, also where most are above the cap."""
+COARSE, FINE, FIXED = Counts(3, 5, 3, 5), Counts(5, 5, 3, 7), Counts(5, 7, 3, 7)
+"""The fine nodes put medians within 0.03 dB of where twice as many of each kind do, also where most are above the cap.
+Where they do not settle, because a person's distribution has two maxima, there are more, which keep their places."""
 
 
 LEAST_SHARE = 1e-4

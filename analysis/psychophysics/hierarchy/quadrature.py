@@ -78,7 +78,8 @@ class Quadrature:
     def log_likelihoods(self, nodes: Nodes, lapse: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Of each run, with the first two derivatives by the logit of the lapse rate: (n, q, k, r) each."""
         parts = zip(self._persons, nodes.shared, nodes.threshold, strict=True)
-        value, first, second = np.stack([person.log_likelihoods(*at, lapse) for person, *at in parts], axis=1)
+        each = [person.log_likelihoods(shared, threshold, lapse) for person, shared, threshold in parts]
+        value, first, second = np.stack(each, axis=1)
         slope = lapse * (1.0 - lapse)
         return value, slope * first, slope**2 * second + slope * (1.0 - 2.0 * lapse) * first
 

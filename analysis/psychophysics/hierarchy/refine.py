@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.psychophysics.hierarchy.nodes import COARSE, FINE, FINEST, Counts, Moments, laplace_moments
-from analysis.psychophysics.hierarchy.objective import Objective
+from analysis.psychophysics.hierarchy.nodes import COARSE, FINE, FIXED, Counts, Moments, laplace_moments
+from analysis.psychophysics.hierarchy.objective import Objective, maximise
 from analysis.psychophysics.hierarchy.quadrature import Quadrature, integrate
 from equalizer.signals.signal import FloatArray
 
 NEWTON_STEPS = 10
-SETTLED = {COARSE: 0.1, FINE: 1e-3, FINEST: 1e-3}
+SETTLED = {COARSE: 0.1, FINE: 1e-3, FIXED: 1e-3}
 """Twice the gain in log-likelihood that the next step would bring: 0.001 is a thirtieth of a standard error, and the
 step before it was that of a quadratic function already."""
 LONGEST_STEP = 2.0, 0.5
@@ -39,64 +39,76 @@ class Refined:
     converged: bool
 
 
-def refine(objective: Objective, numbers: FloatArray, held: int | None = None) -> Refined:
-    """numbers: where the search by Laplace's method ended. held: a parameter that keeps its value (profile)."""
-    quadrature = Quadrature(objective.answers, objective.family)
-    moments = laplace_moments(numbers, *objective.marginal.centres(numbers))
-    for counts in (COARSE, FINE, FINEST):
-        if counts is FINEST and found.converged:
-            break
-        begin = _evaluate(objective, quadrature, numbers, moments, counts)
-        found = _climb(objective, quadrature, begin, counts, held)
-        numbers, moments = found.numbers, found.moments
-    return found
+class Refinement:
+    """Searches by quadrature, for one objective."""
 
+    def __init__(self, objective: Objective) -> None:
+        self.objective, self._quadrature = objective, Quadrature(objective.answers, objective.family)
+        bounds = [(-np.inf if a is None else a, np.inf if b is None else b) for a, b in objective.bounds]
+        self._lower, self._upper = np.array(bounds).T
+        self._longest = np.full(len(bounds), LONGEST_STEP[1])
+        self._longest[: objective.layout.k] = LONGEST_STEP[0]
 
-def _climb(objective: Objective, quadrature: Quadrature, at: Refined, counts: Counts, held: int | None) -> Refined:
-    lower, upper = np.array([(-np.inf if a is None else a, np.inf if b is None else b) for a, b in objective.bounds]).T
-    longest = np.full(len(at.numbers), LONGEST_STEP[1])
-    longest[: objective.layout.k] = LONGEST_STEP[0]
-    for _ in range(NEWTON_STEPS):
-        step = _newton_step(at, held)
-        if -float(at.slope @ step) < SETTLED[counts]:
-            return at
-        share = 1.0 / max(1.0, float(np.abs(step / longest).max()))
-        for _ in range(SHORTER):
-            numbers = np.clip(at.numbers + share * step, lower, upper)
-            then = _evaluate(objective, quadrature, numbers, at.moments, counts)
-            if then.cost <= at.cost + SAME_HEIGHT:
-                break
-            share /= 4.0
-        else:
-            # The nodes were not yet where the person is: again, with those that this evaluation has found.
-            then = _evaluate(objective, quadrature, at.numbers, at.moments, counts)
-        at = replace(then, moments=at.moments) if counts is FINEST else then
-    return replace(at, converged=False)
+    def maximum(self, numbers: FloatArray) -> Refined:
+        """numbers: where the search by Laplace's method ended."""
+        coarse = self._climb(self._begin(numbers, COARSE), COARSE)
+        fine = self._climb(self._evaluate(coarse.numbers, coarse.moments, FINE), FINE)
+        if fine.converged:
+            return fine
+        return self._climb(self._evaluate(fine.numbers, fine.moments, FIXED), FIXED)
 
+    def lowest_cost(self, numbers: FloatArray, held: int | None = None) -> float:
+        """Cost at the maximum near these numbers, by coarse nodes. held: a parameter that keeps its value (profile)."""
+        found = self._climb(self._begin(numbers, COARSE), COARSE, held)
+        if not found.converged:
+            laplace = maximise(self.objective, numbers, held).x
+            found = self._climb(self._begin(laplace, COARSE), COARSE, held)
+        # What is still missing is known from the curvature.
+        return found.cost + 0.5 * float(found.slope @ self._newton_step(found, held))
 
-def _newton_step(at: Refined, held: int | None) -> FloatArray:
-    free = np.arange(len(at.numbers)) != held
-    curvature = at.curvature[np.ix_(free, free)]
-    values, vectors = np.linalg.eigh(curvature)
-    step = np.zeros(len(at.numbers))
-    # Uphill where the curvature says so, and as far as its size says where it is of the wrong sign.
-    step[free] = -vectors @ ((vectors.T @ at.slope[free]) / np.maximum(np.abs(values), LEAST_CURVATURE))
-    return step
+    def _begin(self, numbers: FloatArray, counts: Counts) -> Refined:
+        numbers = np.clip(numbers, self._lower, self._upper)
+        moments = laplace_moments(numbers, *self.objective.marginal.centres(numbers))
+        return self._evaluate(numbers, moments, counts)
 
+    def _climb(self, at: Refined, counts: Counts, held: int | None = None) -> Refined:
+        for _ in range(NEWTON_STEPS):
+            step = self._newton_step(at, held)
+            if -float(at.slope @ step) < SETTLED[counts]:
+                return at
+            share = 1.0 / max(1.0, float(np.abs(step / self._longest).max()))
+            for _ in range(SHORTER):
+                then = self._evaluate(np.clip(at.numbers + share * step, self._lower, self._upper), at.moments, counts)
+                if then.cost <= at.cost + SAME_HEIGHT:
+                    break
+                share /= 4.0
+            else:
+                # The nodes were not yet where the person is: again, with those that this evaluation has found.
+                then = self._evaluate(at.numbers, at.moments, counts)
+            at = replace(then, moments=at.moments) if counts is FIXED else then
+        return replace(at, converged=False)
 
-def _evaluate(
-    objective: Objective, quadrature: Quadrature, numbers: FloatArray, moments: Moments, counts: Counts
-) -> Refined:
-    found = integrate(quadrature, numbers, moments, counts)
-    penalty, slope = objective.penalty(numbers)
-    value = float(found.value.sum())
-    return Refined(
-        numbers=numbers,
-        cost=-value - penalty,
-        log_likelihood=value,
-        scores=found.scores,
-        curvature=-found.hessian - objective.penalty_hessian(numbers),
-        slope=-found.scores.sum(axis=0) - slope,
-        moments=found.moments,
-        converged=True,
-    )
+    def _newton_step(self, at: Refined, held: int | None) -> FloatArray:
+        """0 for what is held, and for what is at a bound that it would cross."""
+        pushed = ((at.numbers <= self._lower) & (at.slope > 0)) | ((at.numbers >= self._upper) & (at.slope < 0))
+        free = (np.arange(len(at.numbers)) != held) & ~pushed
+        values, vectors = np.linalg.eigh(at.curvature[np.ix_(free, free)])
+        step = np.zeros(len(at.numbers))
+        # Uphill where the curvature says so, and as far as its size says where it is of the wrong sign.
+        step[free] = -vectors @ ((vectors.T @ at.slope[free]) / np.maximum(np.abs(values), LEAST_CURVATURE))
+        return step
+
+    def _evaluate(self, numbers: FloatArray, moments: Moments, counts: Counts) -> Refined:
+        found = integrate(self._quadrature, numbers, moments, counts)
+        penalty, slope = self.objective.penalty(numbers)
+        value = float(found.value.sum())
+        return Refined(
+            numbers=numbers,
+            cost=-value - penalty,
+            log_likelihood=value,
+            scores=found.scores,
+            curvature=-found.hessian - self.objective.penalty_hessian(numbers),
+            slope=-found.scores.sum(axis=0) - slope,
+            moments=found.moments,
+            converged=True,
+        )

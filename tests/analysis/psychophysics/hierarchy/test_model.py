@@ -7,8 +7,8 @@ from scipy.stats import norm
 
 from analysis.psychophysics.hierarchy.answers import count_answers
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, TARGET, Family, sensitivity, share_right
-from analysis.psychophysics.hierarchy.objective import Objective, Prior
 from analysis.psychophysics.hierarchy.likelihood import TrialLikelihood
+from analysis.psychophysics.hierarchy.objective import Objective, Prior
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from tests.analysis.conftest import PUBLISHED, simulated_run
 

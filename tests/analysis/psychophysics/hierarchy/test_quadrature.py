@@ -78,9 +78,7 @@ def test_gradient_and_hessian_are_those_of_the_integral(prepared, family):
     answers, _, _, numbers = prepared
     objective, quadrature = Objective(answers, family, Prior()), Quadrature(answers, family)
     found, steps = settled(objective, quadrature, numbers, MANY), 1e-3 * np.eye(len(numbers))
-    sides = [
-        [integrate(quadrature, numbers + sign * step, found.moments, MANY) for sign in (1, -1)] for step in steps
-    ]
+    sides = [[integrate(quadrature, numbers + sign * step, found.moments, MANY) for sign in (1, -1)] for step in steps]
     by_value = np.stack([(up.value - down.value) / 2e-3 for up, down in sides], axis=1)
     by_scores = np.stack([(up.scores - down.scores).sum(axis=0) / 2e-3 for up, down in sides])
     np.testing.assert_allclose(found.scores, by_value, atol=3e-3)
