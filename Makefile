@@ -34,10 +34,12 @@ GIVE_WAY := nice -n 10
 CASES ?= 600
 SEED ?= 95000
 STUDIES ?= 400
+COUNTED ?= build/calibration
+SECONDS_OF_WORK ?= 600
 BANK ?= bank-$(SEED)
 
 .DEFAULT_GOAL := help
-.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank prove-browser prove-formats coverage docs site clean \
+.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank prove-browser prove-formats coverage calibration docs site clean \
 	types imports compiled $(TESTED)
 
 help: ## Show what can be made
@@ -101,6 +103,9 @@ prove-formats: $(VENV)/.installed-test ## Exported datasets before the validator
 
 coverage: $(VENV)/.installed-test ## Coverage of every interval of a report near the cap, counted anew (STUDIES=400)
 	$(BIN)/python tests/references/coverage_of_analyses.py $(STUDIES)
+
+calibration: $(VENV)/.installed-test ## Type-1 errors and ranks of the primary analysis, counted (SECONDS_OF_WORK=600); repeated, it goes on
+	$(BIN)/python tests/references/primary_analysis_calibration.py $(COUNTED) $(SECONDS_OF_WORK)
 
 docs: $(VENV)/.installed ## Make docs/formats.md and the schemas again from the code
 	$(BIN)/python -m study.workflows.files.format_docs docs
