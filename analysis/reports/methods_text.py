@@ -30,7 +30,7 @@ _STEP_CHANGES = {
 _STATISTICS = (
     "All answers of the test runs enter one hierarchical psychometric model (docs/statistics.md): threshold in dB by "
     "frequency, person, and person x frequency; slope and criterion by person; one lapse rate; persons integrated out "
-    "by Laplace's method; intervals by persons, with n - 1 degrees of freedom. "
+    "by adaptive quadrature; intervals by persons, with n - 1 degrees of freedom. "
     "Frequencies are compared as published, by one-way analysis of variance between groups with Tukey-Kramer pairs "
     "and Hochberg-Tamhane comparison intervals (those that MATLAB's multcompare draws), and, because every "
     "participant took every frequency, within participants: analysis of variance with the Greenhouse-Geisser "

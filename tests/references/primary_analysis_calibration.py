@@ -1,7 +1,7 @@
 """Calibration of the primary analysis: type-1 errors over null studies, and ranks of the truth in its intervals.
 
-    python tests/references/primary_analysis_calibration.py FOLDER [SECONDS]     simulates; again, it goes on
-    python tests/references/primary_analysis_calibration.py FOLDER 0             only prints what is there
+    python tests/references/primary_analysis_calibration.py FOLDER [SECONDS [SEED]]     again, it goes on
+    python tests/references/primary_analysis_calibration.py FOLDER 0     only prints what is there
 
 The numbers in docs/statistics.md are from it; some 0.1 s of processor time per study of ten participants. Two parts:
 
@@ -47,9 +47,9 @@ NULLS = {
 }
 
 
-def drawn_crowd(number: int) -> Crowd:
+def drawn_crowd(number: int, seed: int = SEED) -> Crowd:
     """A population from the prior: medians 0.2 to 2.2 N each, spreads, slope, lapses and curve, all drawn."""
-    random = np.random.default_rng([SEED, number])
+    random = np.random.default_rng([seed, number])
     return Crowd(
         HZ,
         tuple(float(n) for n in 10.0 ** random.uniform(np.log10(0.2), np.log10(2.2), 5)),
@@ -83,7 +83,7 @@ def _ranks(values, truth) -> list[float]:
     return student.cdf((truth - values.mean(axis=0)) / error, len(values) - 1).tolist()
 
 
-def simulate(folder: Path, seconds: float) -> None:
+def simulate(folder: Path, seconds: float, seed: int = SEED) -> None:
     """In turn one study of each null and three of the ranks, so that at any time all parts are equally far."""
     folder.mkdir(parents=True, exist_ok=True)
     path, until = folder / "studies.jsonl", time.monotonic() + seconds
@@ -93,8 +93,8 @@ def simulate(folder: Path, seconds: float) -> None:
         while time.monotonic() < until:
             turn, place = divmod(done, len(jobs))
             number = turn if jobs[place] in NULLS else 3 * turn + place - len(NULLS)
-            crowd = NULLS[jobs[place]] if jobs[place] in NULLS else drawn_crowd(number)
-            row = {"part": jobs[place], "number": number, **judge(crowd, (SEED, place, number))}
+            crowd = NULLS[jobs[place]] if jobs[place] in NULLS else drawn_crowd(number, seed)
+            row = {"part": jobs[place], "number": number, **judge(crowd, (seed, place, number))}
             file.write(json.dumps(row) + "\n")
             file.flush()
             done += 1
@@ -131,5 +131,6 @@ def _uniformity(ranks) -> str:
 
 if __name__ == "__main__":
     where = Path(sys.argv[1])
-    simulate(where, float(sys.argv[2]) if len(sys.argv) > 2 else 600.0)
+    asked = sys.argv[2:]
+    simulate(where, float(asked[0]) if asked else 600.0, int(asked[1]) if len(asked) > 1 else SEED)
     print_results(where)

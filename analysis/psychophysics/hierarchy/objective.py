@@ -99,7 +99,7 @@ def maximise(objective: Objective, begin: FloatArray, held: int | None = None) -
     bounds = objective.bounds
     if held is not None:
         bounds[held] = (float(begin[held]), float(begin[held]))
-    # A profile asks for the height alone, which is flat at its top: a thousandth of it is enough.
-    options = {"maxiter": 300, "ftol": 1e-11 if held is None else 1e-7, "gtol": 1e-4, "maxcor": 20}
+    # Quadrature goes on from here: some hundredths of a standard error are enough.
+    options = {"maxiter": 300, "ftol": 1e-7, "gtol": 1e-3, "maxcor": 20}
     begin = np.clip(begin, *np.array([(-np.inf if a is None else a, np.inf if b is None else b) for a, b in bounds]).T)
     return minimize(objective, begin, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
