@@ -11,16 +11,19 @@ from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.discovery.proof import (
     beats,
     choose_on_held_out,
+    does_as_well_with_less,
     holds_elsewhere,
     proof_sentence,
     reasons_against,
 )
+from analysis.diagnosis.errors.output_error import gather_evidence
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.starting_hypotheses import within_data
 from analysis.diagnosis.search.verdict import judge
-from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, SEALED_ALONE_ERROR
+from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, PITCHES_SEEN, SEALED_ALONE_ERROR
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.laws.law import Law
 
@@ -49,8 +52,12 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
         # A law too weak for these recordings to fix its numbers takes no other law's name away.
         found, is_open = fewer, False
     rivals = _rivals(context, known)
-    reasons = reasons_against(context, found, rivals)
-    if not all(beats(found.found.after, rival) for rival in rivals):
+    if known.steps and may_stand_for_a_law(context, known):
+        harder = [rival for rival in rivals if not does_as_well_with_less(context, found, rival)]
+    else:
+        harder = rivals
+    reasons = reasons_against(context, found, harder)
+    if not all(beats(found.found.after, rival) for rival in harder):
         reasons = (*reasons, "what the catalogue names leaves hardly more")
     if is_open:
         reasons = (*reasons, "these recordings leave its numbers as good as open")
@@ -67,7 +74,8 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
 
 
 def _needs_law(result: SearchResult) -> bool:
-    """Only whole simulations prove a law; where noise alone is left, there is none to be found."""
+    """Only whole simulations prove a law; where noise alone is left, there is none to be found, unless the names may
+    stand for it."""
     context, found = result.context, result.found
     if (
         context.measure.name != "free simulation"
@@ -76,9 +84,19 @@ def _needs_law(result: SearchResult) -> bool:
         or found.ended_early
     ):
         return False
-    left = found.after if result.judgement.named else found.retuned
+    left = found.after if result.judgement.named and not may_stand_for_a_law(context, found) else found.retuned
     sealed = float(np.nanmax(left.score.test, initial=0.0))
     return found.statistic is None and (left.score.worst_channel > NOISE_ALONE or sealed > SEALED_ALONE_ERROR)
+
+
+def may_stand_for_a_law(context: SearchContext, named: Explanation) -> bool:
+    """Whether names that fit may only approximate a law that the catalogue lacks: several effects, all of which act at
+    the same sites in the same way; or a periodic force of which fewer than two periods were visited."""
+    claims = named.after.fitted.hypothesis.claims
+    if len(claims) > 1:
+        return len({(type(claim.effect.acts), claim.sites) for claim in claims}) == 1
+    evidence = gather_evidence(context.whole, context.tuning, named.after.fitted)[0]
+    return bool(claims) and not within_data(named.after.fitted.hypothesis, evidence, PITCHES_SEEN)
 
 
 def _improves_held_out(found: Explanation) -> bool:

@@ -121,7 +121,7 @@ def search_effects(
     opened = _find_with_opened(first, left, catalogue, progress, time_left)
     adds = _adds_confirmed(first, opened)
     if adds and (judged.named or opened.judgement.verdict == "explained"):
-        return opened
+        return beyond(opened)
     if judged.named:
         return beyond(first)
     return _find_beyond(first, opened, adds, beyond)

@@ -48,15 +48,15 @@ def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = m
     return tuple(hypothesis for found in each for hypothesis in found if within_data(hypothesis, evidence))
 
 
-def within_data(hypothesis: Hypothesis, evidence: Evidence) -> bool:
+def within_data(hypothesis: Hypothesis, evidence: Evidence, pitches: float = 1.0) -> bool:
     """Whether the newest effect's numbers lie within what was recorded: no ripple repeats within less than its pitch of
-    travel, no dead band or limit lies beyond the largest command."""
+    travel, no dead band or limit lies beyond the largest command. pitches: that must have been travelled."""
     claim, used = hypothesis.claims[-1], evidence.used > 0
     for placed in hypothesis.of_claim(len(hypothesis.claims) - 1):
         for name, reached in WITHIN.get(claim.effect.name, {}).items():
             course = (evidence.axis_position if reached == "travel" else evidence.command)[used]
             course = course[:, list(placed.sites)]
-            size = np.ptp(course, axis=0) if reached == "travel" else np.abs(course).max(axis=0)
+            size = np.ptp(course, axis=0) / pitches if reached == "travel" else np.abs(course).max(axis=0)
             if np.isfinite(size).all() and placed.values[name] > float(size.max(initial=0.0)) > 0:
                 return False
     return True
