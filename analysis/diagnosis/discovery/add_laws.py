@@ -21,10 +21,11 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.search.starting_hypotheses import within_data
+from analysis.diagnosis.search.starting_hypotheses import is_within_data
 from analysis.diagnosis.search.verdict import judge
-from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, PITCHES_SEEN, SEALED_ALONE_ERROR
+from analysis.diagnosis.settings import LAW_MOST_ROUNDS, NAMED_ERROR, NOISE_ALONE, PITCHES_SEEN, SEALED_ALONE_ERROR
 from analysis.diagnosis.types import Progress, TimeBudget
+from equalizer.effects.effect import AxisForce
 from equalizer.laws.law import Law
 
 
@@ -34,7 +35,9 @@ def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) ->
     context, known = result.context, result.found
     if not _needs_law(result) or not time_left():
         return result
-    found = discover(context, known, progress, time_left)
+    fits = result.judgement.named and known.after.score.worst_channel <= NOISE_ALONE
+    # Beside names that fit, only a single law is the shorter description.
+    found = discover(context, known, progress, time_left, 1 if fits else LAW_MOST_ROUNDS)
     return result if found is None else weigh_laws(result, found, time_left)
 
 
@@ -90,13 +93,14 @@ def _needs_law(result: SearchResult) -> bool:
 
 
 def may_stand_for_a_law(context: SearchContext, named: Explanation) -> bool:
-    """Whether names that fit may only approximate a law that the catalogue lacks: several effects, all of which act at
-    the same sites in the same way; or a periodic force of which fewer than two periods were visited."""
-    claims = named.after.fitted.hypothesis.claims
-    if len(claims) > 1:
-        return len({(type(claim.effect.acts), claim.sites) for claim in claims}) == 1
-    evidence = gather_evidence(context.whole, context.tuning, named.after.fitted)[0]
-    return bool(claims) and not within_data(named.after.fitted.hypothesis, evidence, PITCHES_SEEN)
+    """Whether names that fit may only approximate a law that the catalogue lacks: several forces on the same axis, or a
+    periodic force of which fewer than two periods were visited."""
+    fitted, claims = named.after.fitted, named.after.fitted.hypothesis.claims
+    forces = all(isinstance(claim.effect.acts, AxisForce) for claim in claims)
+    if len(claims) > 1 and forces and len({claim.sites for claim in claims}) == 1:
+        return True
+    evidence = gather_evidence(context.whole, context.tuning, fitted)[0]
+    return not all(is_within_data(fitted.hypothesis, k, evidence, PITCHES_SEEN) for k in range(len(claims)))
 
 
 def _improves_held_out(found: Explanation) -> bool:

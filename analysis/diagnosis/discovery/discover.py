@@ -76,14 +76,20 @@ class Discovery:
     """Number of laws that fitted alike, of which the last one was chosen by its error on held-out stretches."""
 
 
-def discover(context: SearchContext, known: Explanation, progress: Progress, time_left: TimeBudget) -> Discovery | None:
-    """The laws found, fitted by output error; None where none is worth its numbers. known: what the named effects
-    explain."""
+def discover(
+    context: SearchContext,
+    known: Explanation,
+    progress: Progress,
+    time_left: TimeBudget,
+    most: int = LAW_MOST_ROUNDS,
+) -> Discovery | None:
+    """The laws found, at most `most`, fitted by output error; None where none is worth its numbers. known: what the
+    named effects explain."""
     retuned = known.retuned.fitted
     base = context.candidate(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
     rounds: list[Round] = []
     steps: list[FittedCandidate] = []
-    while len(rounds) < LAW_MOST_ROUNDS and time_left() and base.score.worst_channel > NOISE_ALONE:
+    while len(rounds) < most and time_left() and base.score.worst_channel > NOISE_ALONE:
         progress("looking for a law that has no name", 0.6 + 0.1 * len(rounds))
         found = _find_next_law(context, base.fitted, time_left)
         if found is None or not is_worthwhile(base, found.fitted_candidates[0]):

@@ -10,6 +10,7 @@ from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
+from analysis.diagnosis.search.exchange import exchange_effects
 from analysis.diagnosis.search.explain import Explanation, explain, is_worthwhile
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
@@ -112,10 +113,11 @@ def search_effects(
 ) -> SearchResult:
     """The search for effects with its verdict. beyond: tried where the catalogue leaves a mismatch, with and without
     the part of the held-out samples that is opened where only they show it."""
-    found = _prune_guarded(context, explain(context, catalogue, progress, time_left), time_left)
+    found = _explain_and_prune(context, catalogue, progress, time_left)
     judged = _judge_with_prediction(context, found)
     first = SearchResult(context, found, judged, _remarks(found))
-    left = found.after if judged.named else found.retuned
+    # What fits where it was fitted is kept even if unconfirmed: a second effect may show in the held-out samples alone.
+    left = found.after if judged.named or (found.steps and as_good_as_noise(found)) else found.retuned
     if found.ended_early or found.barred or not shows_there_alone(left.score.test, left):
         return beyond(first)
     opened = _find_with_opened(first, left, catalogue, progress, time_left)
@@ -150,7 +152,7 @@ def _find_with_opened(
     where the others show the mismatch, else the first half of each."""
     milder = first.context.open_milder(left)
     context = first.context.open_half() if milder is None else milder
-    found = _prune_guarded(context, explain(context, catalogue, progress, time_left), time_left)
+    found = _explain_and_prune(context, catalogue, progress, time_left)
     used = TEST_HALF_USED if milder is None else MILDER_TEST_USED
     return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
 
@@ -175,11 +177,19 @@ def _sites(candidate: FittedCandidate) -> set[tuple[str, int]]:
     return {(claim.effect.name, site) for claim in candidate.fitted.hypothesis.claims for site in claim.sites}
 
 
-def _prune_guarded(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """`prune`, which names nothing where it crashes."""
+def _explain_and_prune(
+    context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> Explanation:
+    """Forward selection, exchange and backward elimination; where the last two crash, nothing is named."""
+    found = explain(context, catalogue, progress, time_left)
     nothing = replace(found, after=found.retuned, steps=())
     newest = found.steps[-1].newest if found.steps else ""
-    return context.guard.part(newest, "its last look", lambda: prune(context, found, time_left), nothing)
+
+    def finish() -> Explanation:
+        exchanged = exchange_effects(context, found, catalogue, progress, time_left)
+        return prune(context, exchanged, time_left)
+
+    return context.guard.part(newest, "its last look", finish, nothing)
 
 
 def _remarks(found: Explanation) -> tuple[str, ...]:
