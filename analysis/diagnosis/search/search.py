@@ -37,18 +37,23 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
     """Backward elimination: effects that forward selection added and that are not needed are removed."""
     if found.statistic is not None or context.certain:
         return found
-    if len(found.steps) == 2 and time_left():
-        found = _drop_former(context, found)
+    if len(found.steps) > 1:
+        found = _drop_former(context, found, time_left)
     if context.references is None:
         found = _drop_negligible(context, found)
     return keep_identifiable(context, found, time_left)
 
 
-def _drop_former(context: SearchContext, found: Explanation) -> Explanation:
-    """Of two effects only the later, where it fits as well alone: the earlier may have stood in for it."""
-    alone = without_effect(context, found, 0)
-    kept = is_worthwhile(alone.steps[-1], found.steps[-1]) or not np.isfinite(alone.steps[-1].fitted.cost)
-    return found if kept else alone
+def _drop_former(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
+    """Without the first of the earlier effects that the others fit as well without: it stood in for a later one."""
+    for number in range(len(found.steps) - 1):
+        if not time_left():
+            break
+        others = without_effect(context, found, number)
+        fits = np.isfinite(others.steps[-1].fitted.cost)
+        if fits and not is_worthwhile(others.steps[-1], found.steps[-1]):
+            return others if len(others.steps) < 2 else _drop_former(context, others, time_left)
+    return found
 
 
 def _drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
