@@ -180,6 +180,7 @@ LAW_BEATS = 0.5  # of a catalogue rival's excess that a law may leave at most
 LAW_STABLE = 0.2  # jackknife error of a factor over stretches, as a share; principle: five standard errors from none
 LAW_PLACEBO = 0.5  # of what chance leaves of a shuffled force, that a law may leave of the missing one at most
 LAW_SAME = 0.05  # of what a law foretells: laws that are no further apart are one, written in two ways (issue 16)
+PITCHES_SEEN = 2.0  # of a periodic force, below which another curve may do as well; principle: a period is seen twice
 LAW_COMMAND_TAKEN = 0.5  # of its axis's command, beyond which a force is the balance's trivial solution; by hand
 LAW_NEAR = 0.03  # of a whole or half exponent, that is then no number to be told
 

@@ -11,17 +11,21 @@ from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.discovery.proof import (
     beats,
     choose_on_held_out,
+    does_as_well_with_less,
     holds_elsewhere,
     proof_sentence,
     reasons_against,
 )
+from analysis.diagnosis.errors.output_error import gather_evidence
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.starting_hypotheses import is_within_data
 from analysis.diagnosis.search.verdict import judge
-from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, SEALED_ALONE_ERROR
+from analysis.diagnosis.settings import LAW_MOST_ROUNDS, NAMED_ERROR, NOISE_ALONE, PITCHES_SEEN, SEALED_ALONE_ERROR
 from analysis.diagnosis.types import Progress, TimeBudget
+from equalizer.effects.effect import AxisForce
 from equalizer.laws.law import Law
 
 
@@ -31,7 +35,9 @@ def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) ->
     context, known = result.context, result.found
     if not _needs_law(result) or not time_left():
         return result
-    found = discover(context, known, progress, time_left)
+    fits = result.judgement.named and known.after.score.worst_channel <= NOISE_ALONE
+    # Beside names that fit, only a single law is the shorter description.
+    found = discover(context, known, progress, time_left, 1 if fits else LAW_MOST_ROUNDS)
     return result if found is None else weigh_laws(result, found, time_left)
 
 
@@ -49,8 +55,12 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
         # A law too weak for these recordings to fix its numbers takes no other law's name away.
         found, is_open = fewer, False
     rivals = _rivals(context, known)
-    reasons = reasons_against(context, found, rivals)
-    if not all(beats(found.found.after, rival) for rival in rivals):
+    if known.steps and may_stand_for_a_law(context, known):
+        harder = [rival for rival in rivals if not does_as_well_with_less(context, found, rival)]
+    else:
+        harder = rivals
+    reasons = reasons_against(context, found, harder)
+    if not all(beats(found.found.after, rival) for rival in harder):
         reasons = (*reasons, "what the catalogue names leaves hardly more")
     if is_open:
         reasons = (*reasons, "these recordings leave its numbers as good as open")
@@ -67,7 +77,8 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
 
 
 def _needs_law(result: SearchResult) -> bool:
-    """Only whole simulations prove a law; where noise alone is left, there is none to be found."""
+    """Only whole simulations prove a law; where noise alone is left, there is none to be found, unless the names may
+    stand for it."""
     context, found = result.context, result.found
     if (
         context.measure.name != "free simulation"
@@ -76,9 +87,20 @@ def _needs_law(result: SearchResult) -> bool:
         or found.ended_early
     ):
         return False
-    left = found.after if result.judgement.named else found.retuned
+    left = found.after if result.judgement.named and not may_stand_for_a_law(context, found) else found.retuned
     sealed = float(np.nanmax(left.score.test, initial=0.0))
     return found.statistic is None and (left.score.worst_channel > NOISE_ALONE or sealed > SEALED_ALONE_ERROR)
+
+
+def may_stand_for_a_law(context: SearchContext, named: Explanation) -> bool:
+    """Whether names that fit may only approximate a law that the catalogue lacks: several forces on the same axis, or a
+    periodic force of which fewer than two periods were visited."""
+    fitted, claims = named.after.fitted, named.after.fitted.hypothesis.claims
+    forces = all(isinstance(claim.effect.acts, AxisForce) for claim in claims)
+    if len(claims) > 1 and forces and len({claim.sites for claim in claims}) == 1:
+        return True
+    evidence = gather_evidence(context.whole, context.tuning, fitted)[0]
+    return not all(is_within_data(fitted.hypothesis, k, evidence, PITCHES_SEEN) for k in range(len(claims)))
 
 
 def _improves_held_out(found: Explanation) -> bool:

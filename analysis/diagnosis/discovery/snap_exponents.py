@@ -1,4 +1,5 @@
-"""Rounds a law's exponents to whole or half numbers where their errors allow it, and simplifies the formula."""
+"""Rounds a law's exponents to whole or half numbers where their errors allow it, writes no memory that is shorter than a
+sample, and simplifies the formula."""
 
 import re
 from dataclasses import replace
@@ -16,6 +17,7 @@ from equalizer.effects.discovered_law import law_channels, law_effect, law_value
 from equalizer.laws.law import Law
 from equalizer.laws.roles import roles
 
+_CUBE_WITH_MEMORY = re.compile(r"\b(\w+)\*lag\(\1\*\*2, p(\d+)\)")
 _LIMIT = re.compile(r"(\w+) \+ p0\*\((.+) - \1\)")
 """A signal plus a share of a soft limit of it less itself (`grammar.bent_terms`)."""
 
@@ -44,7 +46,8 @@ def _with_simple_exponents(context: SearchContext, whole: Hypothesis, errors: np
         if law is None:
             parts.append(_single_claim(whole, number))
             continue
-        simple = _simplify_exponents(law, own)
+        simple = _without_short_memory(law, 1 / recording.sample_rate_hz)
+        simple = _simplify_exponents(law, own) if simple is law else simple
         changed |= simple is not law
         effect = law_effect(simple, law_channels(recording))
         parts.append(hypothesis_of_claim(Claim(effect, "one", claim.sites), [law_values(simple)]))
@@ -56,6 +59,16 @@ def _with_simple_exponents(context: SearchContext, whole: Hypothesis, errors: np
 def _single_claim(whole: Hypothesis, number: int) -> Hypothesis:
     claim = whole.claims[number]
     return hypothesis_of_claim(claim, [dict(placed.values) for placed in whole.of_claim(number)])
+
+
+def _without_short_memory(law: Law, sample_s: float) -> Law:
+    """The law with the cube of a signal for the signal times its lagged square where the lag is less than a sample."""
+    found = _CUBE_WITH_MEMORY.search(law.expression)
+    if found is None or law.numbers[int(found[2])] >= sample_s:
+        return law
+    # The number is written in and the place that held it with it, so that those after it move up.
+    short = substitute_number(law, int(found[2]), 0.0)
+    return replace(short, expression=re.sub(r"\b(\w+)\*lag\(\1\*\*2, 0\)", r"\1**3", short.expression))
 
 
 def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:

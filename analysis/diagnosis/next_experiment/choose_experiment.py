@@ -1,7 +1,8 @@
-"""Optimal experiment to discriminate two rivals: where they differ most after the rival was re-tuned.
+"""Optimal experiments to discriminate rivals: where they differ most after the rival was re-tuned.
 
 Hunter and Reiner (1965), with the information of the existing recordings as the prior of the rival's parameters. A
-difference that re-tuning of the rival removes within its tolerance does not count.
+difference that re-tuning of the rival removes within its tolerance does not count. Gains of several recordings add up:
+a rival that is re-tuned to all of them at once leaves no less than the sum of what it leaves of each.
 """
 
 from collections.abc import Sequence
@@ -46,24 +47,66 @@ class PredictedGain:
 def predict_gains(
     bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, menu: Sequence[Experiment]
 ) -> tuple[PredictedGain, ...]:
-    """The experiments with their gains, the largest gain per cost first, insufficient ones last. known: (t + numbers,
-    t + numbers), information matrix of the rival's numbers from what has been recorded, calibration included."""
-    found = [PredictedGain(experiment, _gain(bench, named, rival, known, experiment)) for experiment in menu]
-    return tuple(
-        sorted(found, key=lambda foreseen: (foreseen.gain < TELLING_GAIN, -foreseen.gain / foreseen.experiment.minutes))
-    )
+    """The experiments with their gains, in the menu's order. known: (t + numbers, t + numbers), information matrix of
+    the rival's numbers from what has been recorded, calibration included."""
+    return tuple(PredictedGain(experiment, _gain(bench, named, rival, known, experiment)) for experiment in menu)
 
 
-def as_document(best: PredictedGain, names: tuple[str, str]) -> NextExperiment | None:
-    """The proposed experiment for the document; None where even the best recording would not tell the rivals apart."""
-    if best.gain < TELLING_GAIN:
+MOST_TOGETHER = 3
+"""Recordings that are proposed at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExperimentSet:
+    experiments: tuple[Experiment, ...]
+    told: tuple[int, ...]
+    """Which rivals they discriminate from what is named, by their place."""
+    gain: float
+    """Smallest expected log likelihood ratio, over these rivals."""
+
+
+def choose_set(foreseen: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
+    """The recordings that discriminate as many rivals as the menu can; empty where it discriminates none. A single
+    one where one is enough, that with the largest gain per cost; else the one first that adds most, per cost, to what
+    is still missing (greedy set cover). foreseen: per rival, the gains of one menu, in its order."""
+    gains = np.array([[each.gain for each in of] for of in foreseen]).reshape(len(foreseen), -1)
+    most = np.sort(gains, axis=1)[:, -MOST_TOGETHER:].sum(axis=1)
+    within_reach = np.flatnonzero(most >= TELLING_GAIN)
+    if not len(within_reach):
+        return ExperimentSet((), (), 0.0)
+    menu = [each.experiment for each in foreseen[0]]
+    cost = np.array([experiment.minutes for experiment in menu])
+    wanted = gains[within_reach]
+    chosen: list[int] = []
+    weakest = wanted.min(axis=0)
+    if (weakest >= TELLING_GAIN).any():
+        chosen = [int(np.argmax(np.where(weakest >= TELLING_GAIN, weakest / cost, -np.inf)))]
+    while len(chosen) < MOST_TOGETHER and (have := wanted[:, chosen].sum(axis=1)).min() < TELLING_GAIN:
+        added = np.minimum(wanted, np.maximum(TELLING_GAIN - have, 0.0)[:, None]).sum(axis=0) / cost
+        added[chosen] = -np.inf
+        chosen.append(int(np.argmax(added)))
+    reached = wanted[:, chosen].sum(axis=1)
+    told = reached >= TELLING_GAIN
+    if not told.any():
+        return ExperimentSet((), (), 0.0)
+    experiments = tuple(menu[number] for number in chosen)
+    return ExperimentSet(experiments, tuple(within_reach[told].tolist()), float(reached[told].min()))
+
+
+def as_document(best: ExperimentSet, names: Sequence[str]) -> NextExperiment | None:
+    """The proposed recordings for the document; None where even the best would not tell the rivals apart. names: of
+    what is named, then of each rival."""
+    if not best.experiments:
         return None
-    said = "; the recording's meta must say the weight (added_mass_kg, or added_inertia_kg_m2)"
+    weighted = any(experiment.added for experiment in best.experiments)
+    said = "; the recording's meta must say the weight (added_mass_kg, or added_inertia_kg_m2)" if weighted else ""
+    first, *more = (experiment.words for experiment in best.experiments)
+    where = "in these recordings together" if more else "there"
     return NextExperiment(
-        command=f"record {best.experiment.words}",
-        splits=names,
-        why=f"there the two differ by more than the noise and the tolerances can hide: the right one would win by "
-        f"{best.gain:.3g} in log likelihood{said if best.experiment.added else ''}",
+        command="; then ".join([f"record {first}", *more]),
+        splits=(names[0], *dict.fromkeys(names[1 + number] for number in best.told)),
+        why=f"{where} they differ by more than the noise and the tolerances can hide: the right one would win by at "
+        f"least {best.gain:.3g} in log likelihood{said}",
     )
 
 

@@ -18,6 +18,8 @@ USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
 """Highest frequency of sweeps: absolute, or as a share of the sample rate."""
 ADDED_SHARE = 0.12
 """Known weight to attach, relative to the grounded mass."""
+RELEASES = 4
+"""How often the handle is let go, to either side in turn."""
 _FADE = 1 / 16
 """Fade at both ends, over an experiment's usual length."""
 
@@ -28,7 +30,7 @@ class Experiment:
     """What to record; ends the sentence "record …"."""
     commands: FloatArray
     """(n, m)"""
-    kind: Literal["sweep", "slow"]
+    kind: Literal["sweep", "slow", "step"]
     """Kind of the recording's segment."""
     added: float = 0.0
     """Mass (or inertia) to attach beforehand."""
@@ -55,8 +57,27 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
     def slow(of: float) -> FloatArray:
         return along(sine(slow_hz, of, int(length_s * sample_rate_hz), sample_rate_hz))
 
+    def elsewhere(of: float) -> FloatArray:
+        wave = log_sweep(slowest_hz, usual_hz, of, int(length_s * sample_rate_hz), sample_rate_hz)
+        return along(wave + of)
+
+    def released(of: float) -> FloatArray:
+        return np.outer(_releases(of, int(length_s * sample_rate_hz)), np.arange(model.inputs) == axis)
+
     sweep, wide = (f"a sweep from {slowest_hz:.3g} to {end:.3g} Hz" for end in (usual_hz, fastest_hz))
     levels = {1: "the highest level so far", 4: "a quarter of the highest level", 20: "a twentieth of it"}
+    held = (
+        Experiment(
+            f"{sweep} at {level / 2:.3g} on top of a constant push of as much, which moves it to another place",
+            elsewhere(level / 2),
+            "sweep",
+        ),
+        Experiment(
+            f"{RELEASES} releases: a push that grows slowly to {level:.3g}, to either side in turn, and ends at once",
+            released(level),
+            "step",
+        ),
+    )
     return (
         *(Experiment(f"{sweep} at {level / n:.3g}, {words}", swept(level / n), "sweep") for n, words in levels.items()),
         Experiment(f"{wide} at {level:.3g}", swept(level, fastest_hz), "sweep"),
@@ -72,10 +93,26 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
             "sweep",
             minutes=1.5,
         ),
+        *(held if _is_held(model, axis) else ()),
         Experiment(
             f"{sweep} at {level:.3g} with {_weight_words(model, added)}", swept(level), "sweep", added, minutes=3.0
         ),
     )
+
+
+def _is_held(model: MechanicalModel, axis: int) -> bool:
+    """Whether a stiffness holds the axis: a constant force would drive another one away."""
+    axes = driven_axes(model)[:, axis]
+    return bool(axes @ model.stiffness @ axes > 0)
+
+
+def _releases(level: float, samples: int) -> FloatArray:
+    """(n,): ramps up to the level, to either side in turn, each followed by as long a rest: after it the device moves
+    freely."""
+    half = samples // (2 * RELEASES)
+    ramp = np.append(np.linspace(0.0, level, half), np.zeros(half))
+    signs = [1.0 if number % 2 == 0 else -1.0 for number in range(RELEASES)]
+    return np.concatenate([sign * ramp for sign in signs])
 
 
 def _grounded_mass(model: MechanicalModel) -> float:

@@ -1,12 +1,18 @@
-"""Proposes the next recording for a finished search whose data could not distinguish two effects."""
+"""Proposes the next recordings for a finished search whose data could not distinguish effects."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from analysis.diagnosis.document import NextExperiment
-from analysis.diagnosis.errors.output_error import hypothesis_sensitivity, residuals_to_fit
-from analysis.diagnosis.next_experiment.choose_experiment import Bench, PredictedGain, as_document, predict_gains
+from analysis.diagnosis.errors.output_error import Fitted, hypothesis_sensitivity, residuals_to_fit
+from analysis.diagnosis.next_experiment.choose_experiment import (
+    Bench,
+    ExperimentSet,
+    as_document,
+    choose_set,
+    predict_gains,
+)
 from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
@@ -14,58 +20,66 @@ from analysis.diagnosis.search.search_context import FittedCandidate, SearchCont
 from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
+MOST_RIVALS = 3
+"""Rivals whose experiments are simulated; each takes a second or more."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
-    """The menu's predicted gains for two rivals that the data do not distinguish."""
+    """What the menu can tell of the rivals that the data do not distinguish from what is named."""
 
-    names: tuple[str, str]
+    names: tuple[str, ...]
+    """What is named, then its rivals."""
     axis: int
     level: float
     """Level of the menu's commands."""
-    foreseen: tuple[PredictedGain, ...]
-    """All of the menu, the best first."""
+    chosen: ExperimentSet
 
     @property
     def document(self) -> NextExperiment | None:
-        """The best experiment; None where none would discriminate."""
-        return as_document(self.foreseen[0], self.names)
+        """The proposed recordings; None where none would discriminate."""
+        return as_document(self.chosen, self.names)
 
 
 def propose_experiment(context: SearchContext, found: Explanation) -> Proposal | None:
-    """For the first pair of rivals that some recording would tell apart, else for the last pair; None where no rival
-    is as good as what is named."""
+    """For the first effect of whose rivals some recording would tell one apart, else for the last that has rivals;
+    None where no rival is as good as what is named."""
     proposal = None
     for fitted_candidates in found.rounds[: len(found.steps)]:
-        rival = _best_rival(fitted_candidates)
-        if rival is None:
-            continue
-        named, other = fitted_candidates[0].fitted, rival.fitted
-        claims = named.hypothesis.claims[-1], other.hypothesis.claims[-1]
-        if any(claim.effect.with_conditions for each in (named, other) for claim in each.hypothesis.claims):
+        rivals = _rivals(fitted_candidates)
+        named = fitted_candidates[0].fitted
+        if not rivals or _has_conditions(named):
             continue  # no experiment of the menu sets a condition
+        claim = named.hypothesis.claims[-1]
         record = context.measure.records[0]
-        sensed = place_of_effect(claims[0].effect) == "sensor"
-        axis = min(claims[0].sites[0], record.command.shape[1] - 1) if sensed else claims[0].sites[0]
+        sensed = place_of_effect(claim.effect) == "sensor"
+        axis = min(claim.sites[0], record.command.shape[1] - 1) if sensed else claim.sites[0]
         level = float(np.abs(record.command).max())
         rate_hz = record.recording.sample_rate_hz
         bench = Bench(context.tuning, rate_hz, record.recording.hold, context.measure.noise)
         menu = experiment_menu(context.tuning.model, rate_hz, axis, level)
-        foreseen = predict_gains(bench, named, other, _recorded_information(context, rival), menu)
-        proposal = Proposal((claims[0].effect.name, claims[1].effect.name), axis, level, foreseen)
+        foreseen = [
+            predict_gains(bench, named, rival.fitted, _recorded_information(context, rival), menu) for rival in rivals
+        ]
+        names = (claim.effect.name, *(rival.newest for rival in rivals))
+        proposal = Proposal(names, axis, level, choose_set(foreseen))
         if proposal.document is not None:
             break
     return proposal
 
 
-def _best_rival(fitted_candidates: tuple[FittedCandidate, ...]) -> FittedCandidate | None:
-    """The best rival that the data do not distinguish from the named effect."""
+def _rivals(fitted_candidates: tuple[FittedCandidate, ...]) -> list[FittedCandidate]:
+    """The best rivals, each of another name, that the data do not distinguish from the named effect."""
     best = fitted_candidates[0]
-    name = best.newest
+    found: dict[str, FittedCandidate] = {}
     for other in fitted_candidates[1:]:
-        if other.newest != name and both_stand(best, other):
-            return other
-    return None
+        if other.newest != best.newest and both_stand(best, other) and not _has_conditions(other.fitted):
+            found.setdefault(other.newest, other)
+    return list(found.values())[:MOST_RIVALS]
+
+
+def _has_conditions(fitted: Fitted) -> bool:
+    return any(claim.effect.with_conditions for claim in fitted.hypothesis.claims)
 
 
 def _recorded_information(context: SearchContext, candidate: FittedCandidate) -> FloatArray:

@@ -152,7 +152,7 @@ def explain(
     ):
         step = Step(f"looking for the {_ORDINALS[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
         try:
-            tried = _find_next_effect(within_time, catalogue, base.fitted, step)
+            tried = find_next_effect(within_time, catalogue, base.fitted, step)
         except OutOfTimeError:
             ended_early = True
             break
@@ -196,9 +196,10 @@ class Step:
         self.progress(self.what, self.begun + 0.3 * share)
 
 
-def _find_next_effect(
+def find_next_effect(
     context: SearchContext, catalogue: Sequence[Effect], base: Fitted, step: Step
 ) -> tuple[FittedCandidate, ...]:
+    """The candidates for one more effect beside those of `base`, the best first."""
     step.at(0.0)
     evidence = gather_evidence(context.measure, context.tuning, base)[0]
     told = [effect for effect in catalogue if context.measure.can_observe(effect)]

@@ -10,6 +10,7 @@ from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
+from analysis.diagnosis.search.exchange import exchange_effects
 from analysis.diagnosis.search.explain import Explanation, explain, is_worthwhile
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
@@ -36,18 +37,23 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
     """Backward elimination: effects that forward selection added and that are not needed are removed."""
     if found.statistic is not None or context.certain:
         return found
-    if len(found.steps) == 2 and time_left():
-        found = _drop_former(context, found)
+    if len(found.steps) > 1:
+        found = _drop_former(context, found, time_left)
     if context.references is None:
         found = _drop_negligible(context, found)
     return keep_identifiable(context, found, time_left)
 
 
-def _drop_former(context: SearchContext, found: Explanation) -> Explanation:
-    """Of two effects only the later, where it fits as well alone: the earlier may have stood in for it."""
-    alone = without_effect(context, found, 0)
-    kept = is_worthwhile(alone.steps[-1], found.steps[-1]) or not np.isfinite(alone.steps[-1].fitted.cost)
-    return found if kept else alone
+def _drop_former(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
+    """Without the first of the earlier effects that the others fit as well without: it stood in for a later one."""
+    for number in range(len(found.steps) - 1):
+        if not time_left():
+            break
+        others = without_effect(context, found, number)
+        fits = np.isfinite(others.steps[-1].fitted.cost)
+        if fits and not is_worthwhile(others.steps[-1], found.steps[-1]):
+            return others if len(others.steps) < 2 else _drop_former(context, others, time_left)
+    return found
 
 
 def _drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
@@ -112,16 +118,17 @@ def search_effects(
 ) -> SearchResult:
     """The search for effects with its verdict. beyond: tried where the catalogue leaves a mismatch, with and without
     the part of the held-out samples that is opened where only they show it."""
-    found = _prune_guarded(context, explain(context, catalogue, progress, time_left), time_left)
+    found = _explain_and_prune(context, catalogue, progress, time_left)
     judged = _judge_with_prediction(context, found)
     first = SearchResult(context, found, judged, _remarks(found))
-    left = found.after if judged.named else found.retuned
+    # What fits where it was fitted is kept even if unconfirmed: a second effect may show in the held-out samples alone.
+    left = found.after if judged.named or (found.steps and as_good_as_noise(found)) else found.retuned
     if found.ended_early or found.barred or not shows_there_alone(left.score.test, left):
         return beyond(first)
     opened = _find_with_opened(first, left, catalogue, progress, time_left)
     adds = _adds_confirmed(first, opened)
     if adds and (judged.named or opened.judgement.verdict == "explained"):
-        return opened
+        return beyond(opened)
     if judged.named:
         return beyond(first)
     return _find_beyond(first, opened, adds, beyond)
@@ -150,7 +157,7 @@ def _find_with_opened(
     where the others show the mismatch, else the first half of each."""
     milder = first.context.open_milder(left)
     context = first.context.open_half() if milder is None else milder
-    found = _prune_guarded(context, explain(context, catalogue, progress, time_left), time_left)
+    found = _explain_and_prune(context, catalogue, progress, time_left)
     used = TEST_HALF_USED if milder is None else MILDER_TEST_USED
     return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
 
@@ -175,11 +182,19 @@ def _sites(candidate: FittedCandidate) -> set[tuple[str, int]]:
     return {(claim.effect.name, site) for claim in candidate.fitted.hypothesis.claims for site in claim.sites}
 
 
-def _prune_guarded(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """`prune`, which names nothing where it crashes."""
+def _explain_and_prune(
+    context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> Explanation:
+    """Forward selection, exchange and backward elimination; where the last two crash, nothing is named."""
+    found = explain(context, catalogue, progress, time_left)
     nothing = replace(found, after=found.retuned, steps=())
     newest = found.steps[-1].newest if found.steps else ""
-    return context.guard.part(newest, "its last look", lambda: prune(context, found, time_left), nothing)
+
+    def finish() -> Explanation:
+        exchanged = exchange_effects(context, found, catalogue, progress, time_left)
+        return prune(context, exchanged, time_left)
+
+    return context.guard.part(newest, "its last look", finish, nothing)
 
 
 def _remarks(found: Explanation) -> tuple[str, ...]:

@@ -51,12 +51,17 @@ def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = m
 def within_data(hypothesis: Hypothesis, evidence: Evidence) -> bool:
     """Whether the newest effect's numbers lie within what was recorded: no ripple repeats within less than its pitch of
     travel, no dead band or limit lies beyond the largest command."""
-    claim, used = hypothesis.claims[-1], evidence.used > 0
-    for placed in hypothesis.of_claim(len(hypothesis.claims) - 1):
-        for name, reached in WITHIN.get(claim.effect.name, {}).items():
-            course = (evidence.axis_position if reached == "travel" else evidence.command)[used]
-            course = course[:, list(placed.sites)]
-            size = np.ptp(course, axis=0) if reached == "travel" else np.abs(course).max(axis=0)
+    return is_within_data(hypothesis, len(hypothesis.claims) - 1, evidence)
+
+
+def is_within_data(hypothesis: Hypothesis, number: int, evidence: Evidence, pitches: float = 1.0) -> bool:
+    """Whether the numbers of the hypothesis's claim `number` lie within what was recorded. pitches: of a ripple that
+    must have been travelled."""
+    limits, used = WITHIN.get(hypothesis.claims[number].effect.name, {}), evidence.used > 0
+    for placed in hypothesis.of_claim(number):
+        for name, reached in limits.items():
+            signal = (evidence.axis_position if reached == "travel" else evidence.command)[used][:, list(placed.sites)]
+            size = np.ptp(signal, axis=0) / pitches if reached == "travel" else np.abs(signal).max(axis=0)
             if np.isfinite(size).all() and placed.values[name] > float(size.max(initial=0.0)) > 0:
                 return False
     return True

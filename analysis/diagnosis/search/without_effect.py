@@ -19,7 +19,9 @@ def without_effect(context: SearchContext, found: Explanation, number: int) -> E
         return replace(found, after=context.with_test_score(earlier[-1]), rounds=found.rounds[:number], steps=earlier)
     alone = [_without(context, candidate, number) for candidate in later]
     alone[-1] = context.candidate(refine(context, alone[-1].fitted))
-    others = [candidate for candidate in found.rounds[number] if candidate.newest != alone[0].newest]
+    # Beside effects that follow, rivals of this one were not compared.
+    rivals = found.rounds[number] if len(alone) == 1 else ()
+    others = [candidate for candidate in rivals if candidate.newest != alone[0].newest]
     rounds = (*found.rounds[:number], (alone[0], *others), *found.rounds[number + 2 :])
     return replace(found, after=context.with_test_score(alone[-1]), rounds=rounds, steps=(*earlier, *alone))
 

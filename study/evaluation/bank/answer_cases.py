@@ -139,7 +139,7 @@ def _diagnose_case(place: Path) -> dict[str, Any]:
         "remarks": list(found.remarks),
     }
     if (proposal := found.proposal) is not None:
-        best = proposal.document and proposal.foreseen[0].experiment.words
+        best = [experiment.words for experiment in proposal.chosen.experiments]
         said["proposal"] = {"axis": proposal.axis, "level": proposal.level, "best": best}
     return said
 

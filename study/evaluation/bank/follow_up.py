@@ -1,7 +1,7 @@
 """Follow-up experiments for cases whose diagnosis returned several effects that the data could not separate.
 
-The sealed device plays the experiment that the diagnosis proposed and, for comparison, one drawn at random from the
-same menu. Separate processes diagnose both.
+The sealed device plays the experiments that the diagnosis proposed and, for comparison, as many drawn at random from
+the same menu. Separate processes diagnose both.
 """
 
 import json
@@ -29,7 +29,7 @@ from study.store.formats.recording_file import write_recording
 
 NEXT = "next"
 """Folder of the follow-up cases: a bank of its own, whose labels name the case they follow."""
-FURTHER = "recording_2.h5"
+FURTHER = "recording_{}.h5"
 PROPOSED, DRAWN = "proposed", "drawn"
 NOISE_SEED = 7
 
@@ -65,7 +65,8 @@ def follow_up(
         done += 1
         if not keep:
             forget_recording(again.open / name)
-            (again.open / name / FURTHER).unlink(missing_ok=True)
+            for further in (again.open / name).glob(FURTHER.format("*")):
+                further.unlink()
         on_done(done, len(names))
 
     ask_engine(again, names, workers, on_answered)
@@ -82,14 +83,16 @@ def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcom
     if proposal is not None:
         model = read_mechanical_model(place / MODEL)
         menu = experiment_menu(model, RATE_HZ, proposal["axis"], proposal["level"])
-        drawn = menu[int(np.random.default_rng([plan.seed, start.number, NOISE_SEED]).integers(len(menu)))]
-        wanted = [(DRAWN, drawn), *((PROPOSED, each) for each in menu if each.words == proposal["best"])]
-        label |= {which: _write_case(again, plan, (first, place), experiment) for which, experiment in wanted}
+        proposed = [each for each in menu if each.words in proposal["best"]]
+        order = np.random.default_rng([plan.seed, start.number, NOISE_SEED]).permutation(len(menu))
+        drawn = [menu[number] for number in order[: max(len(proposed), 1)]]
+        wanted = {DRAWN: drawn} | ({PROPOSED: proposed} if proposed else {})
+        label |= {which: _write_case(again, plan, (first, place), several) for which, several in wanted.items()}
     write_text(again.label(start.number), json.dumps(label, indent=1) + "\n")
 
 
 def _write_case(
-    again: ProofFolder, plan: BankPlan, start: tuple[dict[str, Any], Path], experiment: Experiment
+    again: ProofFolder, plan: BankPlan, start: tuple[dict[str, Any], Path], experiments: Sequence[Experiment]
 ) -> dict[str, Any]:
     """Write one follow-up case and return its part of the label. The first recording is drawn again and must equal
     the one that was answered."""
@@ -98,13 +101,14 @@ def _write_case(
     place = again.open / name
     place.mkdir()
     case = redraw_recording(place, plan, label)
-    further = case.again(experiment.commands, experiment.kind, experiment.added, NOISE_SEED)
-    write_recording(place / FURTHER, further, precision="float32")
+    for number, each in enumerate(experiments):
+        further = case.again(each.commands, each.kind, each.added, NOISE_SEED + number)
+        write_recording(place / FURTHER.format(number + 2), further, precision="float32")
     for kept in (MODEL, SETTINGS):
         write_text(place / kept, read_text(first / kept))
     return {
         "name": name,
-        "words": experiment.words,
+        "words": "; ".join(each.words for each in experiments),
         "recording_sha256": sha256_of(place / RECORDING),
         "model_sha256": sha256_of(place / MODEL),
         "others_sha256": others_sha256(place),

@@ -1,4 +1,4 @@
-"""The proposed recording tells an invented pair apart, and says so where none of the menu would."""
+"""The proposed recordings tell invented rivals apart, and nothing is proposed where none of the menu would."""
 
 from dataclasses import replace
 
@@ -9,7 +9,14 @@ from analysis.diagnosis.data.recorded_conditions import add_mass
 from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.next_experiment.choose_experiment import Bench, as_document, predict_gains
+from analysis.diagnosis.next_experiment.choose_experiment import (
+    MOST_TOGETHER,
+    Bench,
+    PredictedGain,
+    as_document,
+    choose_set,
+    predict_gains,
+)
 from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
 from analysis.diagnosis.settings import TELLING_GAIN
 from equalizer.effects.catalogue import EFFECTS
@@ -68,10 +75,12 @@ def friction():
 
 
 def test_dry_friction_and_presliding_are_distinguished_by_the_proposed_recording(friction):
-    bench, (named, rival), menu = friction
-    proposed = as_document(menu[0], NAMES)
+    bench, (named, rival), gains = friction
+    chosen = choose_set([gains])
+    proposed = as_document(chosen, NAMES)
     assert proposed is not None and proposed.splits == NAMES
-    command = menu[0].experiment.commands
+    (experiment,) = chosen.experiments
+    command = experiment.commands
     played = [
         simulate_mechanism(bench.tuning.model, command, RATE_HZ, each.hypothesis.placed_effects())
         for each in (named, rival)
@@ -82,17 +91,65 @@ def test_dry_friction_and_presliding_are_distinguished_by_the_proposed_recording
     assert cost[1] - cost[0] > 2 * TELLING_GAIN
 
 
-def test_what_tells_most_for_its_cost_comes_first(friction):
-    _, _, menu = friction
-    worth = [each.gain / each.experiment.minutes for each in menu]
-    assert worth == sorted(worth, reverse=True)
-    assert worth[0] > 3 * worth[-1]
+def test_of_recordings_that_tell_alone_the_one_with_the_largest_gain_for_its_cost_is_chosen(friction):
+    _, _, gains = friction
+    (chosen,) = choose_set([gains]).experiments
+    worth = {each.experiment.words: each.gain / each.experiment.minutes for each in gains if each.gain >= TELLING_GAIN}
+    assert worth[chosen.words] == max(worth.values()) > 3 * min(each.gain / each.experiment.minutes for each in gains)
 
 
 def test_a_law_and_itself_are_never_told_apart(friction):
     bench, (named, _), _ = friction
     same = foreseen(bench, named, named)
-    assert as_document(same[0], (NAMES[0], NAMES[0])) is None
+    assert as_document(choose_set([same]), (NAMES[0], NAMES[0])) is None
+
+
+def gains_of(*rows):
+    """Per rival, invented gains of the first recordings of a menu."""
+    menu = experiment_menu(bench_of().tuning.model, RATE_HZ, 0, LEVEL_N)
+    return [[PredictedGain(menu[number], gain) for number, gain in enumerate(row)] for row in rows]
+
+
+def words_of(chosen):
+    menu = [each.words for each in experiment_menu(bench_of().tuning.model, RATE_HZ, 0, LEVEL_N)]
+    return [menu.index(experiment.words) for experiment in chosen.experiments]
+
+
+TELLS, HALF = 3 * TELLING_GAIN, 0.6 * TELLING_GAIN
+
+
+def test_one_recording_that_tells_every_rival_is_preferred_to_two():
+    chosen = choose_set(gains_of([9 * TELLS, 0, TELLS], [0, 9 * TELLS, TELLS]))
+    assert words_of(chosen) == [2]
+    assert chosen.told == (0, 1)
+    assert chosen.gain == pytest.approx(TELLS)
+
+
+def test_rivals_that_no_recording_tells_at_once_need_two():
+    chosen = choose_set(gains_of([TELLS, 0, 0], [0, 0, TELLS]))
+    assert sorted(words_of(chosen)) == [0, 2]
+    assert chosen.told == (0, 1)
+
+
+def test_gains_of_several_recordings_add_up():
+    chosen = choose_set(gains_of([HALF, 0, HALF]))
+    assert sorted(words_of(chosen)) == [0, 2]
+    assert chosen.gain == pytest.approx(2 * HALF)
+    said = as_document(chosen, NAMES)
+    assert said.command.count("; then ") == 1
+    assert "together" in said.why
+
+
+def test_a_rival_that_nothing_tells_does_not_hinder_the_others():
+    chosen = choose_set(gains_of([0.1, 0.1, 0.1], [0, TELLS, 0]))
+    assert words_of(chosen) == [1]
+    assert as_document(chosen, ("a", "b", "c")).splits == ("a", "c")
+
+
+def test_no_more_recordings_are_proposed_than_a_laboratory_would_make():
+    small = 0.3 * TELLING_GAIN
+    assert choose_set(gains_of([small, small, small, small])).experiments == ()
+    assert len(choose_set(gains_of(*np.diag([TELLS] * 5).tolist())).experiments) == MOST_TOGETHER
 
 
 ADDED_KG, GAIN = 0.012, 0.955
@@ -112,29 +169,31 @@ def mass_or_gain(tolerance, fitted=True):
 
 
 def test_a_weight_and_a_weak_motor_are_distinguished_where_the_calibration_is_tight():
-    menu = foreseen(*mass_or_gain(Tolerance(1e-4, 0.01, 0.1, 0.01), fitted=False))
-    assert as_document(menu[0], ("added_mass", "force_gain")) is not None
+    gains = foreseen(*mass_or_gain(Tolerance(1e-4, 0.01, 0.1, 0.01), fitted=False))
+    assert as_document(choose_set([gains]), ("added_mass", "force_gain")) is not None
 
 
 def test_what_the_tolerance_can_hide_tells_nothing():
-    menu = foreseen(*mass_or_gain(LOOSE))
-    assert as_document(menu[0], ("added_mass", "force_gain")) is None
+    gains = foreseen(*mass_or_gain(LOOSE))
+    assert as_document(choose_set([gains]), ("added_mass", "force_gain")) is None
 
 
 def test_a_weight_strapped_on_tells_what_no_louder_sweep_can():
     bench, named, rival = mass_or_gain(LOOSE)
     menu = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
     size = len(bench.tuning.names) + 1
-    first, *others = predict_gains(bench, named, rival, np.diag([1e9] * size), menu)
-    assert "strapped to the handle" in first.experiment.words
-    assert first.gain > TELLING_GAIN
-    assert all(other.gain < first.gain / 3 for other in others)
+    gains = predict_gains(bench, named, rival, np.diag([1e9] * size), menu)
+    *others, weight = gains
+    (chosen,) = choose_set([gains]).experiments
+    assert "strapped to the handle" in chosen.words
+    assert weight.gain > TELLING_GAIN
+    assert all(other.gain < weight.gain / 3 for other in others)
 
 
 def test_what_was_recorded_so_far_holds_the_rival(friction):
-    bench, (named, rival), menu = friction
+    bench, (named, rival), gains = friction
     held = foreseen(bench, named, rival, numbers=1e12)
-    assert held[0].gain >= menu[0].gain
+    assert max(each.gain for each in held) >= max(each.gain for each in gains)
 
 
 def test_nothing_louder_than_before_is_proposed():
@@ -157,6 +216,27 @@ def test_an_informative_expensive_recording_ranks_before_a_cheap_uninformative_o
     sweep, *_, weight = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
     known = np.diag([1e9] * (len(bench.tuning.names) + 1))
     dear = replace(weight, minutes=1e6)
-    first, second = predict_gains(bench, named, rival, known, (replace(sweep, commands=sweep.commands / 50), dear))
-    assert first.experiment is dear
-    assert second.gain < TELLING_GAIN < first.gain
+    small = replace(sweep, commands=sweep.commands / 50)
+    gains = predict_gains(bench, named, rival, known, (small, dear))
+    assert choose_set([gains]).experiments == (dear,)
+    assert gains[0].gain < TELLING_GAIN < gains[1].gain
+
+
+def test_an_axis_that_no_stiffness_holds_is_not_pushed_away():
+    held = bench_of().tuning.model
+    free = replace(held, stiffness=np.zeros((1, 1)))
+    pushes = [
+        sum(np.abs(each.commands.mean()) > 0.1 for each in experiment_menu(m, RATE_HZ, 0, LEVEL_N))
+        for m in (held, free)
+    ]
+    assert pushes == [1, 0]
+    assert [each.kind for each in experiment_menu(held, RATE_HZ, 0, LEVEL_N)].count("step") == 1
+
+
+def test_a_release_ends_at_once_and_leaves_time_to_move_freely():
+    (release,) = (each for each in experiment_menu(bench_of().tuning.model, RATE_HZ, 0, LEVEL_N) if each.kind == "step")
+    command = release.commands[:, 0]
+    (ends,) = np.nonzero(np.abs(np.diff(command)) > 0.9 * LEVEL_N)
+    assert len(ends) == 4
+    assert np.sign(command[ends]).tolist() == [1, -1, 1, -1]
+    assert all((command[end + 1 : end + 900] == 0).all() for end in ends)

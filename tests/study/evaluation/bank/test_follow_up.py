@@ -41,7 +41,7 @@ def answer(place, effect="sensor_gain", rival="force_gain", best=""):
     said = {
         "diagnosis": diagnosis,
         "channel_errors": {"retuned": {"ay": 9.0}},
-        "proposal": {"axis": 0, "level": LEVEL_N, "best": best or None},
+        "proposal": {"axis": 0, "level": LEVEL_N, "best": [best] if best else []},
         "recording_sha256": sha256_of(place / RECORDING),
         "model_sha256": sha256_of(place / MODEL),
     }
@@ -103,7 +103,7 @@ def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_pl
     with pytest.raises(StudyError, match="answer.json"):  # without an answer
         follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
     (name,) = asked
-    assert (folder.path / NEXT / "open" / name / FURTHER).exists()
+    assert (folder.path / NEXT / "open" / name / FURTHER.format(2)).exists()
 
 
 def test_a_start_with_one_name_is_not_taken_up_again(tmp_path):

@@ -1,0 +1,129 @@
+"""Fits sums of terms as laws by output error, and puts the plainest of those that fit alike first."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import product
+from typing import TypeVar
+
+import numpy as np
+
+from analysis.diagnosis.discovery.antisymmetric_pairs import as_pair, coupling_taken, is_coupling, pair_starts
+from analysis.diagnosis.discovery.fit_sum import Sum
+from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, laws_of
+from analysis.diagnosis.discovery.snap_exponents import is_whole_limit
+from analysis.diagnosis.errors.hypothesis import combine
+from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
+from analysis.diagnosis.search.compare_candidates import refine
+from analysis.diagnosis.search.same_within_errors import inseparable
+from analysis.diagnosis.search.search_context import FIRST_ROUNDS, FittedCandidate, SearchContext, sensitivity_at
+from analysis.diagnosis.search.time_budget import OutOfTimeError
+from analysis.diagnosis.settings import AT_RETUNING_BOUND, LAW_NEAR, RETUNING_BOUND
+from analysis.diagnosis.types import TimeBudget
+from equalizer.plant.mechanical_model import MechanicalModelError
+
+T = TypeVar("T")
+
+
+def fit_sums(
+    context: SearchContext, base: Fitted, sums: Sequence[Sum], time_left: TimeBudget
+) -> tuple[tuple[FittedCandidate, Sum], ...]:
+    """The sums fitted by output error: the best one, and plainer ones that are as good, until they converge. Without
+    time, the best of those that were begun."""
+    known = within_time(lambda: sensitivity_at(context, base.deviations, base.hypothesis), None)
+    if known is None:
+        return ()
+    first = partial(fit, context.measure, context.tuning, known=known, rounds=FIRST_ROUNDS, map_=context.map_)
+    fits = [
+        (within_time(partial(first, start), start), each)
+        for each in sums
+        if time_left()
+        for start in _starting_fits(context, base, each)
+    ]
+    fits.sort(key=lambda pair: pair[0].cost)
+    if not fits or not np.isfinite(fits[0][0].cost):
+        return ()
+    best = fits[0]
+    # Of a law's two starts the cheaper one may be that which ends where re-tuning without the law did.
+    ends = [_refine(context, start) for start, each in fits if each is best[1] and np.isfinite(start.cost)]
+    refined = [(context.candidate(min(ends, key=lambda end: end.cost)), best[1])]
+    others = {id(each): (start, each) for start, each in reversed(fits) if each is not best[1]}
+    rest = [
+        (context.candidate(_like_best(context, best, refined[0][0], pair)), pair[1])
+        for pair in sorted(others.values(), key=lambda pair: pair[0].cost)
+    ]
+    close = [
+        pair
+        for pair in rest
+        if time_left() and _count_numbers(pair) < _count_numbers(refined[0]) and inseparable(refined[0][0], pair[0])
+    ]
+    refined += [(context.candidate(_refine(context, candidate.fitted)), item) for candidate, item in close]
+    return (*refined, *(pair for pair in rest if pair not in close))
+
+
+def _starting_fits(context: SearchContext, base: Fitted, each: Sum) -> list[Fitted]:
+    """The sum added to the fit, with the model's own numbers as they were or shifted as the sum's fit has them,
+    whichever costs less; where re-tuning ended at a bound, for want of this law, also with the numbers as given."""
+    recording = context.measure.records[0].recording
+    shifted = np.clip(base.deviations + each.model_shift, -RETUNING_BOUND, RETUNING_BOUND)
+    given = np.zeros_like(base.deviations)
+    at_bound = np.abs(base.deviations).max(initial=0.0) >= AT_RETUNING_BOUND * RETUNING_BOUND
+    starts = (each,) if each.partner is None else pair_starts(each)
+    chosen: list[Fitted] = []
+    for several in ((base.deviations, shifted), *([(given,)] if at_bound else [])):
+        found: list[Fitted] = []
+        for start, deviations in product(starts, several):
+            whole = combine(base.hypothesis, hypothesis_of_sum(start, recording))
+            try:
+                found.append(evaluate_fit(context.measure, context.tuning, deviations, whole))
+            except (MechanicalModelError, np.linalg.LinAlgError):
+                continue
+        chosen += [min(found, key=lambda start: start.cost)] if found else []
+    return chosen
+
+
+def _like_best(
+    context: SearchContext, best: tuple[Fitted, Sum], refined: FittedCandidate, other: tuple[Fitted, Sum]
+) -> Fitted:
+    """The other fit; of a pair of which the best is one half, the refined best as that pair."""
+    single, pair = best[1], other[1]
+    if single.partner is not None or pair.partner is None or not is_coupling(single):
+        return other[0]
+    return as_pair(context.measure, context.tuning, (refined.fitted, single), pair) or other[0]
+
+
+def put_plainest_first(
+    context: SearchContext, pairs: Sequence[tuple[FittedCandidate, Sum]]
+) -> list[tuple[FittedCandidate, Sum]]:
+    """By error; but first comes, of those that these data cannot tell from the best, the one with fewest numbers; of
+    forces that are linear in another axis's motion, the one that asks least of the model's own coupled numbers."""
+    ranked = sorted(pairs, key=lambda pair: pair[0].score.mean_log_error)
+    alike = [pair for pair in ranked if inseparable(ranked[0][0], pair[0])]
+    first = min(alike, key=_count_numbers)
+    if is_coupling(first[1]):
+        same = [pair for pair in alike if is_coupling(pair[1]) and _count_numbers(pair) == _count_numbers(first)]
+        first = min(same, key=lambda pair: coupling_taken(context.tuning, pair[0].fitted))
+    return [first, *(pair for pair in ranked if pair is not first)]
+
+
+def _count_numbers(pair: tuple[FittedCandidate, Sum]) -> int:
+    """Free numbers of a sum, without exponents that are whole or half numbers, and a soft limit's factor of 1."""
+    candidate, of = pair
+    law = laws_of(candidate.fitted.hypothesis)[-1]
+    count = 0 if law is None else -int(is_whole_limit(law, LAW_NEAR))
+    for term in of.terms:
+        plain = [k for k in term.exponents if abs(2 * term.numbers[k] - round(2 * term.numbers[k])) < 2 * LAW_NEAR]
+        count += 1 + len(term.numbers) - len(plain)
+    return count
+
+
+def _refine(context: SearchContext, start: Fitted) -> Fitted:
+    return within_time(lambda: refine(context, start), start)
+
+
+def within_time(work: Callable[[], T], begun: T) -> T:
+    """The result of a fit, or what it began with where the time ended within it: a stiff law takes a second to
+    simulate, and a fit simulates a hundred times."""
+    try:
+        return work()
+    except OutOfTimeError:
+        return begun

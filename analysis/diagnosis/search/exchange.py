@@ -1,0 +1,51 @@
+"""Coordinate exchange of effects that forward selection found.
+
+Forward selection chooses the first effect for what all of them do together, so that it may be a compromise. With the
+second effect held, the first is looked for again; where another one fits better, it takes the first one's place, and
+the second is looked for again beside it, until nothing changes (Miller, Subset Selection in Regression, 2002, ch. 3).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from analysis.diagnosis.search.explain import Explanation, Step, find_next_effect, is_worthwhile
+from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
+from analysis.diagnosis.search.without_effect import without_effect
+from analysis.diagnosis.settings import SEARCH_ON
+from analysis.diagnosis.types import Progress, TimeBudget
+from equalizer.effects.effect import Effect
+
+
+def exchange_effects(
+    context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> Explanation:
+    """The explanation with effects exchanged; unchanged where it reaches the noise, has a single effect, or nothing
+    fits better."""
+    limited = replace(context, map_=limit_map(context.map_, time_left))
+    fixed = context.certain or context.references is not None or found.ended_early or found.barred
+    for _ in found.steps[1:]:
+        if fixed or len(found.steps) < 2 or found.after.score.worst_channel <= SEARCH_ON or not time_left():
+            break
+        better = _exchange_first(limited, found, catalogue, progress)
+        if better is None:
+            break
+        found = better
+    return found
+
+
+def _exchange_first(
+    context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress
+) -> Explanation | None:
+    """The explanation with its first effect replaced by what fits better beside the others; None where nothing does."""
+    kept = without_effect(context, found, 0)
+    step = Step("looking again for the first effect", 0.8, progress)
+    try:
+        tried = find_next_effect(context, catalogue, kept.steps[-1].fitted, step)
+    except OutOfTimeError:
+        return None
+    named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
+    if not named or named[0] is not tried[0] or not is_worthwhile(found.steps[-1], named[0]):
+        return None
+    rounds = (*kept.rounds[: len(kept.steps)], named)
+    return replace(kept, after=context.with_test_score(named[0]), rounds=rounds, steps=(*kept.steps, named[0]))

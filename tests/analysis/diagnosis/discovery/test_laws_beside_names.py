@@ -1,0 +1,102 @@
+"""Names that may only approximate a law that the catalogue lacks, and the shorter law in their place. Compiles."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.discovery.add_laws import add_laws, may_stand_for_a_law
+from analysis.diagnosis.discovery.discover import discover
+from analysis.diagnosis.discovery.law_of_sum import laws_of
+from analysis.diagnosis.discovery.proof import does_as_well_with_less
+from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.search.compare_candidates import refine
+from analysis.diagnosis.search.search import SearchResult
+from analysis.diagnosis.search.time_budget import CountedBudget
+from analysis.diagnosis.search.verdict import judge
+from equalizer.effects.catalogue import EFFECTS
+from tests.lawful import arena_of, law, recorded
+
+CUBIC = 4e4
+
+
+def quiet(said, share):
+    pass
+
+
+def always():
+    return True
+
+
+def claim(name, **values):
+    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+
+
+@pytest.fixture(scope="module")
+def hardened():
+    return arena_of(recorded((law("-p0*x**3", CUBIC),), 3))
+
+
+def named(of, *claims):
+    """As if the search had named these."""
+    context, known = of
+    whole = None
+    for each in claims:
+        whole = each if whole is None else combine(whole, each)
+    start = evaluate_fit(context.measure, context.tuning, known.retuned.fitted.deviations, whole)
+    step = context.candidate(refine(context, start))
+    return replace(known, after=context.with_test_score(step), steps=(step,), rounds=((step,),))
+
+
+def travelled(of):
+    return max(float(np.ptp(record.recording.position.samples)) for record in of[0].whole.records)
+
+
+@pytest.fixture(scope="module")
+def rippled(hardened):
+    """A ripple of little more than one pitch in the place of a cube."""
+    pitch = 0.9 * travelled(hardened)
+    return named(hardened, claim("cogging", amplitude=0.2, pitch=pitch, phase=0.0))
+
+
+def test_a_ripple_that_is_not_seen_twice_may_be_another_curve(hardened, rippled):
+    assert may_stand_for_a_law(hardened[0], rippled)
+    short = named(hardened, claim("cogging", amplitude=0.2, pitch=travelled(hardened) / 8, phase=0.0))
+    assert not may_stand_for_a_law(hardened[0], short)
+
+
+def test_several_forces_on_one_axis_may_be_one_law_and_a_force_and_a_sensor_may_not(hardened):
+    cube, drag = claim("hardening_stiffness", k3=CUBIC), claim("quadratic_damping", coefficient=0.1)
+    assert may_stand_for_a_law(hardened[0], named(hardened, cube, drag))
+    assert not may_stand_for_a_law(hardened[0], named(hardened, cube))
+    assert not may_stand_for_a_law(hardened[0], named(hardened, cube, claim("sensor_gain", gain=1.01)))
+
+
+def test_the_shorter_law_takes_the_place_of_names_that_fit(hardened):
+    context, _ = hardened
+    cube, drag = claim("hardening_stiffness", k3=CUBIC), claim("quadratic_damping", coefficient=1e-4)
+    names = named(hardened, cube, drag)
+    assert judge(names).verdict == "explained"
+    said = add_laws(SearchResult(context, names, judge(names)), quiet, always)
+    (found,) = laws_of(said.found.after.fitted.hypothesis)
+    assert found.expression.endswith("x**3")
+    assert found.numbers[0] == pytest.approx(-CUBIC, rel=0.02)
+    assert said.judgement.verdict == "explained"
+
+
+def test_a_name_that_is_as_short_stays(hardened):
+    context, _ = hardened
+    cube = named(hardened, claim("hardening_stiffness", k3=CUBIC))
+    result = SearchResult(context, cube, judge(cube))
+    assert add_laws(result, quiet, always) is result
+    found = discover(context, cube, quiet, always, 1)
+    assert not does_as_well_with_less(context, found, cube.after)
+
+
+def test_a_search_whose_time_ends_within_a_fit_keeps_what_it_has(hardened):
+    context, known = hardened
+    whole = discover(context, known, quiet, always)
+    asked = CountedBudget(30)
+    begun = discover(context, known, quiet, asked)
+    assert begun is None or begun.found.after.fitted.cost >= whole.found.after.fitted.cost * (1 - 1e-6)

@@ -1,0 +1,100 @@
+"""An effect that forward selection took for what two others do together is exchanged for one of them."""
+
+from dataclasses import replace
+
+import pytest
+
+from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.search.compare_candidates import refine
+from analysis.diagnosis.search.exchange import exchange_effects
+from analysis.diagnosis.search.explain import Explanation, retune_alone
+from analysis.diagnosis.search.search import prune
+from analysis.diagnosis.search.time_budget import always
+from analysis.diagnosis.settings import SEARCH_ON
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.effect import PlacedEffect
+
+LIMIT_N, LAG_HZ = 1.3, 60.0
+
+
+def quiet(said, share):
+    pass
+
+
+def claim(name, **values):
+    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+
+
+def names(found):
+    return sorted(each.effect.name for each in found.after.fitted.hypothesis.claims)
+
+
+@pytest.fixture(scope="module")
+def limited_and_late(arena_of):
+    return arena_of(
+        (
+            PlacedEffect(EFFECTS["force_saturation"], (0,), {"limit": LIMIT_N}),
+            PlacedEffect(EFFECTS["sensor_lag"], (0,), {"bandwidth": LAG_HZ}),
+        )
+    )
+
+
+def found_of(context, *claims):
+    """An explanation that forward selection left, each step refitted."""
+    base = context.candidate(retune_alone(context))
+    steps, fitted = [], base.fitted
+    for each in claims:
+        whole = combine(fitted.hypothesis, each) if fitted.hypothesis.claims else each
+        fitted = refine(context, evaluate_fit(context.measure, context.tuning, fitted.deviations, whole))
+        steps.append(context.candidate(fitted))
+    ends = (context.with_test_score(item) for item in (base, base, steps[-1]))
+    return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
+
+
+@pytest.fixture(scope="module")
+def compromised(limited_and_late):
+    return found_of(limited_and_late, claim("amplifier_lag", time_constant=3e-3), claim("sensor_lag", bandwidth=80.0))
+
+
+CATALOGUE = [EFFECTS[name] for name in ("amplifier_lag", "sensor_lag", "force_saturation", "viscous_damping")]
+
+
+def test_the_first_effect_is_looked_for_again_beside_the_second(limited_and_late, compromised):
+    assert compromised.after.score.worst_channel > SEARCH_ON
+    found = exchange_effects(limited_and_late, compromised, CATALOGUE, quiet, always)
+    assert names(found) == ["force_saturation", "sensor_lag"]
+    assert found.after.score.worst_channel < SEARCH_ON
+    assert len(found.rounds) == len(found.steps) == 2
+
+
+def test_without_time_or_a_better_effect_nothing_is_exchanged(limited_and_late, compromised):
+    assert exchange_effects(limited_and_late, compromised, CATALOGUE, quiet, lambda: False) is compromised
+    assert exchange_effects(limited_and_late, compromised, CATALOGUE[:2], quiet, always) is compromised
+
+
+def test_an_effect_that_is_not_to_be_named_takes_no_place(limited_and_late, compromised):
+    barred = replace(limited_and_late, barred=frozenset({"force_saturation"}))
+    assert exchange_effects(barred, compromised, CATALOGUE, quiet, always) is compromised
+
+
+def test_of_three_the_one_that_stood_in_is_dropped(limited_and_late):
+    three = found_of(
+        limited_and_late,
+        claim("amplifier_lag", time_constant=3e-4),
+        claim("force_saturation", limit=LIMIT_N),
+        claim("sensor_lag", bandwidth=LAG_HZ),
+    )
+    left = prune(limited_and_late, three, always)
+    assert names(left) == ["force_saturation", "sensor_lag"]
+    assert len(left.rounds) == len(left.steps) == 2
+
+
+def test_rivals_are_kept_only_where_they_were_compared(limited_and_late):
+    first = claim("amplifier_lag", time_constant=3e-4)
+    three = found_of(
+        limited_and_late, first, claim("force_saturation", limit=LIMIT_N), claim("sensor_lag", bandwidth=LAG_HZ)
+    )
+    beside = found_of(limited_and_late, claim("viscous_damping", damping=0.5)).steps
+    left = prune(limited_and_late, replace(three, rounds=((*three.rounds[0], *beside), *three.rounds[1:])), always)
+    assert len(left.rounds[0]) == 1
