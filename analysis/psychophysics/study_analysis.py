@@ -198,8 +198,8 @@ def _models(trials: Sequence[Trial], protocol: StudyProtocol) -> tuple[PrimaryAn
 def _mean_contrasts(
     rows: Sequence[Threshold], primary: PrimaryAnalysis | None, protocol: StudyProtocol
 ) -> tuple[tuple[Contrast, ...], tuple[Contrast, ...]]:
-    """Of reversal means, and by Tobit's model of them. At the frequencies of the model where there is one, so that all
-    compare with the same lowest frequency."""
+    """Contrasts of reversal means, and of Tobit's model of them; at the frequencies of the primary model where there is
+    one, so that all have the same lowest frequency as their reference."""
     frequencies_hz = primary.frequencies_hz if primary is not None else protocol.stimulus.frequencies_hz
     table = threshold_table(rows, frequencies_hz, "threshold_db")
     if not table.subjects or not table.frequencies_hz:

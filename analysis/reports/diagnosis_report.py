@@ -172,7 +172,7 @@ _UNMOVED = {
     False: "None had to move by more than the standard deviation of its calibration.",
     True: "None had to move by more than what the first fit left open.",
 }
-"""By whether the model was fitted to the recordings first."""
+"""Key: whether the model was fitted to the recordings first."""
 
 
 def _parameter_section(found: Findings) -> Section:

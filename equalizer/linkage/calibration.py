@@ -14,11 +14,12 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 MOST_CONDITION = 50.0
-"""Of J. Usable places of a delta device have some units; the simulated omega.3 stays below 2.2."""
+"""Largest condition number of J. At usable places of a delta device it is a few units; the simulated omega.3 stays
+below 2.2."""
 MOST_SKEW = 1e-3
 """|M - M^T| over |M|: more than rounding."""
 MASSES_KG = (1e-3, 20.0)
-"""Of handles on a desk, along any direction."""
+"""Range of plausible effective masses of a handle on a desk, along any direction."""
 MOST_DIFFERENCE = 0.05
 """J against finite differences. Another unit or convention gives at least 40 %, a forgotten arm's length some 10 %."""
 
@@ -26,8 +27,8 @@ DEGREES = (4, 3, 2, 1)
 SPARE = 2
 """Times as many positions as terms: below it a lower degree is taken."""
 NEAR_SHARE = 0.3
-"""Of the calibration's reach: standard deviation of the weight around a place. Without one, far positions bend the
-slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
+"""Standard deviation of the Gaussian weight around a place, as a share of the calibration's reach. Without a weight,
+far positions bend the slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
 MOST_TOLD = 10
 """Problems at positions that are told one by one."""
 

@@ -15,7 +15,7 @@ STEP_M = 2e-3
 """Half the distance of a difference: some 200 counts of an encoder, and still a small part of an arm."""
 
 MOST_OFF_DEG = 5.0
-"""Of an arm from its place at a third of a turn."""
+"""Largest deviation of an arm from its nominal place at a third of a turn."""
 
 
 def arm_azimuths(jacobian: FloatArray) -> FloatArray:

@@ -104,7 +104,8 @@ def _in_ascii(text: str) -> str:
 
 
 def _respell_symbol(word: str, known: Collection[str]) -> str:
-    """Of two letters the case tells units apart (`mS`, `MM`)."""
+    """Spell a unit's symbol as it is known. In words of two letters the case is kept, because it tells units apart
+    (`mS`, `MM`)."""
     return word if word in known else _SPELLED.get(word.lower() if len(word) > 2 else word, word)
 
 

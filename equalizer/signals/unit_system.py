@@ -15,9 +15,9 @@ FORCES = ("N", "N m")
 @dataclass(frozen=True, slots=True)
 class UnitSystem:
     force: str = "N"
-    """Of a command,"""
+    """Unit of a command; ASCII."""
     length: str = "m"
-    """and of a motion's position; ASCII, "1" for a plain number."""
+    """Unit of a motion's position; ASCII, "1" for a plain number."""
     time: str = "s"
     """"sample" where no time is known."""
 

@@ -13,7 +13,7 @@ class UnknownUnitError(ValueError):
 
 
 class _NotAUnitError(UnknownUnitError):
-    """Of the text and why; the suggestion takes long, and is made only where the error is shown."""
+    """Created with the text and the reason; the suggestion takes long, and is made only where the error is shown."""
 
     def __str__(self) -> str:
         text, why = self.args

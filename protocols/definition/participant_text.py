@@ -76,7 +76,7 @@ class Question:
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """Of the scale; empty where there is none."""
+        """Texts of the scale's steps; empty where there is no scale."""
         return tuple(str(step) for step in range(self.scale[0], self.scale[1] + 1)) if self.scale else ()
 
     @property

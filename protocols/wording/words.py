@@ -36,7 +36,7 @@ PATTERNS = {
 @dataclass(frozen=True, slots=True)
 class Words:
     own: Mapping[str, str] = field(default_factory=dict, hash=False)
-    """By key. A key that is missing has its English text."""
+    """A protocol's own texts by key. A key that is missing has its English text."""
 
     def __getitem__(self, key: str) -> str:
         return self.own.get(key) or ENGLISH[key]

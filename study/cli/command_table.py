@@ -60,7 +60,7 @@ COMMANDS: dict[str, dict[str, str]] = {
         "kit": "Take a blind test on your own device",
     },
 }
-"""By group: what each command does."""
+"""What each command does, by group."""
 
 
 class LoadedWhenCalled(Mapping[str, Any]):

@@ -27,7 +27,7 @@ _intrinsic: Any = intrinsic
 _cgutils: Any = cgutils
 
 _CLOCK_MONOTONIC, _TIMER_ABSTIME, _INTERRUPTED = 1, 1, 4
-"""Of Linux."""
+"""Constants of Linux (time.h, errno.h)."""
 
 
 def _caller(result: Any) -> Any:
@@ -154,7 +154,7 @@ _monotonic = ctypes.CFUNCTYPE(ctypes.c_double)(time.monotonic)
 
 
 def address_of(function: Any) -> int:
-    """Of a function of a loaded library."""
+    """Address of a function of a loaded library."""
     return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
 
 

@@ -33,7 +33,7 @@ BLOCK_S = 0.05
 VIRTUAL_BLOCK_S = 5.0
 
 PATIENCE_S = 1.0
-"""Beyond all fades, before a device that does not become still counts as lost."""
+"""Time granted beyond all fades, before a device that does not become still counts as lost."""
 
 
 class SafeDevice:

@@ -157,7 +157,8 @@ def fit_modal_structure(
 
 
 def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
-    """Of fits by force balance, the one with fewest numbers that no richer one beats significantly over the folds."""
+    """Return the fit by force balance with the fewest parameters, among those that no richer fit beats significantly
+    over the folds."""
     ordered = sorted(fits, key=lambda fit: (len(fit.numbers), fit.error))
     best = ordered[0]
     for other in ordered[1:]:

@@ -65,7 +65,7 @@ def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
-    """Of an imposed motion recorded as position and speed, only the position."""
+    """Keep only the position of an imposed motion that was recorded as position and speed."""
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
         return recordings, ""
@@ -78,7 +78,7 @@ def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
-    """Of responses of several kinds, only the motions of the lowest derivative."""
+    """Keep only the motions of the lowest derivative, where the responses are of several kinds."""
     response = recordings[0].response
     quantities = set(response.quantities)
     if not quantities & MOTIONS or len({DERIVATIVE_OF_QUANTITY.get(quantity, -1) for quantity in quantities}) == 1:
@@ -92,7 +92,7 @@ def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
-    """Of several forces along fewer imposed motions, the strongest."""
+    """Keep only the strongest forces, where there are more forces than imposed motions."""
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
         return recordings, ""

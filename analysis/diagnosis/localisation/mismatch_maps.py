@@ -24,7 +24,7 @@ STRETCHES = 16
 @dataclass(frozen=True, slots=True, eq=False)
 class Maps:
     cells: Mapping[str, Cells]
-    """By "before", "retuned", "after"."""
+    """The map of each stage; keys "before", "retuned", "after"."""
 
     @property
     def rows(self) -> tuple[Mismatch, ...]:

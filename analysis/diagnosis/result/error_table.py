@@ -25,7 +25,7 @@ def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
 
 
 def channel_errors(found: Explanation, names: tuple[str, ...]) -> Mapping[str, Mapping[str, float]]:
-    """By stage and channel: rms over the test samples in units of the noise."""
+    """Rms errors over the test samples, in units of the noise, by stage and channel."""
     stages = {"before": found.before, "retuned": found.retuned, "after": found.after}
     return {stage: dict(zip(names, candidate.score.test.tolist(), strict=True)) for stage, candidate in stages.items()}
 

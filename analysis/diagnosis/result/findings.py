@@ -67,7 +67,7 @@ class BlackBox:
     kind: str
     numbers: int
     test: float
-    """Its error on the test samples, as in `document.Errors`."""
+    """Error on the test samples, as in `document.Errors`."""
     physics: float
     """The same of the named effects."""
 
@@ -113,7 +113,8 @@ class Findings(Summarised):
     noise_rms: Mapping[str, float]
     """Noise rms by channel, SI."""
     channel_errors: Mapping[str, Mapping[str, float]]
-    """By "before", "retuned", "after", then by channel: rms over the test samples in units of the noise."""
+    """Rms error over the test samples in units of the noise: by stage ("before", "retuned", "after"), then by
+    channel."""
     mismatch: tuple[Mismatch, ...]
     """All tested cells, not only the significant ones (see p_value and share)."""
     signatures: tuple[Signature, ...]
@@ -121,7 +122,7 @@ class Findings(Summarised):
     remarks: tuple[str, ...]
     """Remarks as sentences: assumptions, weaknesses, implausible results."""
     maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
-    """By "before", "retuned", "after": every cell of the map, in units of the noise."""
+    """Every cell of the mismatch map, in units of the noise, by stage ("before", "retuned", "after")."""
     local: Localisation = field(default_factory=Localisation)
     """Localisation of the mismatch: in which states, through which input, and of which kind."""
     fitted: bool = False

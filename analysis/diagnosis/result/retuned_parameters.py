@@ -53,8 +53,8 @@ def moved_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, 
 
 
 def retuned_sentence(moved: Sequence[MovedNumber], fitted: bool = False) -> str:
-    """Beside named physics: what else was turned. fitted: the model was fitted to the same recordings first, so that no
-    calibration holds its numbers."""
+    """Sentence on the parameters that were re-tuned beside named physics. fitted: the model was fitted to the same
+    recordings first, so that no calibration holds its parameters."""
     if not moved:
         return ""
     texts = [f"{number.name} {number.size}" if fitted else number.text for number in moved[:_LISTED]]

@@ -44,7 +44,7 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
 
 
 def _drop_former(context: SearchContext, found: Explanation) -> Explanation:
-    """Of two effects only the later, where it fits as well alone: the earlier may have stood in for it."""
+    """Drop the earlier of two effects where the later alone fits as well: the earlier may have stood in for it."""
     alone = without_effect(context, found, 0)
     kept = is_worthwhile(alone.steps[-1], found.steps[-1]) or not np.isfinite(alone.steps[-1].fitted.cost)
     return found if kept else alone

@@ -16,7 +16,7 @@ class FreshMotion:
 
     columns: Mapping[str, FloatArray]
     added: Mapping[str, FloatArray]
-    """By axis: contribution of the true laws to its force (N), or to its reading (m/s^2)."""
+    """Contribution of the true laws to each axis's force (N) or reading (m/s^2), by axis."""
     response: bool
     """Whether `added` belongs to the reading, not to the force."""
     rate_hz: float

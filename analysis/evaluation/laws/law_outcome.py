@@ -40,7 +40,7 @@ class LawOutcome:
     said: Diagnosis | None
     """The diagnosis; None: it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
-    """By "before", "retuned", "after", then by channel: rms over the noise's, on held-out samples."""
+    """Rms error on held-out samples over the noise's rms: by stage ("before", "retuned", "after"), then by channel."""
     seconds: float
     errors: tuple[float, ...] = ()
     """Error of the reported laws (`law_error`): in the visited range, and at a higher level."""

@@ -19,7 +19,7 @@ class Change:
     effects: tuple[str, ...]
     """Any of these is right; none for nothing."""
     unit: str
-    """Of the number that the one who changes it writes down; empty where there is none."""
+    """Unit of the value that the lab writes down for this change; empty where there is none."""
 
 
 CHANGES: tuple[Change, ...] = (

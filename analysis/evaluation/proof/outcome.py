@@ -38,7 +38,7 @@ class Outcome:
     said: Diagnosis | None
     """The diagnosis; None: it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
-    """By "before", "retuned", "after", then by channel: rms over the noise's, on held-out samples."""
+    """Rms error on held-out samples over the noise's rms: by stage ("before", "retuned", "after"), then by channel."""
     seconds: float
 
     @property

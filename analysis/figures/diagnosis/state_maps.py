@@ -20,7 +20,7 @@ _SEEN = 0.998
 
 
 def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
-    """Of the first axis: the states, then the loops."""
+    """Pictures of the first axis: its states, then its loops."""
     if not maps:
         return ()
     first = maps[0]

@@ -63,7 +63,7 @@ def _table(group: DeliveredTrials, side: float, flawless: float) -> Table:
 
 
 def _median(values: FloatArray) -> float | None:
-    """Of the trials that were measured; None where none was."""
+    """Median over the trials that were measured; None where none was."""
     measured = values[np.isfinite(values)]
     return float(np.median(measured)) if len(measured) else None
 

@@ -26,7 +26,7 @@ class BandEdges:
     end."""
 
     low_hz: float | None = 4.0
-    """By default one hertz below the model's band (5 Hz), so that the model plays the whole band."""
+    """Lower band edge. The default is 1 Hz below the model's band (5 Hz), so that the model plays the whole band."""
     high_hz: float | None = 36.0
 
     def __post_init__(self) -> None:

@@ -33,11 +33,11 @@ class RealtimeSettings:
     """Raises TrackingError for what no loop can run."""
 
     weight: float = 1e-3
-    """Of |force|² against |error|²."""
+    """Weight of |force|² against |error|², (m/s² per N)²."""
     preview_s: float = 0.2
     """How long ahead a stream is known: by so much, less a tick, it is played late."""
     cap_n: float = 3.0
-    """Of the force's length."""
+    """Limit of the force vector's length, N."""
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.preview_s) and self.preview_s >= 0):
@@ -52,7 +52,7 @@ class RealtimeController:
     split: CausalSplit
     transient: TurningTransient
     loss: PreviewLoss
-    """Of the stream, by the model's own prediction, without that of the causal split."""
+    """Tracking loss of the stream by limited preview, predicted by the model; without the loss of the causal split."""
     cap_n: float
 
     @property

@@ -54,7 +54,7 @@ class InterpolationChoice:
     checks: tuple[PlaceCheck, ...]
     workspace: WorkspaceModels
     modal: ModalInterpolation | None
-    """Of all models; None where it is not used."""
+    """Interpolation by the modes of all models; None where it is not used."""
 
     def at(self, place_m: Place) -> ModelsAtPlace:
         return self.modal.at(place_m) if self.modal else blend_at(self.workspace, place_m)

@@ -9,7 +9,8 @@ from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.samples import Counts, Samples
 
 KEPT_S = 300.0
-"""By the arrivals: the longest recording, and the minutes before it to which the clock is fitted."""
+"""Time for which samples are kept, by their arrival: the longest recording, and the minutes before it to which the
+clock is fitted."""
 
 
 class Table:

@@ -71,7 +71,7 @@ MOST_DOUBTFUL = 8
 
 Indices = npt.NDArray[np.intp]
 Packets = npt.NDArray[np.void]
-"""Of `LAYOUT`."""
+"""Packets as an array of `LAYOUT`."""
 
 
 class PacketParser:
@@ -82,7 +82,7 @@ class PacketParser:
         self._doubtful: list[Packets] = []
         """Those after it that do not follow it, each (1,): the next packet tells."""
         self._sequence, self._time_us = 0, 0
-        """Of the newest packet, counted on."""
+        """Number and time of the newest packet, unwrapped."""
         self._received = 0
         self.counts = Counts()
 

@@ -32,7 +32,7 @@ class Counts:
 
     packets: int = 0
     lost: int = 0
-    """By the gaps in the sequence numbers: those that arrived torn or garbled are among them."""
+    """Packets lost, counted by the gaps in the sequence numbers: torn or garbled arrivals are among them."""
     spoiled_bytes: int = 0
     """That belonged to no whole packet."""
     restarts: int = 0

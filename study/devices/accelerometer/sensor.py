@@ -26,7 +26,7 @@ FITTED_S = 120.0
 for a quartz that warms up."""
 
 LATENESS_S = 0.05
-"""So long after the last tick its samples are waited for."""
+"""Longest wait after the last tick for its samples."""
 
 
 class Accelerometer:
@@ -72,7 +72,8 @@ class Accelerometer:
         return Sensed(placed.values, _health(counts, placed.values, placed.fit))
 
     def rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
-        """Of the last seconds, at rest: what came, the standard deviation of each axis, m/s², samples per second."""
+        """What arrived in the last seconds at rest, the standard deviation of each axis (3,) in m/s², and samples per
+        second."""
         now_s = time.monotonic()
         stretch = self._history.stretch(now_s - seconds, now_s)
         noise = self._calibration.acceleration(stretch.raw).std(axis=0) if len(stretch.raw) else np.full(3, np.nan)

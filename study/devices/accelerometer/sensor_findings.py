@@ -13,16 +13,16 @@ ENOUGH_PER_S = 1900.0
 """2 kHz, less what a clock may be off: below, what the sensor's filter of 500 Hz lets through is aliased."""
 
 FEW_LOST = 0.001
-"""Of the packets: no cable needs to lose any."""
+"""Share of packets that may be lost: no cable needs to lose any."""
 
 PLAUSIBLE_PPM = 500.0
 """A quartz is within 100 ppm, a ceramic resonator within 5000 and then wanders."""
 
 LATE_S = 0.05
-"""Beyond that the newest sample is none any more."""
+"""Longest delay of a packet: at a later arrival the newest sample says nothing about the present tick."""
 
 NOISY_MPS2 = 0.3
-"""Of one axis. An ADXL335 behind 500 Hz has 0.04 (x, y) and 0.08 (z)."""
+"""Largest rms noise of one axis. An ADXL335 behind 500 Hz has 0.04 (x, y) and 0.08 (z)."""
 
 
 def sensor_findings(sensor: Accelerometer) -> tuple[DeviceFinding, ...]:

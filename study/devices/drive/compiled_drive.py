@@ -37,7 +37,7 @@ SPIN_S = 0.00015
 """Sleep until so long before a real tick, then wait awake: a sleep ends late by more than that on its own."""
 
 HAIR = 1e-6
-"""Of a tick: a sum of rounded times just short of one counts as that one."""
+"""Tolerance in ticks: a sum of rounded times just short of a tick counts as that tick."""
 
 SEEN_ROWS = 8
 """The newest readings; one that is copied meanwhile stays whole for so many ticks less one."""

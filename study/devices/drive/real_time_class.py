@@ -129,7 +129,8 @@ def _may_starve_others() -> bool:
 
 
 def _request_class() -> tuple[Granted, Callable[[], None]]:
-    """And what takes back what the thread's end does not."""
+    """Request the class of the calling thread and the memory lock. Also returns the function that undoes what does not
+    end with the thread."""
     if platform.system() == "Linux":
         return _of_linux(ctypes.CDLL(None, use_errno=True))
     windows = getattr(ctypes, "windll", None)

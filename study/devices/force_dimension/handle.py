@@ -15,7 +15,7 @@ STATUS_SIZE = 32
 """17 in SDK 3.17.5; room for more, since a library writes as many as it knows."""
 
 FORCE_ON_PLACE, OFF_CAUSE_PLACE = 5, 14
-"""Of a status."""
+"""Indices in the library's status array."""
 OFF_CAUSES = {
     1: "a button of the device was pressed",
     2: "the handle moved faster than the device allows",

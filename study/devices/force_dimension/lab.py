@@ -19,7 +19,7 @@ from study.errors import DeviceError
 Triple = tuple[float, float, float]
 
 HEADER = re.compile(r"\s*\[\[?[\w.\"-]+\]\]?\s*(#.*)?")
-"""Of a table in TOML; a row of numbers is none."""
+"""Header of a table in TOML; a row of numbers in brackets does not match."""
 
 FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"
 

@@ -19,7 +19,7 @@ OLDEST_SDK = (3, 16, 0)
 """From here on all functions are there with the types below; older ones differ in some."""
 
 GEOMETRY_ERROR, DEVICE_IN_USE = 8, 20
-"""Of the library's error codes, those that something is decided by."""
+"""Error codes of the library on which a decision depends."""
 
 _ID, _NUMBER, _NUMBERS = c_byte, c_double, POINTER(c_double)
 _THREE = (_NUMBERS, _NUMBERS, _NUMBERS, _ID)
@@ -106,7 +106,7 @@ class Library:
         raise self.last_error(name)
 
     def last_error(self, name: str) -> LibraryError:
-        """Of this function, whose call just failed in this thread."""
+        """The error of this function, whose call just failed in this thread."""
         code = int(self._functions["dhdErrorGetLast"]())
         text = self._functions["dhdErrorGetLastStr"]() or b"no reason given"
         return LibraryError(name, code, text.decode("utf-8", "replace"))

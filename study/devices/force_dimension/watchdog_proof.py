@@ -12,7 +12,7 @@ from study.errors import DeviceError
 ARMED_FOR_S = 0.05
 EVERY_S = 0.002
 MARGIN_S = 0.02
-"""Beyond the watchdog's time: for the USB and the device's own bookkeeping."""
+"""Time granted beyond the watchdog's own, for the USB and the device's own bookkeeping."""
 
 ATTEMPTS = 5
 """A busy computer may come too late for the watchdog before it is meant to."""

@@ -196,7 +196,7 @@ def _publishing(sources: int) -> Any:
 def _entry_points(sources: int) -> tuple[Any, Any]:
     @njit(MISS_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def miss(state: FloatArray, buffer: FloatArray, nothing: FloatArray, ticks: int) -> None:
-        """So many ticks went by unattended: their rows hold the last force, and `nothing` as their reading."""
+        """Record ticks that passed unattended: their rows hold the last force, and `nothing` as their reading."""
         _ = sources
         for _k in range(ticks):
             _record(state, buffer, nothing)

@@ -30,7 +30,7 @@ GRACE_S = 0.5
 """When this process stood still, the other looks late too: it gets so long to answer."""
 
 CLOSE_S = 6.0
-"""Beyond the fade: a driver that hangs is left to itself after less."""
+"""Time granted beyond the fade to end in order; a driver that hangs is abandoned sooner."""
 
 
 class LoopGoneError(Exception):

@@ -32,7 +32,8 @@ OPENING_GRACE_S = 1.0
 """While the device is opened, no force of a stimulus is on that a fade would end: the process ends soon."""
 
 OVERDUE_S = CLOSE_S + 3.0
-"""Beyond the fade: only a process that hangs, in the driver or in an exit handler, takes so long to end."""
+"""Time granted beyond the fade: only a process that hangs, in the driver or in an exit handler, takes so long to
+end."""
 
 
 class BrokenOffError(Exception):

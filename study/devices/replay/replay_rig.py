@@ -30,8 +30,8 @@ OVER_S = 0.02
 NOMINAL = MODELS["omega3"]
 
 TICK, FIRST, LENGTH, REPEATS, OVER = range(5)
-"""Of the state: ticks since the first row (negative before), first row of the stretch, its rows, whether it is
-repeated, and rows over which its end goes over into its beginning."""
+"""Indices in the state: ticks since the first row (negative before), first row of the stretch, its number of rows,
+whether it is repeated, and rows over which its end is cross-faded into its beginning."""
 
 AX, TRUE_AX = ACCELERATION.start, TRUE_ACCELERATION.start
 

@@ -21,9 +21,10 @@ from study.devices.simulated.packing import effective_mass_kg, isotropic_depth_m
 from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Masses, Omega3Parameters
 
 MOST_MISFIT = 0.1
-"""Of Jacobian or inertia, relative: beyond it the simulated device would not be that of the calibration."""
+"""Largest relative misfit of Jacobian or inertia: above it the simulated device would not be that of the
+calibration."""
 LIGHTEST_KG = 0.07
-"""Of what moves with the handle: what swings on it weighs 54 g."""
+"""Least mass that moves with the handle: the parts that swing on it weigh 54 g."""
 
 
 class SimulatedLinkage:
@@ -51,7 +52,7 @@ class SimulatedLinkage:
         return _pose(self._packed, position_m)[0] if float(np.linalg.norm(position_m)) < self._reach_m else None
 
     def check_frame(self) -> None:
-        """It has one frame."""
+        """Nothing to check: a simulated linkage has a single frame."""
 
 
 @dataclass(frozen=True, slots=True)

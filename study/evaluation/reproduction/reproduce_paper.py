@@ -38,7 +38,7 @@ class ReproducedModel:
     """A model behind figure 5: identified once from its recording and reused by the next run."""
 
     model: IdentifiedModel
-    """It includes the spring, so that playback under the same spring needs no other account of it."""
+    """Includes the spring, so that playback under the same spring needs no separate compensation."""
     tested: HeldOut | None
 
     def as_used_model(self, name: str) -> UsedModel:

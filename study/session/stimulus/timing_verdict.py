@@ -34,7 +34,7 @@ ADVICE = "Close other programs, switch power saving off, and measure again."
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """Of a real device's own loop, or of this program, which tried to wake up at every tick."""
+    """Lateness of a real device's own loop, or of this program, which tried to wake up at every tick."""
 
     median_ms: float
     p99_ms: float
@@ -80,7 +80,7 @@ def judge_lateness(lateness: Lateness, simulated: bool) -> DeviceFinding:
 
 
 def judge_missed(missed_ticks: int, ticks: int, simulated: bool, load_per_processor: float | None) -> DeviceFinding:
-    """They are late ticks too, and have no limit of their own."""
+    """Judge missed ticks as late ticks: they have no limit of their own."""
     share, limit = missed_ticks / max(ticks, 1), _late_limit(load_per_processor)
     fine = share <= limit
     value = f"{missed_ticks} of {ticks} ({share:.2%})"

@@ -21,7 +21,7 @@ class FormKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Of a number."""
+    """Limits of a number."""
 
     lowest: float
     highest: float
@@ -56,7 +56,7 @@ class Form:
 @dataclass(frozen=True, slots=True)
 class FormReply:
     answers: dict[str, str]
-    """By the fields' keys."""
+    """Answers by the keys of their fields."""
 
 
 def find_missing_fields(form: Form, reply: FormReply) -> tuple[FormField, ...]:

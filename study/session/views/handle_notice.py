@@ -10,7 +10,7 @@ BeforeMoving = Callable[[str], None]
 
 
 def refuse_unannounced(notice: str) -> None:
-    """Of a caller that tells no person: a real device does not move for it. Raises StudyError."""
+    """Refuse to move a real device, for a caller that cannot announce it to a person. Raises StudyError."""
     raise StudyError(
         "The device was not moved",
         f"A real device would move without a warning. {notice}",

@@ -126,7 +126,7 @@ class DriftLine:
     """Since the session was opened, when it was first seen."""
     sentence: str
     beyond: bool
-    """It leaves what the analysis of the session allows."""
+    """Whether the drift exceeds what the analysis of the session allows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,7 @@ class WatchView:
     session: str
     subject: str
     protocol: str
-    """Its title."""
+    """Title of the protocol."""
     device: str
     simulated: bool
     """Nothing moves."""
@@ -167,7 +167,7 @@ class WatchView:
     """The run that `points` belong to: the present one, or the last one while nothing is answered in it."""
     points: tuple[StaircasePoint, ...]
     next_level_n: float | None
-    """Of the staircase in `shown_run`, after the last point; None where the run is over."""
+    """Next level of the staircase in `shown_run`, after the last point; None where the run is over."""
     cap_n: float
     open_trial: OpenTrial | None
     last: tuple[ClosedTrial, ...]

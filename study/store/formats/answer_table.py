@@ -24,7 +24,7 @@ class FilledForm:
 @dataclass(frozen=True, slots=True)
 class AnswerColumn:
     table: str
-    """Of the protocol: before or debrief."""
+    """The protocol's table of questions: before or debrief."""
     question: Question
 
     @property

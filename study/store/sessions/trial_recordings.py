@@ -11,7 +11,7 @@ from study.store.formats.recording_file import read_recording, write_recording
 from study.store.sessions.archive import SessionFolder
 
 PROBE_PREFIX = "probe-"
-"""Of files that hold a probe, and no trial."""
+"""File name prefix of recordings of a probe instead of a trial."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,7 +78,7 @@ class Diagnose:
     out: str
     """Empty: a new folder near what is diagnosed."""
     clean: tuple[str, ...] = ()
-    """Of the device when it was in order."""
+    """Recordings of the device when it was in order."""
 
 
 @dataclass(frozen=True, slots=True)

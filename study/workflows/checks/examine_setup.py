@@ -50,7 +50,8 @@ class Examination:
 
     @property
     def exit_code(self) -> ExitCode:
-        """By the worst finding: DEVICE if device or timing is wrong, beside any other finding. Warnings are ignored."""
+        """Exit code of the worst finding: DEVICE if device or timing is wrong, beside any other finding. Warnings are
+        ignored."""
         timing = self.timing.findings if self.timing is not None else ()
         if any(finding.wrong for finding in (*self.device.findings, *timing)):
             return ExitCode.DEVICE

@@ -63,7 +63,7 @@ class ContactPlan:
     out: Path
     device: str = "simulated"
     scale: float = 1.0
-    """Of the recording."""
+    """Factor on the recording."""
     weight: float = 1e-3
     cap_n: float = 3.0
     seed: int = 1

@@ -35,7 +35,7 @@ DOCUMENTS = {
     WITHDRAWAL_FORMAT: ("withdrawal that was begun", ()),
     TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
 }
-"""By format: kind in words, and required keys."""
+"""Kind in words and required keys, by format."""
 
 
 def recognise_session(content: FileContent) -> str | None:

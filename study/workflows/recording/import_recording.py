@@ -36,7 +36,7 @@ class ImportPlan:
     """Foreign files, the map to a recording, and the output."""
 
     files: tuple[Path, ...]
-    """Or one folder, whose map is searched for."""
+    """Files, or one folder in which a map is searched for."""
     map: str | None
     """Name of a shipped map, or a path; None if headers suffice."""
     out: Path

@@ -15,7 +15,8 @@ from study.workflows.session.simulated_touch import SimulatedTouch
 def make_simulated_participant(
     name: str, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
 ) -> Participant:
-    """By the name used on the command line and in the log. Raises StudyError for an unknown name."""
+    """Create the participant of a name used on the command line and in the log. Raises StudyError for an unknown
+    name."""
     return seat_observer(observer_named(name, seed), seed, clock, on_question)
 
 

@@ -15,7 +15,7 @@ class Judgement:
     flags: tuple[str, ...]
     """Remarks on a trial that counts."""
     cause: VoidCause = VoidCause.FAULT
-    """Of a void trial."""
+    """Cause of a void trial."""
     measured: bool = True
     """Whether the acceleration can be trusted, where there is any."""
 

@@ -32,7 +32,7 @@ TOLD = (
     "answer", "response_time_s", "status", "cause", "missed_ticks", "late_ticks", "latest_s", "delivered_mps2",
     "outcome",
 )  # fmt: skip
-"""Of each fact: nothing about the person, no notes, no forms."""
+"""Fields of each fact that are streamed: nothing about the person, no notes, no forms."""
 
 LAST = "session_closed"
 """No fact of a trial follows it, and it is never taken back."""

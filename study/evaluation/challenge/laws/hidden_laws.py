@@ -45,7 +45,7 @@ class LawKind:
     memory: bool = False
     axes: int = 1
     both: bool = False
-    """It acts on the other axis as well."""
+    """Whether the law acts on the other axis as well."""
     change: Callable[[FloatArray, FloatArray, float, float], FloatArray] | None = None
     """For commands or readings: change for k = 1, from own axis, other axis, a and b."""
 
