@@ -192,7 +192,7 @@ def noun_of(effect: str) -> str:
 
 
 def place_of(effect: str) -> Place:
-    """Where an effect of the vocabulary acts, or a law that it lacks."""
+    """Place (mechanism, actuator, sensor or hand) at which an effect of the vocabulary, or a law outside it, acts."""
     known = EFFECTS_BY_NAME.get(effect)
     law = LAW_WORDS.get(effect)
     return known.place if known is not None else "mechanism" if law is None else law.place

@@ -69,7 +69,7 @@ class Picture:
 
 
 def picture_svg(picture: Picture) -> str:
-    """As `inline_svg`, drawn once."""
+    """Draw a picture once and return it as inline SVG (see `inline_svg`)."""
     if not picture.drawn:
         picture.drawn.append(inline_svg(picture.figure, picture.name, picture.title, picture.alternative))
     return picture.drawn[0]

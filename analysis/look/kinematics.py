@@ -49,7 +49,7 @@ class KinematicPair:
 def find_kinematic_pairs(
     channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
 ) -> tuple[KinematicPair, ...]:
-    """For each speed and acceleration, the channel whose derivative agrees best with it, if any does."""
+    """Find, for each speed and acceleration, the channel whose derivative agrees best with it, if any does."""
     moving = [
         channel for channel in channels if channel.unit in _ORDER and channel.known.size and np.ptp(channel.known) > 0
     ]

@@ -53,7 +53,8 @@ class PracticeRun:
 
 
 def practice_runs(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[PracticeRun, ...]:
-    """In the order in which they first occur. Practice has the phase TRAINING and follows the training staircases."""
+    """Runs of practice in the order in which they first occur. Practice has the phase TRAINING and follows the training
+    staircases."""
     first = len(protocol.training.frequencies_hz)
     places = range(first, first + len(protocol.practice.frequencies_hz))
     grouped: dict[tuple[str, str, int], list[Trial]] = {}

@@ -84,7 +84,7 @@ def _banner(found: Findings) -> str:
 
 
 def _answer_sections(found: Findings) -> list[Section]:
-    """Where physics was named: one sentence each, and what they leave open."""
+    """Sections of a diagnosis that names physics: one sentence for each effect, and what they leave open."""
     effects, signatures = found.diagnosis.effects, signature_texts(found)
     if not effects:
         return []

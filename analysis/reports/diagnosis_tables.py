@@ -79,7 +79,7 @@ def error_table(found: Findings) -> Table:
 
 
 def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None:
-    """In each channel's unit, with the multiple of the noise; None where no series tells the channels."""
+    """Errors in each channel's unit, with the multiple of the noise; None where the series are not known by channel."""
     if not found.time_series:
         return None
     names, units, noises = found.time_series[0].channels, found.time_series[0].units, found.noise_rms

@@ -38,7 +38,7 @@ def pictures_of(found: Sequence[Overview]) -> tuple[tuple[Picture, ...], ...]:
 
 
 def brief(found: Overview) -> str:
-    """In a sentence: what was recorded, for how long, and what came of the checks."""
+    """One sentence: what was recorded, for how long, and the result of the checks."""
     recording = found.recording
     counts = {level: sum(check.level == level for check in found.checks) for level in ("wrong", "notice", "fine")}
     said = (

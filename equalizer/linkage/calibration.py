@@ -43,7 +43,7 @@ class CalibrationError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkageReading:
-    """At one position of the handle."""
+    """What a device says of its linkage at one position of the handle."""
 
     position_m: FloatArray
     """(3,)"""

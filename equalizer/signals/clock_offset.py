@@ -80,7 +80,7 @@ def _normalised_correlation(first: FloatArray, second: FloatArray) -> FloatArray
 
 
 def _has_enough_overlap(lags: IntArray, first: int, second: int) -> BoolArray:
-    """At which lags signals of these lengths overlap by a quarter of the shorter one."""
+    """Mask of the lags at which signals of these lengths overlap by at least a quarter of the shorter one."""
     overlap = np.minimum(first, lags + second) - np.maximum(0, lags)
     enough: BoolArray = overlap >= 0.25 * min(first, second)
     return enough

@@ -74,7 +74,7 @@ _PEAK = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.IGNOR
 
 
 def respell(text: str, known: Collection[str]) -> str:
-    """In the spelling of this project; `known` are its symbols, which stay as they are."""
+    """Spell a unit as this project does; `known` are its symbols, which stay as they are."""
     plain = text.strip()
     if match := _PEAK.fullmatch(plain):
         return match["unit"]

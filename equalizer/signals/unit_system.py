@@ -57,7 +57,7 @@ class UnitSystem:
 
     @property
     def rotational(self) -> bool | None:
-        """None for a system that is none of SI."""
+        """Whether the system is rotational; None for a system outside SI."""
         return {LINEAR: False, ROTATIONAL: True}.get(self)
 
 

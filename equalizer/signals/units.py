@@ -235,8 +235,8 @@ def suggest_unit(text: str) -> str:
 
 
 def plain_unit(text: str) -> str:
-    """As it is written here (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`), where that is a unit; else the text
-    itself."""
+    """Spell a unit as this project does (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`); text that is no unit is
+    returned unchanged."""
     if len(text) > LONGEST_UNIT:
         return text
     # Here, for only files of others spell units in other ways.

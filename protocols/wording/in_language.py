@@ -87,5 +87,5 @@ def _short(text: str) -> str:
 
 
 def known_languages() -> str:
-    """In words, for a message."""
+    """The known languages in words, for a message."""
     return ", ".join(f'"{code}" ({name})' for code, name in LANGUAGES.items())

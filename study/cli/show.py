@@ -67,7 +67,7 @@ def _show_recording(path: Path, as_json: bool) -> None:
 
 
 def _folder(what: str, data: Path) -> Path:
-    """Also that of a session that was withdrawn or cannot be read: these are looked at too."""
+    """Folder of a session, also of one that was withdrawn or cannot be read: these can be shown too."""
     from study.store.sessions.archive import find_session, session_folders
 
     folder = Path(what) if Path(what).is_dir() else data / what

@@ -61,7 +61,8 @@ class MaskingSound:
                 raise OSError(f"{self.output} plays no more" if self._playing else f"{self.output} plays nothing")
 
     def stop(self) -> bool:
-        """Without what the output still holds in its buffers. Whether it played until now. Never raises."""
+        """Stop at once, without what the output still holds in its buffers. Returns whether it played until now. Never
+        raises."""
         played, self._playing = self._playing, False
         if played:
             with contextlib.suppress(Exception):

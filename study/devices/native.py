@@ -88,7 +88,7 @@ def set_word(context: Any, address: Any, place: Any, value: Any) -> Any:
 
 @part
 def now_s(system: Addresses) -> float:
-    """As `time.monotonic`, to the last bit."""
+    """The time in s, as `time.monotonic` gives it, to the last bit."""
     if system[CLOCK] == 0:
         return float(call_float(system[MONOTONIC], ()))
     time_now = room_for_2()
@@ -101,7 +101,7 @@ def now_s(system: Addresses) -> float:
 
 @part
 def sleep_until(system: Addresses, until_s: float) -> None:
-    """Only where `system[SLEEP]` is not 0."""
+    """Sleep until a time. Call it only where `system[SLEEP]` is not 0."""
     until = room_for_2()
     whole_s = int(until_s)
     set_word(until, 0, whole_s)

@@ -78,8 +78,8 @@ class SafeDevice:
         self._held = stimulus
 
     def hold_unchecked(self, stimulus: HeldStimulus) -> None:
-        """As `hold`, for a stimulus that it refuses, of the right shape: to show with no hand on the handle that the
-        caps of each tick hold."""
+        """Hold a stimulus of the right shape that `hold` refuses: shows, with no hand on the handle, that the caps of
+        each tick hold."""
         if self._hand_on_handle:
             raise _refusal("A hand is on the handle.", "Open it without.")
         self._must_be_idle()

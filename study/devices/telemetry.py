@@ -46,8 +46,8 @@ class Ring:
                 self._make(rows)
 
     def rows(self, rate_hz: float) -> FloatArray | None:
-        """For the loop, (1 + rows, RING_WIDTH), with every page there before the first tick needs it. None where there
-        is no ring."""
+        """The ring for the loop, (1 + rows, RING_WIDTH), with every page in memory before the first tick needs it. None
+        where there is no ring."""
         if not self.path:
             return None
         try:
@@ -59,7 +59,7 @@ class Ring:
         return rows
 
     def remove(self) -> None:
-        """Who reads it keeps what is in it. Never raises; may be called again."""
+        """Remove the ring's file; a reader keeps what is in it. Never raises; may be called again."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
             with contextlib.suppress(OSError):

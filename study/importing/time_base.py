@@ -88,8 +88,8 @@ class TimeBase:
         )
 
     def samples(self, values: Value) -> Samples:
-        """Times by the reference clock. Rows skipped by a uniform logger are missing samples, unless the map says that
-        there are no gaps."""
+        """Sample times by the reference clock. Rows skipped by a uniform logger are missing samples, unless the map
+        says that there are no gaps."""
         times_s = self.times_s(len(values)) + self.offset_s
         widest_s = 0.0 if self.places is None else float(np.max(np.diff(self.places))) / self.rate_hz
         if self.places is not None and self.places[-1] > len(self.places) - 1 and widest_s <= self.gap_s:

@@ -34,8 +34,8 @@ class GivenBase:
 
 
 def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: GivenBase) -> Regression:
-    """As `regression_of`, with the model's needed force as the base. Free parameters that hardly change the force are
-    left out."""
+    """Build the regression of `regression_of` with the model's required force as its base. Free parameters that hardly
+    change the force are left out."""
     varying = _sensitive_columns(given)
     columns = [each[:, varying] for each in given.columns]
     plain = replace(regression_of(motions, axis, laws, False, None, columns), mass=given.mass)

@@ -169,7 +169,8 @@ def _smoother_gains(
 
 
 def _covariance_by_schur_form(advance: FloatArray, observed: FloatArray, process_noise: FloatArray) -> FloatArray:
-    """As `_steady_covariance`. Raises numpy.linalg.LinAlgError."""
+    """Steady prediction covariance by an ordered Schur form (SciPy), slower than by doubling. Raises
+    numpy.linalg.LinAlgError."""
     try:
         return np.asarray(solve_discrete_are(advance.T, observed.T, process_noise, np.eye(len(observed))))
     except ValueError as problem:  # not finite

@@ -36,7 +36,8 @@ class Observed:
     """(n,): held-out samples, used only in the end."""
 
     def unseal(self, opened: Mask) -> "Observed":
-        """With those of the held-out samples to fit and, of each stretch the last third, to choose by."""
+        """Copy in which the held-out samples of `opened` are used too: two thirds of each stretch to fit, the last
+        third to choose by."""
         opened = opened & self.test
         edges = np.flatnonzero(np.diff(np.concatenate([[0], opened.astype(np.int8), [0]]))).reshape(-1, 2)
         fit, choose = self.fit.copy(), self.choose.copy()

@@ -67,7 +67,8 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
 
 
 def _needs_law(result: SearchResult) -> bool:
-    """Only whole simulations prove a law; where noise alone is left, there is none to be found."""
+    """Whether a law may be searched for: only whole simulations prove one, and where noise alone remains, there is none
+    to be found."""
     context, found = result.context, result.found
     if (
         context.measure.name != "free simulation"

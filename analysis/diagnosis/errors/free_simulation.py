@@ -18,7 +18,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeSimulation:
-    """From rest at the first sample."""
+    """Output error of a simulation that starts at rest at the first sample and sees the commands alone."""
 
     records: tuple[Observed, ...]
     unit: FloatArray

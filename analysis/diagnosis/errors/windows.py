@@ -37,7 +37,8 @@ STATES = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
-    """For plants that integrate freely, and for recordings that do not begin at rest."""
+    """Output error over windows, each from a fitted initial state (multiple shooting): for plants that integrate
+    freely, and for recordings that do not begin at rest."""
 
     records: tuple[Observed, ...]
     states: tuple[FloatArray, ...]

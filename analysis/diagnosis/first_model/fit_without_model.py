@@ -90,7 +90,8 @@ def _free_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
 
 
 def _plain_structure(recordings: Sequence[Recording], kind: Kind) -> MechanicalModel | None:
-    """None where no motion was measured along the commands, or that does not carry the structure."""
+    """Fit the plain structure by force balance; None where no motion was measured along the commands, or where the fit
+    fails."""
     try:
         return fit_structure(balance_recordings(recordings), kind).model
     except (StructureRefused, NoMotionError):
@@ -143,7 +144,7 @@ def _require_no_weight(recordings: Sequence[Recording]) -> None:
 
 
 def _rigid_model(recordings: Sequence[Recording], whose: str) -> MechanicalModel | None:
-    """None where the recordings do not carry one."""
+    """Fit a rigid body; None where the recordings do not determine one."""
     if not can_be_rigid(recordings):
         return None
     try:

@@ -207,7 +207,7 @@ def _lowest_derivative_channels(signal: Signal) -> list[int]:
 
 
 def _select_excitation(excitation: Signal | None, command: Signal, kept: Sequence[int]) -> Signal | None:
-    """None where there is no excitation, or none for each command."""
+    """The excitations of the kept commands; None where there is no excitation, or none for each command."""
     if excitation is None or len(excitation.channels) != len(command.channels):
         return None
     return excitation.select_channels(kept)

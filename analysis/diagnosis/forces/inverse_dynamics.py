@@ -78,7 +78,8 @@ def required_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
 
 
 def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
-    """For a model whose every coordinate is measured: the derivatives suffice, without another Fourier transform."""
+    """Required force of a model whose every coordinate is measured: the derivatives suffice, without another Fourier
+    transform."""
     to_coordinates = np.linalg.inv(model.output[: model.inputs])
     to_commands = np.linalg.inv(model.input)
     matrices = model.stiffness, model.damping, model.mass

@@ -15,7 +15,7 @@ _WELL_CONDITIONED = 1e8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisTransfer:
-    """From a force held over each sample along each driven axis; each (lines, rows, m)."""
+    """Transfer functions from a force along each driven axis, held over each sample; each of shape (lines, rows, m)."""
 
     response: ComplexArray
     """To the response, as the sensor reads it."""

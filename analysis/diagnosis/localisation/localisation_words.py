@@ -20,7 +20,7 @@ def localisation_sentences(local: Localisation) -> tuple[str, ...]:
 
 
 def entry_sentence(entry: EntryPoint | None) -> str:
-    """Where the mismatch enters; empty with too few lines of enough power."""
+    """Sentence on the place where the mismatch enters; empty with too few lines of enough power."""
     if entry is None or not entry.ranking or entry.lines < ENTRY_LEAST_LINES:
         return ""
     best = entry.ranking[0]

@@ -33,8 +33,8 @@ class Proposal:
 
 
 def propose_experiment(context: SearchContext, found: Explanation) -> Proposal | None:
-    """For the first pair of rivals that some recording would tell apart, else for the last pair; None where no rival
-    is as good as what is named."""
+    """Propose a recording for the first pair of rivals that some recording would distinguish, else for the last pair;
+    None where no rival is as good as the named effects."""
     proposal = None
     for fitted_candidates in found.rounds[: len(found.steps)]:
         rival = _best_rival(fitted_candidates)

@@ -76,8 +76,8 @@ def primary_analysis(
     confidence: float = CONFIDENCE,
     declared_hz: Sequence[float] = (),
 ) -> PrimaryAnalysis | None:
-    """None below two persons or two frequencies with answers. declared_hz: the declared contrast's, first minus second,
-    or none."""
+    """Fit the hierarchical model to all answers; None with fewer than two persons or two frequencies with answers.
+    declared_hz: the declared contrast's frequencies, first minus second, or none."""
     if answers is None or answers.persons < 2:
         return None
     asked_hz, answers = answers.frequencies_hz, at_played_frequencies(answers)

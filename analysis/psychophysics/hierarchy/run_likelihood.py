@@ -45,7 +45,8 @@ class Nuisance:
 
 @dataclass(frozen=True, slots=True)
 class RunLikelihood:
-    """In dB re 1 N. An interval holds every threshold that the answers do not contradict."""
+    """Threshold of one person at one frequency by those answers alone, in dB re 1 N. Its interval holds every threshold
+    that the answers do not contradict."""
 
     subject: str
     frequency_hz: float

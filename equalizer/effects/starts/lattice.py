@@ -16,7 +16,7 @@ BIN_SHARE = 0.2
 
 
 def lattice_offset(values: FloatArray, step: float) -> float | None:
-    """Where the lattice of this step starts, between minus and plus half a step; None where values are not on one."""
+    """Offset of the lattice of this step, between minus and plus half a step; None where values are not on one."""
     if step <= 0:
         return None
     turn = np.exp(2j * np.pi * values / step)

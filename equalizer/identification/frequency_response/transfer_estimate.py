@@ -42,8 +42,8 @@ class EstimateSettings:
 
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
-    """From total command to response. Raises TransferEstimateError where the recordings do not belong together, or
-    hold fewer independent experiments than there are inputs."""
+    """Estimate the transfer function from total command to response. Raises TransferEstimateError where the recordings
+    do not belong together, or hold fewer independent experiments than there are inputs."""
     settings = settings or EstimateSettings()
     _check_alike(recordings)
     found = _collect_experiments(recordings, settings)

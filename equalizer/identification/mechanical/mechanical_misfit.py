@@ -94,7 +94,7 @@ class LineGroup:
         return self.of_lines(~self.left_out)
 
     def thin_out(self, most: int) -> "LineGroup":
-        """At most `most` lines: every second, third... one, with held-out lines chosen anew."""
+        """Keep at most `most` lines: every second, third, ... line, with held-out lines chosen anew."""
         every = -(-len(self.frequency_hz) // most)
         part = self.of_lines(np.arange(len(self.frequency_hz)) % every == 0)
         return replace(part, left_out=_every_fourth_line(len(part.frequency_hz)))

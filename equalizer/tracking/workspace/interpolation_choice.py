@@ -71,11 +71,10 @@ def held_out_model(model: IdentifiedModel, band_hz: tuple[float, float]) -> Held
 def choose_interpolation(
     workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace] = (), weight: float = WEIGHT
 ) -> InterpolationChoice:
-    """With `held_out` by those; else each model that lies between the others is held out in turn, which judges a
-    coarser grid than the one that is used. Blended forces where nothing can be checked, or modes do not match.
-
-    Raises WorkspaceError for a held-out place where one of the models was identified: it would judge nothing.
-    """
+    """Choose between modal and blended interpolation: by the models of `held_out` places, else by holding out in turn
+    each model that lies between the others, which judges a coarser grid than the one that is used. Blended forces where
+    nothing can be checked, or modes do not match. Raises WorkspaceError for a held-out place where one of the models
+    was identified: it would judge nothing."""
     _check_apart(workspace, held_out)
     try:
         modal = modal_interpolation(workspace) if len(workspace) > 1 else None

@@ -76,7 +76,7 @@ class History:
             self._forget(arrived_s - KEPT_S)
 
     def counted(self, since_s: float) -> Counts:
-        """From the last arrival before that time to the newest."""
+        """Counts from the last arrival before that time to the newest."""
         with self._lock:
             arrivals = self._arrivals.rows
             if not len(arrivals):

@@ -104,8 +104,9 @@ class PacketParser:
         return self._count_on(last, packets, anew)
 
     def _choose(self, starts: Indices, packets: Packets) -> tuple[Packets, npt.NDArray[np.int64], int]:
-        """Those that count, (n,); (n,), 1 where the firmware began anew with it, else 0; how many bytes are used up.
-        Those of a doubtful packet are not: one that counts may begin among them."""
+        """Choose the packets that count. Returns them, (n,); (n,), 1 where the firmware began anew with the packet,
+        else 0; and how many bytes are used up. Bytes of a doubtful packet are not used up: a packet that counts may
+        begin among them."""
         chosen, anew, used, last = [packets[:0]], [0] * 0, 0, self._last
         for k, start in enumerate(starts.tolist()):
             packet = packets[k : k + 1]

@@ -57,14 +57,14 @@ class Accelerometer:
 
     @property
     def samples(self) -> FloatArray:
-        """Where compiled code reads what `latest` tells."""
+        """The array from which compiled code reads what `latest` returns."""
         return self._newest.rows
 
     def latest(self) -> tuple[FloatArray, bool]:
         return self._newest.fresh(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed:
-        """As `study.devices.rig.SensesApart`."""
+        """Read the sensor apart from the position: the port of `study.devices.rig.SensesApart`."""
         if len(tick_s):
             time.sleep(max(0.0, tick_s[-1] + HALF_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
         placed = self._placed(tick_s, rate_hz) if len(tick_s) else Placed(np.zeros((0, 3)), None)

@@ -138,7 +138,7 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
     def run_due(  # noqa: PLR0913 - compiled code takes function pointers one by one
         sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, course: Any, ticks: int
     ) -> int:
-        """At most `ticks` ticks, fewer if all is over before."""
+        """Run at most `ticks` ticks that are due, fewer if all is over before. Returns their number."""
         _ = sources
         code = GOES_ON
         for _k in range(ticks):

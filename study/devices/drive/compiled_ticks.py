@@ -56,7 +56,7 @@ class CompiledTicks:
         return self.last_seen() if self._running else None
 
     def last_seen(self) -> FloatArray | None:
-        """That of the last call, or of the one under way."""
+        """Last reading of the last call, or of the one under way."""
         while count := int(self._flags[SEEN]):
             reading: FloatArray = self._seen[(count - 1) % SEEN_ROWS].copy()
             if self._flags[SEEN] - count < SEEN_ROWS - 1:

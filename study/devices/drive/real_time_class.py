@@ -88,8 +88,8 @@ _USERS = _Users()
 
 @contextlib.contextmanager
 def real_time_class() -> Iterator[Granted]:
-    """For the calling thread until it ends, and for the program's memory until the last that asked for it ends. Raises
-    nothing."""
+    """Give the calling thread the real-time class until it ends, and lock the program's memory until the last user
+    ends. Raises nothing."""
     granted = _USERS.enter()
     try:
         yield granted

@@ -75,7 +75,7 @@ class Glances:
         return self._request is not None and not self._request.taken.is_set()
 
     def mark_taken(self) -> None:
-        """To be said by the loop's thread after a reading."""
+        """Note that a reading was taken; called by the loop's thread after each."""
         if self._request is not None:
             self._request.taken.set()
 

@@ -18,7 +18,7 @@ class Seen:
 
 
 def look_of(seen: Seen | None, missed_ticks: int) -> Look:
-    """Without anything seen: a look without a reading."""
+    """The look that screens may show; without a reading where nothing was read."""
     if seen is None:
         return Look(None, None, sensor_clipped=False, buttons=frozenset(), missed_ticks=missed_ticks)
     return Look(

@@ -100,7 +100,8 @@ def _look(calls: Addresses, cells: FloatArray) -> int:
 
 @part
 def _sense_acceleration(samples: FloatArray, now: float, reading: FloatArray) -> None:
-    """As `study.devices.accelerometer.newest_sample.NewestSample.fresh`."""
+    """Read the accelerometer in compiled code, as `study.devices.accelerometer.newest_sample.NewestSample.fresh` does
+    in Python."""
     count = samples[0, COUNT]
     while count > 0.0:
         row = 1 + int(count - 1.0) % ROWS
@@ -142,7 +143,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
 
 @part
 def _is_silent(calls: Addresses, cells: FloatArray) -> bool:
-    """For longer than the device holds a force by itself."""
+    """Whether no force was sent for longer than the device holds a force by itself."""
     return bool(now_s(calls) - cells[SENT_S] > cells[DROPS_AFTER_S] > 0.0)
 
 
@@ -168,7 +169,7 @@ def _wake(calls: Addresses, cells: FloatArray) -> int:
 
 @part
 def _send(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
-    """Only with the lock."""
+    """Send a force. The caller must hold the lock."""
     if _is_silent(calls, cells):
         code = _wake(calls, cells)
         if code != 0:

@@ -125,7 +125,8 @@ class Handle:
         self.library.call("dhdSetTimeGuard", 0, self.number)
 
     def arm_watchdog(self, seconds: float) -> float:
-        """For how long the device holds a force now that no other follows, s, as it says itself; 0: for ever."""
+        """Arm the watchdog. Returns for how long the device now holds a force that no other follows, in s, as the
+        device reports it; 0: for ever."""
         self.library.call("dhdEnableExpertMode")
         units = c_ubyte()
         try:

@@ -112,7 +112,7 @@ class Library:
         return LibraryError(name, code, text.decode("utf-8", "replace"))
 
     def addresses(self, names: tuple[str, ...]) -> npt.NDArray[np.int64]:
-        """For calls from compiled code."""
+        """Addresses of the library's functions, for calls from compiled code."""
         return np.array([address_of(self._functions[name]) for name in names], dtype=np.int64)
 
     def call(self, name: str, *arguments: Any) -> int:

@@ -42,11 +42,11 @@ class VendorLinkage:
         self._library, self._number = handle.library, handle.number
 
     def at(self, position_m: FloatArray) -> LinkageReading | None:
-        """None out of reach. Raises `DeviceError`."""
+        """The linkage at a position of the handle; None out of reach. Raises `DeviceError`."""
         return self._asked(self._at, position_m)
 
     def angles_at(self, position_m: FloatArray) -> FloatArray | None:
-        """As `at`, the joint angles alone."""
+        """Joint angles (3,) at a position of the handle, rad; None out of reach. Raises `DeviceError`."""
         return self._asked(lambda place: self._angles(self._counts(place)), position_m)
 
     def check_frame(self) -> None:
@@ -74,7 +74,7 @@ class VendorLinkage:
         return float(np.linalg.norm(jacobian @ (angles - reading.joint_angle_rad)))
 
     def _asked(self, ask: Callable[[FloatArray], Told | None], position_m: FloatArray) -> Told | None:
-        """None out of reach. Raises `DeviceError`."""
+        """Ask the library for the linkage at a position; None out of reach. Raises `DeviceError`."""
         try:
             return ask(position_m)
         except LibraryError as error:

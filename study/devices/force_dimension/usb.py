@@ -29,7 +29,7 @@ class UsbDevice:
 def find_usb_devices(
     devices: Path = Path("/sys/bus/usb/devices"), nodes: Path = Path("/dev/bus/usb")
 ) -> tuple[UsbDevice, ...] | None:
-    """None where this system does not tell (no Linux)."""
+    """Find devices on the USB; None where this system cannot list them (no Linux)."""
     if not devices.is_dir():
         return None
     found = []

@@ -89,7 +89,7 @@ def _hear(state: FloatArray, settings: FloatArray) -> None:
 
 @part
 def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
-    """From 0 at 0 ticks to 1 at `length`."""
+    """Share of a fade: from 0 at 0 ticks to 1 at `length`."""
     if ticks >= length:
         return 1.0
     if ticks <= 0:

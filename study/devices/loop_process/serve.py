@@ -77,7 +77,7 @@ class DeviceServer:
             thread.start()
 
     def close(self) -> None:
-        """With a fade; then the caller hears that it is done. Never raises."""
+        """Close the device with a fade, then tell the caller that it is done. Never raises."""
         self._device.close()
         self._closed.set()
         self._threads[-1].join(LAST_ANSWER_S)

@@ -110,7 +110,7 @@ def replay_rig(path: Path) -> CompiledRig:
 
 
 def _nearest(excitation: FloatArray, wanted: FloatArray) -> int:
-    """Where in the excitation (N, 3) the stretch begins that differs least from wanted (n, 3), n <= N."""
+    """Index in the excitation (N, 3) of the stretch that differs least from wanted (n, 3), n <= N."""
     rows = len(excitation) - len(wanted) + 1
     size = len(excitation) + len(wanted)
     lines = np.fft.rfft(excitation, size, axis=0) * np.fft.rfft(wanted, size, axis=0).conj()

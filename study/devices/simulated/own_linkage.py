@@ -28,7 +28,7 @@ LIGHTEST_KG = 0.07
 
 
 class SimulatedLinkage:
-    """Without a hand."""
+    """Linkage of the simulated omega.3, without a hand."""
 
     def __init__(self, parameters: Omega3Parameters, info: DeviceInfo) -> None:
         self.info = info
@@ -36,7 +36,7 @@ class SimulatedLinkage:
         self._masses, self._reach_m = parameters.masses, parameters.stops.radius_m
 
     def at(self, position_m: FloatArray) -> LinkageReading | None:
-        """None in the stops."""
+        """The linkage at a position of the handle; None in the stops."""
         if not float(np.linalg.norm(position_m)) < self._reach_m:
             return None
         angles, rates = _pose(self._packed, position_m)
@@ -48,7 +48,7 @@ class SimulatedLinkage:
         return LinkageReading(np.array(position_m), angles, jacobian, inertia, held)
 
     def angles_at(self, position_m: FloatArray) -> FloatArray | None:
-        """As `at`, the joint angles alone."""
+        """Joint angles (3,) at a position of the handle, rad; None in the stops."""
         return _pose(self._packed, position_m)[0] if float(np.linalg.norm(position_m)) < self._reach_m else None
 
     def check_frame(self) -> None:

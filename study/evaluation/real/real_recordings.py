@@ -246,7 +246,7 @@ def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:
 
 @contextmanager
 def _new_folder_in_parents(folder: Path) -> Iterator[Path]:
-    """As `new_folder`, with its parents. Raises StudyError."""
+    """Open a new folder as `new_folder` does, and create its parents. Raises StudyError."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:

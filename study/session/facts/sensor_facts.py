@@ -8,7 +8,7 @@ from study.session.facts.sitting_events import FACT
 
 @dataclass(frozen=True, config=FACT)
 class SensorFacts:
-    """From the onset until the handle was at rest."""
+    """What the log says of the accelerometer for one trial, from the onset until the handle was at rest."""
 
     packets: Count
     """Whole ones."""

@@ -45,7 +45,7 @@ class Lateness:
 
     @property
     def too_late(self) -> bool:
-        """For a real device. NaN counts as too late."""
+        """Whether a real device's loop is too late. NaN counts as too late."""
         return not self.p99_ms < LATE_TICKS * self.tick_ms
 
 

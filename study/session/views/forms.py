@@ -175,7 +175,7 @@ def _reminder(setup: SetupSettings, answers: dict[str, str]) -> str:
 
 
 def _questions(kind: FormKind, name: str, questions: tuple[Question, ...], words: Words) -> Form:
-    """None of them needs an answer: taking part does not depend on them."""
+    """Form of voluntary questions: taking part does not depend on their answers."""
     fields = tuple(_question(question, words) for question in questions)
     return Form(kind, words[f"{name}_title"], words[f"{name}_intro"], fields)
 

@@ -13,7 +13,7 @@ ASKED = {"before": "questionnaire", "debrief": "debrief"}
 
 @dataclass(frozen=True, slots=True)
 class FilledForm:
-    """As it was logged."""
+    """A filled form, as it was logged."""
 
     subject: str
     session: str

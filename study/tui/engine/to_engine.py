@@ -123,7 +123,7 @@ class Heartbeat:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """To the `Ask` or `LayDown` of the same number. A number that is over is ignored."""
+    """Reply to the `Ask` or `LayDown` of the same number. Replies to a question that is over are ignored."""
 
     number: int
     value: Any

@@ -68,7 +68,7 @@ class DemoScreen(SpokenScreen[DemoChoice]):
             take_off(self, PlayDemo(self._vibration, answer))
 
     def action_heard(self, answer: int) -> None:
-        """For the footer only: the answers are handled in `on_key`."""
+        """Gives the footer its entry; the answers are handled in `on_key`."""
 
     def action_turn(self, step: int) -> None:
         turned = self._vibration + step

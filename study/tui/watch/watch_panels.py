@@ -59,7 +59,7 @@ def alarm_lines(unseen: Sequence[Alarm], seen: Sequence[Alarm]) -> Content:
 
 
 def runs_lines(view: WatchView, rows: int) -> Content:
-    """As many runs as there are rows, the current one among them."""
+    """Lines on as many runs as there are rows, the current run among them."""
     lines = [Content.styled("  run            Hz  rev.  n", MUTED)]
     lines += [_run_line(view, run) for run in _around_the_present(view.runs, rows - 1)]
     return Content("\n").join(lines)

@@ -96,7 +96,7 @@ def check_today(name: str, moving: Moving) -> CheckedToday:
 
 
 def check_on(device: Device, plan: RecordingPlan, moving: Moving) -> CheckedToday:
-    """As `check_today`, on an open device."""
+    """Carry out the check of `check_today` on an open device."""
     baseline, digest = _accepted_recording(device.info, plan.protocol)
     begun: list[str] = []
 

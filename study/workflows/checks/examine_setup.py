@@ -104,7 +104,7 @@ def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[f
 
 
 def _settings(name: str, timing_s: float) -> DeviceSettings:
-    """As for a study, but without the centring spring: nothing may move while the loop is timed."""
+    """Settings of a study, but without the centring spring: nothing may move while the loop is timed."""
     settings = device_settings(read_study_protocol(PROTOCOL).protocol)
     longest_s = max(settings.limits.longest_hold_s, timing_s + SPARE_S)
     limits = replace(settings.limits, longest_hold_s=longest_s)

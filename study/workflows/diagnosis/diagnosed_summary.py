@@ -11,7 +11,7 @@ from study.store.formats.diagnosis_file import MODEL_NAME, PAGE_NAME
 
 
 def summary(findings: Findings) -> dict[str, Any]:
-    """As in diagnosis.json."""
+    """The diagnosis as plain values, as in diagnosis.json."""
     return {"format": FORMAT, "version": VERSION, **diagnosis_to_json(findings.diagnosis)}
 
 

@@ -19,7 +19,8 @@ GIVE_ONE = "Give a model of the device alone with --model, or a recording that c
 def first_model_of(
     found: DiagnosisInput, without: Sequence[str], bounds: tuple[TimeBudget, Guard], on_progress: Progress
 ) -> FirstModel:
-    """As in `analysis`; if the force balance crashes, by a fit to spectra. Raises StudyError."""
+    """Fit a first model by force balance; if the balance crashes, to spectra. bounds: remaining time, and the guard
+    that catches crashes. Raises StudyError."""
     time_left, guard = bounds
 
     def weighed() -> FirstModel | None:

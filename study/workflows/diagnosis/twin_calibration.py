@@ -24,7 +24,8 @@ def check_same_device(calibration: LinkageCalibration, device: str, title: str) 
 
 
 def inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> tuple[ModelEffect, ...]:
-    """At the centre; an axis along which the inertia stays the same has none.
+    """Change of inertia along each axis at the centre, as effects; an axis along which the inertia stays the same has
+    none.
 
     The effect's `per_m` counts the mass on the drive's side of the cables alone, so it is larger than of the whole.
     """

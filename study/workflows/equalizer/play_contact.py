@@ -222,7 +222,7 @@ def _play_both(
 
 
 def _settings(plan: ContactPlan, models: ModelsForPlaying, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
-    """Without fade-in: a force that begins with the contact begins with a step."""
+    """Settings of the device, without fade-in: a force that begins with the contact begins with a step."""
     settings, rate_hz = playback_settings(plan.cap_n, models), models.nearest.sample_rate_hz
     steps = [np.linalg.norm(np.diff(each, axis=0, prepend=0, append=0), axis=1).max() for each in forces]
     slew_n_per_s = max(settings.limits.slew_n_per_s, float(max(steps)) * rate_hz + SPRING_SLEW_N_PER_S)
@@ -277,7 +277,7 @@ def contact_summary(done: ContactPlay) -> dict[str, Any]:
 
 
 def contact_lines(done: ContactPlay) -> tuple[str, ...]:
-    """For the terminal."""
+    """Lines for the terminal."""
     found = contact_summary(done)
     low, high = done.band_hz
     return (

@@ -79,7 +79,7 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
 
 
 def calibration_summary(written: WrittenCalibration) -> dict[str, Any]:
-    """As one JSON document."""
+    """The calibration as plain values, for one JSON document."""
     calibration = written.calibration
     centre = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
     masses = np.linalg.eigvalsh(calibration.inertia_kg)
@@ -107,7 +107,7 @@ def calibration_summary(written: WrittenCalibration) -> dict[str, Any]:
 
 
 def calibration_lines(written: WrittenCalibration) -> tuple[str, ...]:
-    """For a person."""
+    """Lines for the terminal."""
     told = calibration_summary(written)
     positions, (least, most) = told["positions"], told["mass_kg"]
     along = ", ".join(f"{told['centre']['inertia_kg'][axis][axis]:.3g}" for axis in range(3))

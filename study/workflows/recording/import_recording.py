@@ -82,7 +82,7 @@ class Foreign:
 
 
 def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progress = lambda share: None) -> Foreign:
-    """As `import_recording`, into memory. Raises StudyError."""
+    """Import recordings into memory; nothing is written. Raises StudyError."""
     if map_name is not None:
         source = read_map(map_name)
         return _by_map(source, _inside(files, source.map), on_progress)

@@ -70,7 +70,7 @@ def record_on(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
-    """As `record_device`, on an open device."""
+    """Record on an open device."""
     done: list[Take] = []
     try:
         if not device.info.simulated:

@@ -51,7 +51,7 @@ class LawKind:
 
 
 def _either(random: Random, simple: tuple[float, ...], low: float, high: float) -> float:
-    """With equal probability one of the simple numbers, or any number in the range."""
+    """Draw, with equal probability, one of the simple numbers or any number in the range."""
     return float(random.choice(simple)) if random.random() < 0.5 else float(random.uniform(low, high))
 
 

@@ -33,7 +33,8 @@ Build = Callable[[MujocoBench, int, Values], MujocoBench]
 def draw_mujoco_case(
     seed: int, effects: Sequence[str], concealed: Concealed, strength: Sequence[float], name: str, rig: Rig
 ) -> Case:
-    """As `draw_case`. Raises ValueError for an effect that the engine cannot express."""
+    """Draw a case as `draw_case` does, moved by MuJoCo. Raises ValueError for an effect that the engine cannot
+    express."""
     if unknown := set(effects) - set(BUILDERS) - set(IN_THE_SENSOR):
         raise ValueError(f"the second engine cannot conceal {', '.join(sorted(unknown))}")
     random = np.random.default_rng([seed, len(effects), 2])
