@@ -111,9 +111,9 @@ def _diagnose_beside_clean(
         contrast = contrast.without_name(TOO_SHORT)
     if not settings.fitted and (noise_is_from_repeats(fitting.chosen) or predicts_clean(model, settings.clean)):
         found_by_model = _diagnose_by_model(recordings, model, settings, map_, progress)
-        said = found_by_model.diagnosis
-        names = frozenset(name for effect in said.effects for name in (effect.effect, *effect.class_))
-        if not contrast.contradicts(names, said.verdict == "explained"):
+        by_model = found_by_model.diagnosis
+        names = frozenset(name for effect in by_model.effects for name in (effect.effect, *effect.class_))
+        if not contrast.contradicts(names, by_model.verdict == "explained"):
             return found_by_model
     elif not settings.fitted and contrast.left_open:
         unweighed = _search_beside_clean(recordings, model, settings, contrast.tested_effects, map_, progress)

@@ -30,8 +30,8 @@ def check_clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Che
             ),
         )
     if recording.time_s is None:
-        said = (*_resampling_checks(recording), *_rate_checks(recording.sample_rate_hz))
-        return said or (Check(CLOCK, "fine", _clock_source(recording)),)
+        checks = (*_resampling_checks(recording), *_rate_checks(recording.sample_rate_hz))
+        return checks or (Check(CLOCK, "fine", _clock_source(recording)),)
     found = tuple(check for start, stop in stretches for check in _stamp_checks(recording, start, stop))
     return found or (Check(CLOCK, "fine", "All stamps are in their places."),)
 
@@ -57,8 +57,8 @@ def _clock_source(recording: Recording) -> str:
 
 def _resampling_checks(recording: Recording) -> tuple[Check, ...]:
     """Checks from an import's notes about uneven stamps."""
-    said = recording.meta.get("import")
-    notes = said.get("notes", ()) if isinstance(said, dict) else ()
+    origin = recording.meta.get("import")
+    notes = origin.get("notes", ()) if isinstance(origin, dict) else ()
     uneven = [str(note) for note in notes if "uneven stamps" in str(note)] if isinstance(notes, list) else []
     return tuple(
         Check(CLOCK, "notice", f"The import has evened it out: {note}", "Trust phases far below half the rate only.")

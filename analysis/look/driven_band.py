@@ -120,8 +120,8 @@ def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tupl
         for name in idle
     ]
     found += [Check(DRIVEN, "wrong", sentence, "Correct the segments.") for sentence in silent_segments(recording)]
-    said = "; ".join(f"'{band.command}' is driven from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands)
-    return (*found, *((Check(DRIVEN, "fine", f"Command {said}."),) if said else ()))
+    text = "; ".join(f"'{band.command}' is driven from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands)
+    return (*found, *((Check(DRIVEN, "fine", f"Command {text}."),) if text else ()))
 
 
 def silent_segments(recording: Recording) -> tuple[str, ...]:

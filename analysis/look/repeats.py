@@ -90,9 +90,9 @@ def repeat_checks(recording: Recording, seen: Repeats) -> tuple[Check, ...]:
 def _noise_checks(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[Check, ...]:
     channels = recording.response.channels
     shares = np.array([each.share for each in noise])
-    said = conjoin([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
+    sentence = conjoin([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
     loud = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
-    text = f"Between repeats (up to {max(each.looks for each in noise)}) remain at least {said}, rms."
+    text = f"Between repeats (up to {max(each.looks for each in noise)}) remain at least {sentence}, rms."
     do = f"{conjoin(loud)} hardly repeat: average more periods, or drive more." if loud else ""
     return (Check(REPEATS, "notice" if loud else "fine", text, do),)
 

@@ -42,7 +42,7 @@ def delivery_warning(found: Sequence[Delivery]) -> str:
     off = [delivery for delivery in found if not delivery.as_wanted]
     if not off:
         return ""
-    said = [
+    texts = [
         f"{delivery.frequency_hz:g} Hz "
         f"({' and '.join(f'{100 * along:.0f} %' for along in delivery.along if along is not None)} "
         f"of what was wanted, {100 * delivery.off_axis:.0f} % off the direction)"
@@ -50,7 +50,7 @@ def delivery_warning(found: Sequence[Delivery]) -> str:
     ]
     return (
         f"The accelerations that arrived are not those that were wanted, by more than {100 * NEAR:.0f} % at the "
-        f"median: {conjoin(said)}. Take the delivered accelerations, not the levels, for what was felt there."
+        f"median: {conjoin(texts)}. Take the delivered accelerations, not the levels, for what was felt there."
     )
 
 

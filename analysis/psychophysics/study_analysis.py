@@ -251,9 +251,9 @@ def _declared_document(result: DeclaredResult) -> dict[str, Any]:
 def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
     """The published analysis beside the one within participants, in words and numbers."""
     if anova.p is None or within.p is None:
-        said = "neither" if anova.p is None and within.p is None else "only one"
+        text = "neither" if anova.p is None and within.p is None else "only one"
         return (
-            f"The published analysis is one-way, between groups; the design is within participants. Of the two, {said} "
+            f"The published analysis is one-way, between groups; the design is within participants. Of the two, {text} "
             "can be computed from these data, so they cannot be compared."
         )
     agree = (anova.p < 0.05) == (within.p < 0.05)

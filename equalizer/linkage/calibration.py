@@ -129,8 +129,8 @@ def reading_problems(reading: LinkageReading, gravity_known: bool = True) -> Ite
     """One sentence each."""
     where = "(" + ", ".join(f"{1000 * each:.0f}" for each in reading.position_m) + ") mm"
     jacobian, inertia = reading.jacobian, reading.inertia_kg
-    told = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
-    for name, values in (told | {"Jacobian": jacobian, "inertia": inertia}).items():
+    vectors = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
+    for name, values in (vectors | {"Jacobian": jacobian, "inertia": inertia}).items():
         if not np.isfinite(values).all():
             yield f"at {where} the {name} holds what is no number"
     if not (np.isfinite(jacobian).all() and np.isfinite(inertia).all()):

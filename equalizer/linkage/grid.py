@@ -32,8 +32,8 @@ def arm_azimuths(jacobian: FloatArray) -> FloatArray:
     ideal = turned + thirds * 2 * math.pi / 3
     off_deg = np.degrees(np.abs(outwards - ideal)).max()
     if len(set(thirds.astype(int) % 3)) < 3 or off_deg > MOST_OFF_DEG:
-        told = ", ".join(f"{each:.0f}" for each in np.degrees(outwards))
-        raise CalibrationError((f"the arms lie at {told} degrees; those of a delta device are 120 degrees apart",))
+        text = ", ".join(f"{each:.0f}" for each in np.degrees(outwards))
+        raise CalibrationError((f"the arms lie at {text} degrees; those of a delta device are 120 degrees apart",))
     azimuths: FloatArray = np.angle(np.exp(1j * ideal))
     return azimuths
 

@@ -111,12 +111,12 @@ def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
     width = columns()
     inside = None if width is None else width - 2
     yield view.verdict
-    said = (
+    sections = (
         ("Effects", view.sentences),
         ("Candidates, not confirmed", view.candidates),
         ("Rivals, and why not", view.rivals),
     )
-    for title, sentences in said:
+    for title, sentences in sections:
         if sentences:
             yield from ("", title, *(f"  {sentence}" for sentence in sentences))
     for title, rows in (("Fit", view.fit), ("Mismatch", view.mismatch), ("What remains", view.remainder)):

@@ -252,8 +252,8 @@ def without_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, 
     kept = np.delete(np.arange(len(stamps)), standing)
     arrays = {name: array[kept] if _is_row(array, len(stamps)) else array for name, array in names.arrays.items()}
     count = f"{len(standing)} row{'s' if len(standing) > 1 else ''}"
-    said = f"Clock '{clock.name}': {count} logged twice (the same stamp, the same values) left out."
-    return replace(names, arrays=arrays), said
+    text = f"Clock '{clock.name}': {count} logged twice (the same stamp, the same values) left out."
+    return replace(names, arrays=arrays), text
 
 
 def _repeats(array: Array, rows: npt.NDArray[np.intp]) -> bool:

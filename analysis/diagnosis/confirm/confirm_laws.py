@@ -229,8 +229,8 @@ def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) 
     return None
 
 
-def _all_of_some(said: Sequence[bool]) -> bool:
-    return bool(said) and all(said)
+def _all_of_some(flags: Sequence[bool]) -> bool:
+    return bool(flags) and all(flags)
 
 
 def leaves_open(result: SearchResult) -> bool:

@@ -114,14 +114,14 @@ def fit_first_linear_model(
             return rigid, (RIGID_SAID,)
         raise NothingToDiagnose((f"no model was given, and none can be fitted: {refusal}",)) from refusal
     tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on what was kept for a test"
-    said = (
+    text = (
         f"No model was given. A linear one was fitted to {whose} first, with an error of "
         f"{100 * fit.error:.1f} %{tested}, and its masses, dampers and springs were left open by much more than that; "
         "what it could take on itself, such as friction at one level as damping, is not missing from it any more, and "
         "is not named."
     )
     return widen_tolerance(fit.model), (
-        said,
+        text,
         *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks),
     )
 

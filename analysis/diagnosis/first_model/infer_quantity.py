@@ -30,8 +30,8 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
     first = recordings[0]
     if set(first.response.quantities) & KNOWN:
         return recordings, ""
-    if said := _said_by_names(first):
-        return tuple(_with_quantity(each, said) for each in recordings), _sentence_of_names(first, said)
+    if named := _said_by_names(first):
+        return tuple(_with_quantity(each, named) for each in recordings), _sentence_of_names(first, named)
     if not is_driven(recordings):
         if set(first.response.units) != {UNSTATED}:
             return recordings, ""
@@ -55,11 +55,11 @@ def _said_by_names(recording: Recording) -> tuple[str, ...]:
     from equalizer.signals.quantity_words import quantity_in  # only where a quantity is missing
 
     response = recording.response
-    told = [
+    found = [
         named if unit == UNSTATED and (named := quantity_in(name)) in KNOWN else quantity
         for name, unit, quantity in zip(response.channels, response.units, response.quantities, strict=True)
     ]
-    return tuple(told) if set(told) & KNOWN else ()
+    return tuple(found) if set(found) & KNOWN else ()
 
 
 def _sentence_of_names(recording: Recording, quantities: Sequence[str]) -> str:

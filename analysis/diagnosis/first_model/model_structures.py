@@ -222,8 +222,10 @@ def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np
     return np.asarray(MASSLESS_SHARE * force / np.maximum(moved, 1e-300))
 
 
-def _numbers(given: BalancedRecordings, fit: JointFit, said: tuple[UnitSystem, Sequence[Part]]) -> tuple[Number, ...]:
-    names, (system, parts) = given.recording.command.channels, said
+def _numbers(
+    given: BalancedRecordings, fit: JointFit, units_and_parts: tuple[UnitSystem, Sequence[Part]]
+) -> tuple[Number, ...]:
+    names, (system, parts) = given.recording.command.channels, units_and_parts
     return tuple(
         Number(f"{part} {name}", matrix_unit(part, system), float(fit.matrices[part][k, k]),
                float(fit.halves[part][k, k]))

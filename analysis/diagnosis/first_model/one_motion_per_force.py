@@ -34,15 +34,15 @@ Step = Callable[[Recordings], tuple[Recordings, str]]
 def one_motion_per_force(recordings: Sequence[Recording], turns: bool = True) -> tuple[Recordings, tuple[str, ...]]:
     """The converted recordings, and a sentence for each change. recordings: alike in channels, units and rate. turns:
     commands that are counted against their motion are reversed; not where a model says already how they are counted."""
-    found, said = tuple(recordings), []
+    found, remarks = tuple(recordings), []
     steps: tuple[Step, ...] = (
         name_motion, read_free_motion, _separate_conditions, _select_imposed_motion, _select_motions, _select_forces,
         restore_sign, _drop_constant_commands, _merge_commands,
     )  # fmt: skip
     for step in (*steps, reverse_commands) if turns else steps:
         found, sentence = step(found)
-        said.append(sentence)
-    return found, tuple(filter(None, said))
+        remarks.append(sentence)
+    return found, tuple(filter(None, remarks))
 
 
 def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:

@@ -15,8 +15,8 @@ _FORCES = "drives, mechanism and a hand enter so, and so does timing, which shif
 
 def localisation_sentences(local: Localisation) -> tuple[str, ...]:
     """Sentences about the residual of the re-tuned model: where it enters, and the states that it depends on."""
-    said = (entry_sentence(local.entry), states_sentence(local.states.get("retuned", ())))
-    return tuple(sentence for sentence in said if sentence)
+    texts = (entry_sentence(local.entry), states_sentence(local.states.get("retuned", ())))
+    return tuple(sentence for sentence in texts if sentence)
 
 
 def entry_sentence(entry: EntryPoint | None) -> str:

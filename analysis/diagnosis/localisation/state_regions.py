@@ -164,8 +164,8 @@ def _region(state: State, values: FloatArray, bins: IntArray, asked: _Sample) ->
 def _unevenness(seen: FloatArray, expected: FloatArray) -> float:
     """Chi-squared statistic of bin powers against the expected ones, over the total power."""
     whole = float(expected.sum())
-    told = expected > _LEAST_EXPECTED * whole / len(expected)
-    return float(np.sum((seen - expected)[told] ** 2 / expected[told])) / whole if whole > _TINY else 0.0
+    populated = expected > _LEAST_EXPECTED * whole / len(expected)
+    return float(np.sum((seen - expected)[populated] ** 2 / expected[populated])) / whole if whole > _TINY else 0.0
 
 
 def _within_stratum(strata: IntArray) -> FloatArray:

@@ -58,12 +58,12 @@ def as_document(best: PredictedGain, names: tuple[str, str]) -> NextExperiment |
     """The proposed experiment for the document; None where even the best recording would not tell the rivals apart."""
     if best.gain < TELLING_GAIN:
         return None
-    said = "; the recording's meta must say the weight (added_mass_kg, or added_inertia_kg_m2)"
+    text = "; the recording's meta must say the weight (added_mass_kg, or added_inertia_kg_m2)"
     return NextExperiment(
         command=f"record {best.experiment.words}",
         splits=names,
         why=f"there the two differ by more than the noise and the tolerances can hide: the right one would win by "
-        f"{best.gain:.3g} in log likelihood{said if best.experiment.added else ''}",
+        f"{best.gain:.3g} in log likelihood{text if best.experiment.added else ''}",
     )
 
 

@@ -45,7 +45,7 @@ def assemble_findings(
     context, found, judged = result.context, result.found, result.judgement
     measure, tuning = context.whole, context.tuning
     recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.placed_effects()
-    said, (improved, retuned) = labels_of(recording, tuning.model), _models(result, recording)
+    labels, (improved, retuned) = labels_of(recording, tuning.model), _models(result, recording)
     channels, errors = channel_names(recording, len(measure.noise)), _standard_errors(result)
     maps = mismatch_maps(measure, found.stages, floors, learned, context.map_)
     time_series = _time_series(measure, found, names)
@@ -74,7 +74,7 @@ def assemble_findings(
         local=examined.local,
         floor=floors[0],
         tuning=tuning,
-        axes=tuple(axis_letter(name, said.inputs) for name in said.inputs),
+        axes=tuple(axis_letter(name, labels.inputs) for name in labels.inputs),
         proposal=proposal,
         split_s=_split_s(measure),
         own_errors=errors[: len(tuning.names)] * tuning.deviation,
@@ -84,8 +84,8 @@ def assemble_findings(
 def _models(result: SearchResult, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
     """The re-tuned models with the named effects and without, driven by the commands as they were recorded."""
     tuning, found = result.context.tuning, result.found
-    fitted, said = found.after.fitted, labels_of(recording, tuning.model)
-    effects = (*tuning.model.effects, *model_effects(fitted.hypothesis.placed_effects(), said.inputs, said.outputs))
+    fitted, labels = found.after.fitted, labels_of(recording, tuning.model)
+    effects = (*tuning.model.effects, *model_effects(fitted.hypothesis.placed_effects(), labels.inputs, labels.outputs))
     with_them = replace(tuning.tune(fitted.deviations), effects=effects)
     return as_recorded(with_them, recording), as_recorded(tuning.tune(found.retuned.fitted.deviations), recording)
 
@@ -103,8 +103,8 @@ def _remarks(
     first: Sequence[str], time_series: Sequence[TimeSeries], tuning: Tuning, floors: tuple[NoiseFloor, ...]
 ) -> tuple[str, ...]:
     of_noise = (remark for floor in floors for remark in floor.remarks)
-    said = (*first, *unit_sentences(time_series), constant_sentence(tuning.model), *of_noise)
-    return tuple(dict.fromkeys(filter(None, said)))
+    texts = (*first, *unit_sentences(time_series), constant_sentence(tuning.model), *of_noise)
+    return tuple(dict.fromkeys(filter(None, texts)))
 
 
 def _split_s(measure: ErrorMeasure) -> dict[str, float]:
@@ -136,14 +136,14 @@ def _document(
     found, judged = result.found, result.judgement
     measure, tuning, fitted = result.context.whole, result.context.tuning, found.after.fitted
     maps, local = examined
-    said = labels_of(measure.records[0].recording, tuning.model)
+    labels = labels_of(measure.records[0].recording, tuning.model)
     return Diagnosis(
         verdict=judged.verdict,
         mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
         or (
             () if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.score, found.before.fitted)
         ),
-        effects=_effects_with_gains(result, errors[len(tuning.names) :], said) if judged.named else (),
+        effects=_effects_with_gains(result, errors[len(tuning.names) :], labels) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
@@ -156,10 +156,10 @@ def _document(
     )
 
 
-def _effects_with_gains(result: SearchResult, errors: FloatArray, said: Labels) -> tuple[NamedEffect, ...]:
+def _effects_with_gains(result: SearchResult, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
     """The named effects, with their gains on held-out data where samples were compared."""
     context, found = result.context, result.found
-    effects = named_effects(found, errors, said)
+    effects = named_effects(found, errors, labels)
     if found.statistic is not None or len(found.steps) != len(effects):
         return effects
     between = [context.with_test_score(step) for step in found.steps[:-1]]

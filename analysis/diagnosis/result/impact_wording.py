@@ -21,11 +21,11 @@ def impact_sentence(diagnosis: Diagnosis, named: str) -> str:
     rest = "" if diagnosis.verdict == "explained" else ", but that is not all"
     off = [errors.retuned, errors.after, errors.noise]
     factors = [f"{math.exp(ratio):.3g}" for ratio in off if ratio is not None]
-    said = "how far its amplitudes are off is not known"
+    text = "how far its amplitudes are off is not known"
     if len(factors) == len(off):
         without, with_it, chance = factors
-        said = (
+        text = (
             f"how strong they are, can: by half octaves, amplitudes are off by a factor of {without} without it and "
             f"of {with_it} with it, and chance alone makes {chance} of it"
         )
-    return f"Missing in the model: {named}{rest}. Its blows cannot be predicted one by one; {said}."
+    return f"Missing in the model: {named}{rest}. Its blows cannot be predicted one by one; {text}."

@@ -59,10 +59,12 @@ def retuned_sentence(moved: Sequence[MovedNumber], fitted: bool = False) -> str:
         return ""
     texts = [f"{number.name} {number.size}" if fitted else number.text for number in moved[:_LISTED]]
     more = len(moved) - _LISTED
-    said = conjoin([*texts, f"{more} more"] if more > 0 else texts)
+    sentence = conjoin([*texts, f"{more} more"] if more > 0 else texts)
     if fitted:
-        return f"Fitted once more, these numbers of the first model moved by more than was left open at first: {said}."
-    return f"Re-tuned beyond the calibration's standard deviation: {said}."
+        return (
+            f"Fitted once more, these numbers of the first model moved by more than was left open at first: {sentence}."
+        )
+    return f"Re-tuned beyond the calibration's standard deviation: {sentence}."
 
 
 def doubtful_sentences(moved: Sequence[MovedNumber], fitted: bool = False) -> tuple[str, ...]:

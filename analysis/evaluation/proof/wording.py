@@ -18,8 +18,8 @@ def concealed_text(outcome: Outcome) -> str:
 
 
 def said_text(outcome: Outcome) -> str:
-    said = " + ".join(f"{e.effect}{f' of {e.axis}' if e.axis else ''} ({e.probability:.2f})" for e in outcome.named)
-    return f"{outcome.verdict.replace('_', ' ')}{f': {said}' if said else ''}"
+    text = " + ".join(f"{e.effect}{f' of {e.axis}' if e.axis else ''} ({e.probability:.2f})" for e in outcome.named)
+    return f"{outcome.verdict.replace('_', ' ')}{f': {text}' if text else ''}"
 
 
 def strength_text(outcome: Outcome) -> str:

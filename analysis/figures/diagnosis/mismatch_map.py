@@ -115,8 +115,8 @@ def _fits_upright(layout: _Layout) -> bool:
 
 
 def _row_label(channel: tuple[str, str], level: float, layout: _Layout) -> str:
-    said = _channel_label(channel, layout)
-    return said if _fits_upright(layout) or not level else f"{said} at {level:.3g}"
+    label = _channel_label(channel, layout)
+    return label if _fits_upright(layout) or not level else f"{label} at {level:.3g}"
 
 
 def _add_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:

@@ -16,14 +16,14 @@ _LOWEST = 1e-4
 
 def real_picture(answer: RealAnswer) -> Picture:
     rows = error_rows(answer)
-    said = "; ".join(f"{name} {100 * value:.3g} %" for name, value, _ in rows)
+    text = "; ".join(f"{name} {100 * value:.3g} %" for name, value, _ in rows)
     return Picture(
         name=f"held-out-{_plain_name(answer.folder)}-{_plain_name(answer.recording)}",
         title=f"Held-out data of {answer.recording}",
         caption="Left: where what was found changes the prediction most. Right: errors on all held-out data as a share "
         "of the signal, logarithmic; shorter is better.",
         figure=_draw_answer(answer.excerpt, rows),
-        alternative=said or "Nothing was held out.",
+        alternative=text or "Nothing was held out.",
     )
 
 

@@ -78,11 +78,11 @@ def draw_signature(signature: Signature) -> Figure:
     return figure
 
 
-def _scaled_label(said: str, values: FloatArray) -> tuple[str, float]:
+def _scaled_label(text: str, values: FloatArray) -> tuple[str, float]:
     """ "velocity of x (m/s)" as "Velocity of x (mm/s)", with the factor that goes with it."""
-    words, bracket, rest = said.rpartition(" (")
+    words, bracket, rest = text.rpartition(" (")
     if not bracket or "/√" in rest or rest.startswith("Hz"):
-        return said[:1].upper() + said[1:], 1.0
+        return text[:1].upper() + text[1:], 1.0
     scale = scale_of(rest.removesuffix(")"), float(np.max(np.abs(values))))
     return f"{words[:1].upper()}{words[1:]} ({scale.unit})", scale.factor
 

@@ -116,8 +116,8 @@ def cue_warnings(found: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tu
             f"Within a direction, answers followed what was delivered, so direction was not the only cue: "
             f"{conjoin(followed)}."
         )
-    if said := gap_text([gap for gap in gaps if gap.missing < gap.trials]):
-        sentences.append(said)
+    if sentence := gap_text([gap for gap in gaps if gap.missing < gap.trials]):
+        sentences.append(sentence)
     return tuple(sentences)
 
 

@@ -244,10 +244,10 @@ def _scatter(model: IdentifiedModel, frequency_hz: FloatArray, slow: tuple[SlowP
 
 def _refuse_foreign(records: tuple[Recording, ...], like: FrequencyResponse) -> None:
     for record in records:
-        told = (record.sample_rate_hz, record.command.channels, record.response.channels)
-        if told != (like.sample_rate_hz, like.input_channels, like.output_channels):
+        form = (record.sample_rate_hz, record.command.channels, record.response.channels)
+        if form != (like.sample_rate_hz, like.input_channels, like.output_channels):
             raise IdentificationRefused(
-                f"a record of {', '.join(told[2])} per {', '.join(told[1])} at {told[0]:g} Hz does not belong to a "
+                f"a record of {', '.join(form[2])} per {', '.join(form[1])} at {form[0]:g} Hz does not belong to a "
                 f"response of {', '.join(like.output_channels)} per {', '.join(like.input_channels)} at "
                 f"{like.sample_rate_hz:g} Hz; give the records that the response was estimated from"
             )

@@ -54,8 +54,8 @@ class TwoModels:
                 f"begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one begin "
                 "above 2 Hz"
             )
-        told = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
-        if told[0] != told[1] and None not in told[0] + told[1]:
+        origins = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
+        if origins[0] != origins[1] and None not in origins[0] + origins[1]:
             raise ValueError(
                 f"the narrower one was made {_describe_conditions(self.narrow)}, the wider one "
                 f"{_describe_conditions(self.wide)}: two bands must be of one device, held and driven alike"

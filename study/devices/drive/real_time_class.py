@@ -109,16 +109,16 @@ def real_time_finding() -> DeviceFinding:
     thread.start()
     thread.join()
     (granted,) = found
-    told = [
+    texts = [
         "the loop goes before all other programs" if granted.scheduled else "other programs may delay the loop",
         "its memory stays" if granted.locked else "its memory may be swapped",
     ]
     starving = granted.scheduled and _may_starve_others()
     if starving:
-        told.append("a loop that hangs may starve them")
+        texts.append("a loop that hangs may starve them")
     fine = granted.scheduled and granted.locked and not starving
     advice = " ".join(filter(None, (granted.advice, STARVING_ADVICE if starving else "")))
-    return DeviceFinding("Priority", "; ".join(told), fine, advice, warning=not fine)
+    return DeviceFinding("Priority", "; ".join(texts), fine, advice, warning=not fine)
 
 
 def _may_starve_others() -> bool:

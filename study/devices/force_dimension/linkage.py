@@ -56,9 +56,9 @@ class VendorLinkage:
         except LibraryError as error:
             raise device_error(self._model.name, error) from error
         reading = self.at(here)
-        told = (c_double * JOINTS)()
-        self._library.call("dhdGetJointAngles", told, self._number)
-        if reading is not None and self._moves_by(reading, np.array(told[:3])) <= SAME_M:
+        reported = (c_double * JOINTS)()
+        self._library.call("dhdGetJointAngles", reported, self._number)
+        if reading is not None and self._moves_by(reading, np.array(reported[:3])) <= SAME_M:
             return
         raise DeviceError(
             f"The linkage of the {self._model.name} was not read",

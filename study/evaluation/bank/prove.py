@@ -24,7 +24,7 @@ def reveal_cases(folder: ProofFolder, cases: int) -> tuple[Outcome, ...]:
     return reveal_bank(folder, cases, outcome_of)
 
 
-def outcome_of(label: dict[str, Any], said: dict[str, Any]) -> Outcome:
+def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
     """Pair a revealed label with the answer of the diagnosis."""
     concealed = tuple(
         Concealed(each["effect"], each["place"], each["axis"], {**each["values"], **each["unseen"]})
@@ -40,9 +40,9 @@ def outcome_of(label: dict[str, Any], said: dict[str, Any]) -> Outcome:
         concealed=concealed,
         strengths=tuple(label["strengths"]),
         adds=label["adds"],
-        said=None if "failed" in said else diagnosis_from_json(said["diagnosis"]),
-        channel_errors=said.get("channel_errors", {}),
-        seconds=said.get("cpu_seconds", float("nan")),
+        diagnosis=None if "failed" in answer else diagnosis_from_json(answer["diagnosis"]),
+        channel_errors=answer.get("channel_errors", {}),
+        seconds=answer.get("cpu_seconds", float("nan")),
     )
 
 

@@ -97,10 +97,10 @@ def reveal_bank(
         place = folder.open / label["name"]
         if label["number"] >= cases or not (place / ANSWER).exists():
             continue
-        said = read_answer(place)
-        if not answers_sealed_case(label, said):
+        answer = read_answer(place)
+        if not answers_sealed_case(label, answer):
             broken.append(path.name)
-        found.append(outcome_of(label, said))
+        found.append(outcome_of(label, answer))
     if broken:
         raise broken_seal_error(broken, folder.path)
     return tuple(found)

@@ -191,7 +191,7 @@ def _results(
         models=tuple(each.as_used_model(name) for name, each in identified.items()),
         tested=identified[CENTRE_NAME].tested,
         tested_frictionless=identified[SLICK_NAME].tested,
-        remarks=tuple(f"{name}: {said}" for name, recording in recordings.items() for said in recording.warnings),
+        remarks=tuple(f"{name}: {warning}" for name, recording in recordings.items() for warning in recording.warnings),
         sources=tuple(recording.path for recording in recordings.values()),
         protocol_hash=collected.protocol_hash,
     )

@@ -15,9 +15,9 @@ HEARTBEAT_S = 0.1
 
 
 class EngineSaid(Message):
-    def __init__(self, said: FromEngine) -> None:
+    def __init__(self, message: FromEngine) -> None:
         super().__init__()
-        self.said = said
+        self.message = message
 
 
 class EngineLine:

@@ -73,10 +73,10 @@ class SensorScreen(Screen[None]):
     def on_mount(self) -> None:
         self.query_one("#port", Input).focus()
 
-    def hear(self, said: LayDown | Calibrated | SensorKept) -> None:
-        match said:
+    def hear(self, message: LayDown | Calibrated | SensorKept) -> None:
+        match message:
             case LayDown(number=number, position=position, heard=heard):
-                self._waits_for = said
+                self._waits_for = message
                 if heard is not None:
                     self._note(f"✓ read {', '.join(f'{value:.0f}' for value in heard)}")
                 self._say(f"{number} of {STEPS}: lay the sensor down with {position}, let go of it, press Enter.")

@@ -72,8 +72,8 @@ def status(view: WatchView) -> list[str]:
 
 def _new_trials(before: WatchView, now: WatchView) -> list[ClosedTrial]:
     """Oldest first. A trial that is being measured is reported afterwards."""
-    told = {(t.run, t.trial, t.attempt) for t in before.last if t.status != "measuring"}
-    fresh = [t for t in now.last if (t.run, t.trial, t.attempt) not in told and t.status != "measuring"]
+    reported = {(t.run, t.trial, t.attempt) for t in before.last if t.status != "measuring"}
+    fresh = [t for t in now.last if (t.run, t.trial, t.attempt) not in reported and t.status != "measuring"]
     newest = (before.last[0].run, before.last[0].trial, before.last[0].attempt) if before.last else (-1, 0, 0)
     return [t for t in fresh[::-1] if (t.run, t.trial, t.attempt) >= newest]
 

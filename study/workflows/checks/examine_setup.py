@@ -137,5 +137,5 @@ def accept(name: str, examination: Examination, operator: str, moving: Moving) -
     baseline = record_baseline(name, moving) if sensed else ("", "")
     moving.announce(proof_notice(name, proof_force_n()))
     settings = replace(_settings(name, 0.0), with_sensor=sensed)
-    said = accept_device(name, settings, RealClock(), operator, baseline)
-    return said if sensed else f"{said}. Without an accelerometer no daily check will be possible."
+    sentence = accept_device(name, settings, RealClock(), operator, baseline)
+    return sentence if sensed else f"{sentence}. Without an accelerometer no daily check will be possible."

@@ -61,10 +61,10 @@ def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: Non
     check_free(plan.out)
     read = read_foreign(plan.files, plan.map, on_progress)
     provenance = gather_provenance(parents=read.files).as_dict()
-    said: dict[str, Any] = {"map": read.map, "notes": list(read.notes)}
+    origin: dict[str, Any] = {"map": read.map, "notes": list(read.notes)}
     if read.map_hash:
-        said["map_sha256"] = read.map_hash
-    meta = {**read.recording.meta, "import": said, "provenance": provenance}
+        origin["map_sha256"] = read.map_hash
+    meta = {**read.recording.meta, "import": origin, "provenance": provenance}
     recording = replace(read.recording, meta=meta)
     write_recording(plan.out, recording)
     return Imported(plan.out, recording, read.map, read.notes)

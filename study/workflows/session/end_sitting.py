@@ -45,8 +45,8 @@ def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalys
         raise already_finished(folded.state, folder)
     with hold_session_lock(folder.path):
         written = write_results(folder)
-    said = f"{folder.name} had all its runs already; written now, because missing or out of date: {', '.join(due)}."
-    return replace(written, warnings=(said, *written.warnings))
+    text = f"{folder.name} had all its runs already; written now, because missing or out of date: {', '.join(due)}."
+    return replace(written, warnings=(text, *written.warnings))
 
 
 def _not_finished(end: Conducted) -> StudyError:

@@ -48,13 +48,13 @@ def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
     def is_whole(label: Mapping[str, Any]) -> bool:
         return sha256_of(fresh_file(folder, label["number"])) == str(label["fresh_sha256"])
 
-    def outcome_of(label: Mapping[str, Any], said: Mapping[str, Any]) -> LawOutcome:
-        return _outcome(label, said, fresh_file(folder, label["number"]))
+    def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> LawOutcome:
+        return _outcome(label, answer, fresh_file(folder, label["number"]))
 
     return reveal_bank(folder, cases, outcome_of, is_whole)
 
 
-def _outcome(label: Mapping[str, Any], said: Mapping[str, Any], fresh: Path) -> LawOutcome:
+def _outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh: Path) -> LawOutcome:
     truth = None if label["truth"] is None else _true_law(label["truth"])
     found = LawOutcome(
         number=label["number"],
@@ -64,9 +64,9 @@ def _outcome(label: Mapping[str, Any], said: Mapping[str, Any], fresh: Path) -> 
         axes=tuple(label["axes"]),
         truth=truth,
         adds=label["adds"],
-        said=None if "failed" in said else diagnosis_from_json(said["diagnosis"]),
-        channel_errors=said.get("channel_errors", {}),
-        seconds=said.get("cpu_seconds", float("nan")),
+        diagnosis=None if "failed" in answer else diagnosis_from_json(answer["diagnosis"]),
+        channel_errors=answer.get("channel_errors", {}),
+        seconds=answer.get("cpu_seconds", float("nan")),
     )
     if truth is None or not found.laws:
         return found

@@ -47,7 +47,7 @@ def outcome(kind="single", concealed=("coulomb_friction",), answer=None, bank="m
         "adds": 3.0,
         "seconds": 4.0,
     }
-    return Outcome(kind=kind, bank=bank, concealed=hidden, said=answer, channel_errors=found, **(fixed | more))
+    return Outcome(kind=kind, bank=bank, concealed=hidden, diagnosis=answer, channel_errors=found, **(fixed | more))
 
 
 RIGHT = outcome(answer=said("explained", named("coulomb_friction")))
