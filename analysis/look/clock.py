@@ -102,25 +102,25 @@ def _gap_check(steps: np.ndarray, gaps: np.ndarray, stamps: np.ndarray, rate_hz:
 
 
 def _jitter_check(jitter: float, most: float, step_s: float) -> Check | None:
-    seen = (
+    text = (
         f"Time stamps lie {jitter * step_s * 1e6:.3g} us rms off their places ({jitter:.1%} of a step), "
         f"{most * step_s * 1e6:.3g} us at most."
     )
     if jitter > WILD:
-        return Check(CLOCK, "wrong", seen, "Import with the stamps as the clock, and resample.")
+        return Check(CLOCK, "wrong", text, "Import with the stamps as the clock, and resample.")
     if jitter > JITTER:
         return Check(
-            CLOCK, "notice", seen, "Expect noise beside strong lines; resample by the stamps where it matters."
+            CLOCK, "notice", text, "Expect noise beside strong lines; resample by the stamps where it matters."
         )
-    return Check(CLOCK, "fine", seen)
+    return Check(CLOCK, "fine", text)
 
 
 def _drift_check(drift_ppm: float, rate_hz: float) -> Check | None:
     slower = "slower" if drift_ppm > 0 else "faster"
-    seen = f"By its stamps the clock is {abs(drift_ppm):.4g} ppm {slower} than {rate_hz:g} Hz."
+    text = f"By its stamps the clock is {abs(drift_ppm):.4g} ppm {slower} than {rate_hz:g} Hz."
     if abs(drift_ppm) > RATE_PPM:
         true_hz = rate_hz / (1 + drift_ppm * 1e-6)
-        return Check(CLOCK, "wrong", seen, f"State the rate as {true_hz:.6g} Hz, or import with the stamps.")
+        return Check(CLOCK, "wrong", text, f"State the rate as {true_hz:.6g} Hz, or import with the stamps.")
     if abs(drift_ppm) > DRIFT_PPM:
-        return Check(CLOCK, "notice", seen, "State the rate of the stamps where frequencies matter.")
-    return Check(CLOCK, "fine", seen)
+        return Check(CLOCK, "notice", text, "State the rate of the stamps where frequencies matter.")
+    return Check(CLOCK, "fine", text)

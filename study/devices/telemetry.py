@@ -146,8 +146,8 @@ class TelemetryReader:
 
 def _whole(rows: FloatArray) -> np.ndarray:
     bits = rows.view(np.int64)
-    seen = bits[:, : cells.RING_CHECK]
-    checks = np.sum((seen ^ (seen >> cells.RING_FOLD)) * cells.RING_FACTORS, axis=1)
+    checked = bits[:, : cells.RING_CHECK]
+    checks = np.sum((checked ^ (checked >> cells.RING_FOLD)) * cells.RING_FACTORS, axis=1)
     whole: np.ndarray = checks == bits[:, cells.RING_CHECK]
     return whole
 

@@ -65,8 +65,8 @@ def _power_per_freedom(plain: Regression) -> float:
     left = plain.remainder(plain.columns_of(()))
     power, freedom = 0.0, 0.0
     for residual, motion in zip(left, plain.motions, strict=True):
-        seen = np.where(motion.valid_samples(motion.fit), residual, 0.0)
-        lines = np.abs(np.fft.rfft(seen)) ** 2
-        power += float(seen @ seen)
+        known_residual = np.where(motion.valid_samples(motion.fit), residual, 0.0)
+        lines = np.abs(np.fft.rfft(known_residual)) ** 2
+        power += float(known_residual @ known_residual)
         freedom += 2 * float(lines.sum()) ** 2 / max(float((lines**2).sum()), 1e-300)
     return power / max(freedom, 1.0)

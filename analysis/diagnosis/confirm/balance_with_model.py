@@ -49,14 +49,14 @@ def find_balances_beside_model(
         found = motions_of(records)
         if len(found[0].channels) < model.inputs or found[0].order == 2 or not np.isfinite(found[0].band_hz):
             return ()
-        seen = [_balance_data(record, motion, model) for record, motion in zip(records, found, strict=True)]
+        data = [_balance_data(record, motion, model) for record, motion in zip(records, found, strict=True)]
         axes = driven_axes(model)
         mass = np.einsum("nm,nk,km->m", axes, model.mass, axes)
         return tuple(
             judge_laws(
                 search_structures(
-                    [_select_axis(each.motion, axis) for each in seen], axis, model.rotational, without, time_left,
-                    GivenBase(tuple(each.columns[axis] for each in seen), float(mass[axis]), LAW_OF_SIGNAL),
+                    [_select_axis(each.motion, axis) for each in data], axis, model.rotational, without, time_left,
+                    GivenBase(tuple(each.columns[axis] for each in data), float(mass[axis]), LAW_OF_SIGNAL),
                 )
             )
             for axis in range(model.inputs)

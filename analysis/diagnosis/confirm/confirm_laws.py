@@ -129,37 +129,37 @@ def _without(named: _Named, place: int, instead: tuple[int, JudgedLaw] | None = 
     return [*named[:place], *([] if instead is None else [instead]), *named[place + 1 :]]
 
 
-def require_enough_gain(seen: SearchResult, repeats: bool) -> SearchResult:
+def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
     """The result with only those effects named that take as much of the held-out error power as a law of a balance
     must, and `explained` only where repeats show the noise. Constants are numbers of the model and need no proof."""
-    found = seen.found
-    while found.steps and not _takes_enough(seen.context, found):
-        found = without_effect(seen.context, found, len(found.steps) - 1)
-        seen = replace(seen, found=found, judgement=judge(found), errors=None)
+    found = result.found
+    while found.steps and not _takes_enough(result.context, found):
+        found = without_effect(result.context, found, len(found.steps) - 1)
+        result = replace(result, found=found, judgement=judge(found), errors=None)
     names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed_effects()}
-    if repeats or seen.judgement.verdict != "explained" or names <= set(CONSTANTS):
-        return seen
-    return replace(seen, judgement=replace(seen.judgement, verdict="partly_explained"))
+    if repeats or result.judgement.verdict != "explained" or names <= set(CONSTANTS):
+        return result
+    return replace(result, judgement=replace(result.judgement, verdict="partly_explained"))
 
 
-def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
+def unname_doubtful_effects(result: SearchResult) -> SearchResult:
     """The result with named effects of actuator and sensor made candidates, unless the signal itself shows them: the
     model was fitted to these recordings, so that a law of the motion that the catalogue lacks may look like a nonlinear
     or late sensor. What the signal shows is a candidate, too, where the model without it predicts nothing."""
-    found, demoted = seen.found, []
+    found, demoted = result.found, []
     doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
-    if len(doubtful) < len(found.steps) and not predicts_something(seen.context.whole, found.plain):
+    if len(doubtful) < len(found.steps) and not predicts_something(result.context.whole, found.plain):
         doubtful = list(range(len(found.steps)))
     for place in reversed(doubtful):
-        gain = held_out_gain(seen.context.whole, found.plain, seen.context.with_test_score(found.steps[place]))
+        gain = held_out_gain(result.context.whole, found.plain, result.context.with_test_score(found.steps[place]))
         if gain is not None and gain.gain > 0:
             why_not = BESIDE_RUNAWAY if found.steps[place].newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
             demoted.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, why_not))
-        found = without_effect(seen.context, found, place)
+        found = without_effect(result.context, found, place)
     if not doubtful:
-        return seen
+        return result
     kept = tuple(sorted(demoted, key=lambda each: -each.gain))
-    return replace(seen, found=found, judgement=judge(found), errors=None, unconfirmed=(*seen.unconfirmed, *kept))
+    return replace(result, found=found, judgement=judge(found), errors=None, unconfirmed=(*result.unconfirmed, *kept))
 
 
 def _takes_enough(context: SearchContext, found: Explanation) -> bool:

@@ -28,14 +28,14 @@ def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> boo
     signals = [recording.response.samples]
     if recording.position is not None:
         signals.append(recording.position.samples)
-    seen = np.hstack(signals)
-    known = np.isfinite(seen).all(axis=1) & np.isfinite(command)
+    measured = np.hstack(signals)
+    known = np.isfinite(measured).all(axis=1) & np.isfinite(command)
     rows = np.arange(PAST, len(command))
     rows = rows[np.all([known[rows - back] for back in range(PAST + 1)], axis=0)]
     if len(rows) < _LEAST:
         return False
     own = np.column_stack([command[rows - back] for back in range(1, PAST + 1)] + [np.ones(len(rows))])
-    others = np.column_stack([seen[rows - back] for back in range(PAST)])
+    others = np.column_stack([measured[rows - back] for back in range(PAST)])
     alone, helped = _residual_rms(command[rows], own), _residual_rms(command[rows], np.hstack([own, others]))
     # A smooth command is predicted by its own past alone, so that the test has no power.
     return bool(alone > 1e-6 * _rms(command[:, None]) and helped < FORETOLD_SHARE * alone)

@@ -68,8 +68,8 @@ class BandPower:
 
     def misfits(self, off: FloatArray) -> FitScore:
         """Rms by channel of a difference of logarithms `off`, on the samples to fit, choose and test by; NaN = none."""
-        seen = np.where(np.isnan(self.measured), np.nan, off)
-        return FitScore(*(_rms(seen[[stretch.part == part for stretch in self.stretches]]) for part in PARTS))
+        known_errors = np.where(np.isnan(self.measured), np.nan, off)
+        return FitScore(*(_rms(known_errors[[stretch.part == part for stretch in self.stretches]]) for part in PARTS))
 
     @cached_property
     def _edges(self) -> FloatArray:

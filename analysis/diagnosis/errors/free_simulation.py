@@ -61,10 +61,10 @@ class FreeSimulation:
     ) -> SimulationResult:
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
-        seen = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
+        measurement = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
         model = add_carried_weight(model, signals)
         every = [_coarsen(placed, self.coarser) for placed in under_conditions((*self.known, *effects), signals)]
-        return simulate(model, record.command, signals.sample_rate_hz, every, signals.hold, seen)
+        return simulate(model, record.command, signals.sample_rate_hz, every, signals.hold, measurement)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]

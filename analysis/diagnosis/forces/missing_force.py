@@ -34,14 +34,14 @@ def missing_force(
     expected rms of such a force; larger values pass more force and more noise."""
     n, c = residuals.shape
     length = next_fast_len(n + int(_SETTLING_S * sample_rate_hz), real=True)
-    seen = axis_transfer(model, sample_rate_hz, rfftfreq(length, 1 / sample_rate_hz))
-    through = np.concatenate([seen.response, seen.position], axis=1)[:, :c] / unit[:c, None]
+    transfer = axis_transfer(model, sample_rate_hz, rfftfreq(length, 1 / sample_rate_hz))
+    through = np.concatenate([transfer.response, transfer.position], axis=1)[:, :c] / unit[:c, None]
     spectrum = rfft(residuals, length, axis=0)
     adjoint = np.conj(np.swapaxes(through, 1, 2))
     normal = adjoint @ through + np.diag(1 / expected_n**2)
     force = np.linalg.solve(normal, adjoint @ spectrum[:, :, None])
     back = [
         irfft(part[:, :, 0], length, axis=0)[:n]
-        for part in (force, seen.axis_position @ force, seen.axis_velocity @ force)
+        for part in (force, transfer.axis_position @ force, transfer.axis_velocity @ force)
     ]
     return MissingForce(*back)

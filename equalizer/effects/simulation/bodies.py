@@ -109,12 +109,12 @@ def simulate_bodies(
             rows_of_block = spare[: (end - first) * rows]
             np.matmul(drive[first * rows : end * rows], stepping.into, out=rows_of_block[:, :inner])
             stepping.run(rows_of_block, first)
-            seen = rows_of_block[::rows]
+            inputs = rows_of_block[::rows]
             # An acceleration shows the force of its very instant, not the last step's mean.
-            seen[0, inner:], seen[1:, inner:] = last[first - 1] if first else 0.0, last[first : end - 1]
-            np.matmul(seen, output, out=motion_rows[first:end])
+            inputs[0, inner:], inputs[1:, inner:] = last[first - 1] if first else 0.0, last[first : end - 1]
+            np.matmul(inputs, output, out=motion_rows[first:end])
             if motion:
-                added[first:end, list(ports)] = seen[:, len(stepping.outward) : inner]
+                added[first:end, list(ports)] = inputs[:, len(stepping.outward) : inner]
     return motion_rows, added
 
 

@@ -81,13 +81,13 @@ def forced_stepping(linear: LinearSteps, forces: Forces, steps: int, stride: int
     outward, inward = asked @ form.outward, (form.inward @ by_force).T
     step = (form.advance, _contiguous(outward), _contiguous(inward), _contiguous(per_newton.T))
     into = np.hstack([(form.inward @ linear.by_command).T, linear.motion_by_command[2 * r + where].T])
-    seen = np.ascontiguousarray(commanded, dtype=np.float64) if forces.sees else np.empty((0, 0))
+    commands = np.ascontiguousarray(commanded, dtype=np.float64) if forces.sees else np.empty((0, 0))
     state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(where))), forces.memory.copy()
 
     def run(rows: FloatArray, first: int) -> None:
         step_mechanism(
             forces.laws, forces.places, forces.numbers, memory, step, rows,
-            seen[first * stride : first * stride + len(rows)], ports, state, (steps, stride, first),
+            commands[first * stride : first * stride + len(rows)], ports, state, (steps, stride, first),
             linear.step_s,
         )  # fmt: skip
 

@@ -27,8 +27,8 @@ LABEL_CELLS = 11
 
 def changes(before: WatchView | None, now: WatchView) -> list[str]:
     """One line for each change, alarms first, each with a bell. Without a previous view: the current state."""
-    seen = {(alarm.kind, alarm.since) for alarm in before.alarms} if before is not None else set()
-    lines = [f"{BELL}ALARM {alarm.sentence}" for alarm in now.alarms if (alarm.kind, alarm.since) not in seen]
+    reported = {(alarm.kind, alarm.since) for alarm in before.alarms} if before is not None else set()
+    lines = [f"{BELL}ALARM {alarm.sentence}" for alarm in now.alarms if (alarm.kind, alarm.since) not in reported]
     if before is None:
         return [*lines, *status(now)]
     lines += [_trial_line(trial) for trial in _new_trials(before, now)]

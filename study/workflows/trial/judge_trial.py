@@ -45,7 +45,7 @@ def judge(
         (health.sensor_clipped > 0, "accelerometer clipped"),
         (bool(missing), f"no trustworthy acceleration: {missing}"),
     )
-    return Judgement("", tuple(text for seen, text in observed if seen), measured=not missing)
+    return Judgement("", tuple(text for is_so, text in observed if is_so), measured=not missing)
 
 
 def _too_late(health: Health, settings: MeasurementSettings) -> str:

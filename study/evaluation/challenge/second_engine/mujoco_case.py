@@ -67,8 +67,8 @@ def draw_mujoco_case(
         further = further_plan(command, kind, rig)
         heavier = replace(device, mass_kg=device.mass_kg + added_kg)
         felt = simulate_motion(heavier, further.command)
-        seen = read(sensing.sensor, *felt, RATE_HZ, np.random.default_rng([seed, noise]))
-        return replace(make_recording(name, further, *seen, rig), meta=added_mass_meta(added_kg))
+        readings = read(sensing.sensor, *felt, RATE_HZ, np.random.default_rng([seed, noise]))
+        return replace(make_recording(name, further, *readings, rig), meta=added_mass_meta(added_kg))
 
     adds = visibility(Device(bench), sensing, (still, motion), rig) if effects else 0.0
     return Case(recording, as_model(name, known, tolerance, rig.axes), tuple(truth), again, adds)
