@@ -1,5 +1,7 @@
 """Base error for screen and command line: what happened, what was saved, what to do now."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import IntEnum
 from typing import Any
 
@@ -53,6 +55,18 @@ class LeftError(StudyError):
     """Ctrl-C was pressed or the terminal closed, and what was done so far is safe."""
 
     exit_code = ExitCode.INTERRUPTED
+
+
+@contextmanager
+def resumable(happened: str, saved: str, also: tuple[type[LeftError], ...] = ()) -> Iterator[None]:
+    """Turn Ctrl-C into a LeftError which says that the same command continues. also: LeftError, where a part of the
+    work raises its own, which says less."""
+    try:
+        yield
+    except (KeyboardInterrupt, *also) as interruption:
+        raise LeftError(
+            "Interrupted", happened, "Run the same command again: it goes on where it stopped.", saved
+        ) from interruption
 
 
 def _restore_error(kind: type[StudyError], fields: dict[str, Any]) -> StudyError:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
 
 MOST_CONDITION = 50.0
@@ -33,12 +34,8 @@ MOST_TOLD = 10
 """Problems at positions that are told one by one."""
 
 
-class CalibrationError(ValueError):
+class CalibrationError(ListedProblemsError):
     """Readings that cannot be those of a linkage. `problems`: one sentence each."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 @dataclass(frozen=True, slots=True, eq=False)

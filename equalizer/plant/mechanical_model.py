@@ -12,6 +12,7 @@ import numpy as np
 
 from equalizer.laws.law import Law
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
+from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.summary import Summarised, Summary
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, system_of
@@ -23,12 +24,8 @@ DERIVATIVE_OF_QUANTITY = {
 """Quantities that a response may have, as the order of the coordinates' time derivative."""
 
 
-class MechanicalModelError(ValueError):
+class MechanicalModelError(ListedProblemsError):
     """A model that contradicts itself or the format. `problems`: one sentence each."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 @dataclass(frozen=True, slots=True)

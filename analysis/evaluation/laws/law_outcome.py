@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect
 from analysis.evaluation.proof.outcome import DETECTABLE
+from equalizer.effects.discovered_law import has_memory
 from equalizer.laws.law import Law, law_of
-from equalizer.laws.parse import MEMORY
-from equalizer.laws.tree import Apply, nodes
 
 CLOSE = 0.05
 """Relative error up to which a law counts as the same function (issue 16)."""
@@ -116,13 +115,9 @@ def _has_true_structure(laws: Sequence[Law], truth: TrueLaw) -> bool:
         return False
     for axis, readings in zip(truth.axes, truth.variables, strict=True):
         variables = " ".join(sorted({name for law in laws_by_axis[axis] for name in law.variables}))
-        remembers = any(_has_memory(law) for law in laws_by_axis[axis])
+        remembers = any(has_memory(law) for law in laws_by_axis[axis])
         if variables not in readings or remembers != truth.memory:
             return False
         if any(law.acts_on not in truth.acts_on for law in laws_by_axis[axis]):
             return False
     return True
-
-
-def _has_memory(law: Law) -> bool:
-    return any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree))

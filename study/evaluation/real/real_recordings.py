@@ -15,7 +15,7 @@ from analysis.diagnosis.search.time_budget import CountedBudget
 from analysis.diagnosis.types import TimeBudget
 from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
-from study.errors import LeftError, StudyError, WrongUseError
+from study.errors import LeftError, StudyError, WrongUseError, resumable
 from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, report_crash
 from study.evaluation.real.inject_real import carriers, run_injections
@@ -83,7 +83,8 @@ def diagnose_folder(
     time = clock or RealClock()
     kept = kept_answers(plan.out, found.recordings, plan.seconds)
     _make_writable(plan.out)
-    try:
+    saved = f"What was answered so far is in {plan.out}."
+    with resumable("Not all recordings were diagnosed.", saved, also=(LeftError,)):
         if executor is None:
             answers = _answers(plan, found, kept, on_progress, time)
         else:
@@ -93,13 +94,6 @@ def diagnose_folder(
         return write_real(
             plan.out, RealResults(answers, found.troubles, injected), local_time(time.utc(), machine_zone)
         )
-    except (KeyboardInterrupt, LeftError) as interruption:
-        raise LeftError(
-            "Interrupted",
-            "Not all recordings were diagnosed.",
-            "Run the same command again: it goes on where it stopped.",
-            saved=f"What was answered so far is in {plan.out}.",
-        ) from interruption
 
 
 def _found(plan: RealPlan) -> RealFolder:

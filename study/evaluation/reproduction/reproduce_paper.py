@@ -15,7 +15,7 @@ from equalizer.identification.state_space.held_out import HeldOut, validate_on_t
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from study.devices.opening import FRICTIONLESS
-from study.errors import LeftError, StudyError
+from study.errors import LeftError, StudyError, resumable
 from study.evaluation.reproduction.reproduce_baselines import play_baselines
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, play_equalized
 from study.evaluation.reproduction.reproduce_recordings import CachedRecording, RecordingRequest, record_or_load
@@ -90,20 +90,14 @@ def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]
     wanted = _recordings_to_make(plan)
     models = _model_names()
     steps = Steps(_weights(plan, wanted, models), on_progress)
-    try:
+    saved = f"Sessions, recordings and models so far are in {plan.out}."
+    with resumable("The reproduction is not finished.", saved, also=(LeftError,)):
         _make_folders(plan)
         recordings = {name: record_or_load(plan, each, steps.of(f"recording {name}")) for name, each in wanted.items()}
         collected = _sit(plan, steps)
         identified = {name: identify_or_load(plan, recordings[name], steps.of(f"model {name}")) for name in models}
         results = _results(plan, recordings, identified, collected, steps)
         return write_reproduction_folder(plan, results, steps.of("writing"))
-    except (KeyboardInterrupt, LeftError) as interruption:
-        raise LeftError(
-            "Interrupted",
-            "The reproduction is not finished.",
-            "Run the same command again: it goes on where it stopped.",
-            saved=f"Sessions, recordings and models so far are in {plan.out}.",
-        ) from interruption
 
 
 def _recordings_to_make(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:

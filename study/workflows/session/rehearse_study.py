@@ -1,16 +1,15 @@
 """Rehearse a whole study with simulated participants, several at once; begun sessions are resumed, finished ones
 kept."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
-from study.errors import LeftError, StudyError
+from study.errors import StudyError, resumable
 from study.participants.observer import Observer
 from study.participants.observers import observer_named
 from study.participants.population import KINDS, member
@@ -63,7 +62,8 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
     Raises StudyError where the folder holds a rehearsal of another protocol, seed or model.
     """
     _check_same(rehearsal)
-    with _resumable(rehearsal, "begun so far" if isinstance(workers, int) else "finished so far"):
+    kept = "begun so far" if isinstance(workers, int) else "finished so far"
+    with resumable("The rehearsal is not finished.", f"All sessions {kept} are in {rehearsal.data}."):
         if isinstance(workers, Executor):
             _rehearse_elsewhere(rehearsal, workers, on_finished)
             return
@@ -89,20 +89,6 @@ def _rehearse_elsewhere(rehearsal: Rehearsal, executor: Executor, on_finished: C
             write_files(part, files)
         _require_finished(session, why)
         on_finished(done)
-
-
-@contextmanager
-def _resumable(rehearsal: Rehearsal, kept: str) -> Iterator[None]:
-    """kept: which sessions are in the folder after an interruption."""
-    try:
-        yield
-    except KeyboardInterrupt as interruption:
-        raise LeftError(
-            "Interrupted",
-            "The rehearsal is not finished.",
-            "Run the same command again: it goes on where it stopped.",
-            saved=f"All sessions {kept} are in {rehearsal.data}.",
-        ) from interruption
 
 
 def subject_code(number: int) -> str:

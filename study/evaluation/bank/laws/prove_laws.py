@@ -9,11 +9,12 @@ from analysis.diagnosis.document import diagnosis_from_json
 from analysis.evaluation.laws.law_error import law_error
 from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
 from analysis.evaluation.laws.law_score import LawScore, law_score
+from study.errors import resumable
 from study.evaluation.bank.ask_engine import is_answered
 from study.evaluation.bank.laws.seal_laws import fresh_file, fresh_motions, seal_laws
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.seal_cases import BankPlan, read_case_names
-from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank, engines, resumable, reveal_bank
+from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank, engines, reveal_bank
 from study.store.disk.provenance import sha256_of
 
 LAWS = "laws"
@@ -33,7 +34,7 @@ class LawProof:
 def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> LawProof:
     """Run or continue a bank of laws in the folder `path`. Resumable. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief, LAWS)
-    with resumable(path):
+    with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
         names = read_case_names(folder, range(plan.cases))
         there = [name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING).exists()]
