@@ -61,9 +61,10 @@ class LeftError(StudyError):
 def resumable(happened: str, saved: str, also: tuple[type[LeftError], ...] = ()) -> Iterator[None]:
     """Turn Ctrl-C into a LeftError which says that the same command continues. also: LeftError, where a part of the
     work raises its own, which says less."""
+    caught: tuple[type[BaseException], ...] = (KeyboardInterrupt, *also)
     try:
         yield
-    except (KeyboardInterrupt, *also) as interruption:
+    except caught as interruption:
         raise LeftError(
             "Interrupted", happened, "Run the same command again: it goes on where it stopped.", saved
         ) from interruption

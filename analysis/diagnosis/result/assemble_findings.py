@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from analysis.diagnosis.localisation.clean_floor import CleanFloor, learned_sent
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, mismatch_maps, whole_mismatch
 from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
-from analysis.diagnosis.next_experiment.propose_experiment import Proposal, propose_experiment
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.error_table import channel_errors, errors_of, held_out_stands_still
 from analysis.diagnosis.result.findings import Findings, TimeSeries
@@ -35,6 +35,9 @@ from equalizer.effects.placing import axis_letter, model_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+
+if TYPE_CHECKING:
+    from analysis.diagnosis.next_experiment.propose_experiment import Proposal
 
 
 def assemble_findings(
@@ -131,7 +134,7 @@ def _standard_errors(result: SearchResult) -> FloatArray:
 
 
 def _document(
-    result: SearchResult, errors: FloatArray, examined: tuple[Maps, Localisation], proposal: Proposal | None
+    result: SearchResult, errors: FloatArray, examined: tuple[Maps, Localisation], proposal: "Proposal | None"
 ) -> Diagnosis:
     found, judged = result.found, result.judgement
     measure, tuning, fitted = result.context.whole, result.context.tuning, found.after.fitted
@@ -166,9 +169,14 @@ def _effects_with_gains(result: SearchResult, errors: FloatArray, labels: Labels
     return with_gains(effects, context.whole, (found.plain, *between, found.after))
 
 
-def _proposal(context: SearchContext, found: Explanation, judged: Judgement) -> Proposal | None:
-    foretold = judged.named and context.whole.name == "free simulation" and found.statistic is None
-    return propose_experiment(context, found) if foretold else None
+def _proposal(context: SearchContext, found: Explanation, judged: Judgement) -> "Proposal | None":
+    """The next recording; None where no effect is named, or where recordings cannot be predicted by simulation."""
+    if not judged.named or context.whole.name != "free simulation" or found.statistic is not None:
+        return None
+    # Imported here: only named effects have rivals that a further recording could separate.
+    from analysis.diagnosis.next_experiment.propose_experiment import propose_experiment
+
+    return propose_experiment(context, found)
 
 
 def channel_names(recording: Recording, count: int) -> tuple[str, ...]:

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.diagnosis.next_experiment.propose_experiment import Proposal
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.curves.state_maps import StateMaps
 from analysis.diagnosis.search.explain import Explanation
@@ -17,6 +17,9 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.summary import Summarised, Summary
+
+if TYPE_CHECKING:
+    from analysis.diagnosis.next_experiment.propose_experiment import Proposal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +139,7 @@ class Findings(Summarised):
     deviations."""
     axes: tuple[str, ...] = ()
     """Displayed names of the driven axes; empty = x, y, z."""
-    proposal: Proposal | None = None
+    proposal: "Proposal | None" = None
     """The next recording proposed, where rivals are as good as what is named."""
     reached: tuple[BalanceErrors, ...] = ()
     """Force balance per axis; empty where none was computed."""

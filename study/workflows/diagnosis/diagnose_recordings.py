@@ -25,7 +25,6 @@ from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.store.disk.new_folder import new_folder, require_new_folder
 from study.workflows.crash_guard import crash_guard
-from study.workflows.diagnosis.clean_recordings import with_clean
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
     not_diagnosable_error,
@@ -109,6 +108,9 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     found = read_input(plan.sources, plan.seed, plain, plan.force_constants)
     clean: DiagnosisInput | None = None
     if plan.clean:
+        # Imported here: most diagnoses have no recordings of the device in order.
+        from study.workflows.diagnosis.clean_recordings import with_clean
+
         both = with_clean(found, plan.sources, plan.clean, plan.seed)
         found, clean = both.found, both.clean
     on_progress("reading", READ)
