@@ -1,7 +1,12 @@
 """The force along each driven axis that would explain a model's residual, and the motion that it causes.
 
-Deconvolution through the model, line by line, regularised by the noise (Wiener filter; a latent force in the sense of
-Rogers and Friis 2021).
+Deconvolution through the model, regularised by the noise (Wiener filter): for each spectral line, with the residuals r
+and the model's transfer H from the m forces to the c channels, both in units of the noise,
+
+    f = (H* H + diag(1 / s²))^-1 H* r        s: expected rms of the force
+
+It is the mean of the posterior of a force with prior variance s² (a latent force in the sense of Rogers and Friis,
+Mech. Syst. Signal Process. 2021).
 """
 
 from dataclasses import dataclass

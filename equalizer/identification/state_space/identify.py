@@ -1,11 +1,30 @@
-"""Identification of a state-space model from measured frequency responses: starts, refinement, choice, uncertainty."""
+"""Identification of a state-space model from measured frequency responses: starts, refinement, choice, uncertainty.
+
+Theory of operation. The measured response G(f) of each line f has noise of known variance s(f)² per entry. The model
+
+    G_M(f) = C (zI - A)^-1 B + D,    z = exp(2 pi i f / rate)
+
+minimises the weighted squared residual sum of |G - G_M|² / s², the maximum-likelihood estimate for Gaussian noise.
+
+1. Starts. Subspace identification in the frequency domain (`warped_subspace`) for several horizons, and canonical
+   variate analysis of the time records (`canonical_variate`), because the cost has many local minima.
+2. Refinement. Each start is refined by Levenberg-Marquardt steps over poles and output shapes (`refinement`). All
+   poles stay inside a circle that stands for the longest decay the recordings can show: the model is always stable.
+3. Choice. Least cost among those without a large gain outside the band (`candidates`).
+4. Relaxation. Where the bound on the decay costs significantly, single poles may decay more slowly (`relaxed_poles`).
+5. Uncertainty. A parametric bootstrap refits draws of the noise (`bootstrap`); the misfit is what exceeds the noise.
+
+References: McKelvey, Akçay and Ljung, IEEE Trans. Autom. Control 41:960 (1996); Pintelon and Schoukens, System
+Identification (2012), chapters 2 and 9.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.state_space.bootstrap import parameter_draws, response_deviation
 from equalizer.identification.state_space.candidates import (
     Candidate,
     Start,
@@ -18,55 +37,15 @@ from equalizer.identification.state_space.candidates import (
 )
 from equalizer.identification.state_space.misfit import Misfit, count_unknowns, misfit_of
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
-from equalizer.identification.state_space.refinement import FittedForm, refine
 from equalizer.identification.state_space.refusals import IdentificationRefused, require_lines
 from equalizer.identification.state_space.relaxed_poles import RelaxedFit, SlowPole, relax_poles, retighten, slow_poles
 from equalizer.identification.state_space.settings import IdentificationSettings
-from equalizer.identification.state_space.stable_poles import Radius
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.summary import Summarised, Summary
-
-STEPS = 3
-
-
-def parameter_draws(
-    fitted: FittedForm, lines: WeightedLines, radius: Radius, noise_factor: float, draws: int, seed: int
-) -> FloatArray:
-    """Parametric bootstrap (draws, k), in the order of `IdentifiedModel.parameters`: each a fit to another draw of the
-    noise.
-
-    A covariance from the Jacobian is not used: with an order above what the band shows, the response depends on some
-    directions of the parameters only beyond first order, so that draws from a normal distribution are unstable models.
-    Refitting keeps every draw within the decay bound, at the cost of a few steps each (Efron and Tibshirani 1993).
-
-    lines: the fitted lines, binned or not; noise_factor: assumed noise over that of the weights, above 1 where
-    residuals exceed the noise.
-    """
-    random = np.random.default_rng(seed)
-    modelled = fitted.response(lines.z)
-    deviation = noise_factor / lines.weight / np.sqrt(2)
-    rows = []
-    for _ in range(draws):
-        real, imaginary = random.standard_normal((2, *modelled.shape))
-        noisy = replace(lines, response=modelled + deviation * (real + 1j * imaginary))
-        drawn = refine(fitted.form, noisy, radius, STEPS)
-        parts = (drawn.form.state_matrix, drawn.B, drawn.form.C, drawn.D)
-        rows.append(np.concatenate([part.ravel() for part in parts]))
-    return np.array(rows)
-
-
-def response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> FloatArray:
-    """Standard error |δG| of each entry, (lines, p, m), from the model's samples. Raises ValueError without them."""
-    if model.samples is None:
-        raise ValueError("the model holds no samples of its uncertainty; identify it again with draws > 0")
-    middle = model_response(model, frequency_hz)
-    squares = [np.abs(model_response(model.with_parameters(row), frequency_hz) - middle) ** 2 for row in model.samples]
-    return np.asarray(np.sqrt(np.mean(squares, axis=0)), dtype=np.float64)
-
 
 FIRST_SEARCH = 0.8
 """Share of the progress that is reported for the first search; poles are relaxed in the rest."""
