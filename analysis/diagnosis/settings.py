@@ -101,7 +101,7 @@ SHORT_SHARE = 0.7  # of the samples, above which the whole is simulated at once;
 # Whether a further effect is looked for, and added (`explain`). By hand.
 MOST_EFFECTS = 3
 NOISE_ALONE = 1.05  # error that counts as noise alone
-SEALED_SURPRISE = 1.15  # error of the re-tuned model on sealed samples from which an effect is looked for all the same
+HELD_OUT_SURPRISE = 1.15  # held-out error of the re-tuned model from which an effect is looked for all the same
 SEARCH_ON = 1.12  # error from which a further effect is looked for; principle: laws of real physics are never exact
 ADDED_SHARE = 0.15  # of what is left above the noise that an effect must take to be added,
 ADDED_GAIN = 0.003  # and the least gain
@@ -125,15 +125,15 @@ NO_PREDICTION_ERROR = 3.0  # by hand
 # The verdict (`verdict`, `search`). By hand, but where a bank is named.
 EXPLAINED_ERROR = 1.12  # as good as noise; principle: laws of real physics are never exact
 CONVINCING_SHARE, CONVINCING_ERROR = 0.93, 1.3  # of the mismatch taken; then so is this: real friction reverses rounder
-HELD_OUT_ERROR = 1.5  # on sealed samples. Bank 93000: 169 of 172 right explanations below, three of nine wrong above
+HELD_OUT_ERROR = 1.5  # on held-out samples. Bank 93000: 169 of 172 right explanations below, three of nine wrong above
 NAMED_ERROR = 3.0  # up to which what was found is named beside a remainder;
 NAMED_SHARE = 0.9  # above, where it explains this share of the mismatch,
 NAMED_GAIN = 1.6  # or gains this, four fifths of the error power: noise may be small beside all physics
 EXPLAINED_BY_CHANCE = 2.5  # error over chance, where a statistic is compared; principle: no law of a contact is exact
-CONFIRMED_SHARE = 0.3  # of the mismatch, in logarithms, that must fall on sealed samples,
-SEALED_TOO_SMALL = 0.05  # unless it is smaller there than this
-# on sealed samples, and over that on all others: all but the loudest of the sealed ones, or half, are opened
-SEALED_ALONE_ERROR, SEALED_ALONE_TIMES = 1.25, 1.5
+CONFIRMED_SHARE = 0.3  # of the mismatch, in logarithms, that must fall on held-out samples,
+HELD_OUT_TOO_SMALL = 0.05  # unless it is smaller there than this
+# on held-out samples, and over that on all others: all but the loudest of the held-out ones, or half, are opened
+HELD_OUT_ALONE_ERROR, HELD_OUT_ALONE_TIMES = 1.25, 1.5
 LOUDER = 1.05  # times the largest command elsewhere, from which on a stretch is louder
 
 # Faults that a recording shows by itself (`model_free_faults`). By hand.

@@ -173,17 +173,17 @@ def _matrix_problems(model: MechanicalModel) -> Iterator[str]:
         "mass": (n, n), "damping": (n, n), "stiffness": (n, n),
         "input": (n, *model.input.shape[1:2]), "output": (model.output.shape[0], n),
     }  # fmt: skip
-    sound = True
+    valid = True
     for name, shape in shapes.items():
         matrix: FloatArray = getattr(model, name)
         if matrix.ndim != 2 or matrix.shape != shape or 0 in matrix.shape:
             wanted = {"input": f"({n}, inputs)", "output": f"(outputs, {n})"}.get(name, f"({n}, {n})")
             yield f"model.{name} has shape {matrix.shape}, but must have {wanted}: mass is {n} rows high"
-            sound = False
+            valid = False
         elif not np.isfinite(matrix).all():
             yield f"model.{name} holds values that are not finite numbers"
-            sound = False
-    if sound:
+            valid = False
+    if valid:
         yield from _mass_problems(model.mass)
 
 

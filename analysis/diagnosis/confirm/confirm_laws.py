@@ -119,8 +119,8 @@ def _confirm(begun: _Confirming, named: Sequence[tuple[int, JudgedLaw]]) -> tupl
             errors = final_errors(context, explained)
             vague = _find_vague_law(explained, errors[len(context.tuning.names) :], begun.constants)
         if vague is None:
-            sealed = float(np.nanmax(after.score.test, initial=0.0))
-            whole = begun.repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
+            test_error = float(np.nanmax(after.score.test, initial=0.0))
+            whole = begun.repeats and as_good_as_noise(explained) and test_error <= HELD_OUT_ERROR
             judged = Judgement("explained" if whole else "partly_explained", True)
             return SearchResult(begun.whole, explained, judged, errors=errors), named
         simpler = None if errors is None else find_special_case(begun.balances, _without(named, vague), named[vague])

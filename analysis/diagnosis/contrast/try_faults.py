@@ -53,8 +53,8 @@ def _try_variant(bare: Sequence[Pair], streams: Sequence[Stream], fault: Fault, 
         replace(pair, with_it=stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, fault, variant)))
         for stream, pair in zip(streams, bare, strict=True)
     ]
-    sound = all(pair.with_it.is_sound(variant) for pair in pairs)
-    return (fit_sizes(pairs, variant), fault, variant, pairs) if sound else None
+    well_conditioned = all(pair.with_it.is_well_conditioned(variant) for pair in pairs)
+    return (fit_sizes(pairs, variant), fault, variant, pairs) if well_conditioned else None
 
 
 def _error_of(tried: Tried) -> float:

@@ -78,9 +78,9 @@ class Observed:
     def shorten(self) -> "Observed":
         """The record without the samples after the last one to fit or to choose by; its recording is not cut."""
         end = int(np.flatnonzero(self.fit | self.choose)[-1]) + 1 if (self.fit | self.choose).any() else len(self.fit)
-        sealed = np.zeros(end, dtype=np.bool_)
+        no_test = np.zeros(end, dtype=np.bool_)
         return Observed(
-            self.recording, self.command[:end], self.measured[:end], self.fit[:end], self.choose[:end], sealed
+            self.recording, self.command[:end], self.measured[:end], self.fit[:end], self.choose[:end], no_test
         )
 
 

@@ -20,7 +20,7 @@ from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import judge
-from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, SEALED_ALONE_ERROR
+from analysis.diagnosis.settings import HELD_OUT_ALONE_ERROR, NAMED_ERROR, NOISE_ALONE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.laws.law import Law
 
@@ -79,7 +79,7 @@ def _needs_law(result: SearchResult) -> bool:
         return False
     left = found.after if result.judgement.named else found.retuned
     sealed = float(np.nanmax(left.score.test, initial=0.0))
-    return found.statistic is None and (left.score.worst_channel > NOISE_ALONE or sealed > SEALED_ALONE_ERROR)
+    return found.statistic is None and (left.score.worst_channel > NOISE_ALONE or sealed > HELD_OUT_ALONE_ERROR)
 
 
 def _improves_held_out(found: Explanation) -> bool:

@@ -45,8 +45,8 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
         return recordings, ""
     names = conjoin(list(first.response.channels))
     return tuple(_with_quantity(each, quantity) for each in recordings), (
-        f"Nothing says what {names} measures: it was taken for a {quantity}, as its course suggests; if it is another, "
-        "say so in the map (quantity)."
+        f"Nothing says what {names} measures: it was taken for a {quantity}, as its time series suggests; if it is "
+        "another, say so in the map (quantity)."
     )
 
 

@@ -47,9 +47,9 @@ from analysis.diagnosis.search.time_budget import OutOfTimeError, always, limit_
 from analysis.diagnosis.settings import (
     ADDED_GAIN,
     ADDED_SHARE,
+    HELD_OUT_SURPRISE,
     MOST_EFFECTS,
     NOISE_ALONE,
-    SEALED_SURPRISE,
     SEARCH_ON,
     WORTH_FITTING,
 )
@@ -155,7 +155,7 @@ def explain(
     retuned = _retune(context, before)
     base = context.candidate(retuned)
     confirmed = context.with_test_score(base)
-    surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > SEALED_SURPRISE)
+    surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     rounds: list[tuple[FittedCandidate, ...]] = []
     steps: list[FittedCandidate] = []
     barred, ended_early = "", False

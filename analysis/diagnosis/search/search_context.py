@@ -14,11 +14,11 @@ from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
 from analysis.diagnosis.search.screening import ScreenedHypothesis
 from analysis.diagnosis.settings import (
+    HELD_OUT_ALONE_ERROR,
+    HELD_OUT_ALONE_TIMES,
     LEAST_FITTED,
     LOUDER,
     MOST_FITTED,
-    SEALED_ALONE_ERROR,
-    SEALED_ALONE_TIMES,
     WORTH_FITTING,
 )
 from analysis.diagnosis.types import Mapper, Mask
@@ -123,7 +123,7 @@ def shows_there_alone(errors: FloatArray, candidate: FittedCandidate) -> bool:
     """Whether held-out samples show a mismatch that those to fit and to choose by do not. errors: (c,), there, times
     the noise."""
     shown = float(np.nanmax(errors, initial=0.0))
-    return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * candidate.score.worst_channel
+    return shown > HELD_OUT_ALONE_ERROR and shown > HELD_OUT_ALONE_TIMES * candidate.score.worst_channel
 
 
 def first_fits(
