@@ -51,21 +51,21 @@ class DeviceError(StudyError):
     exit_code = ExitCode.DEVICE
 
 
-class LeftError(StudyError):
+class UserInterruptError(StudyError):
     """Ctrl-C was pressed or the terminal closed, and what was done so far is safe."""
 
     exit_code = ExitCode.INTERRUPTED
 
 
 @contextmanager
-def resumable(happened: str, saved: str, also: tuple[type[LeftError], ...] = ()) -> Iterator[None]:
-    """Turn Ctrl-C into a LeftError which says that the same command continues. also: LeftError, where a part of the
-    work raises its own, which says less."""
+def resumable(happened: str, saved: str, also: tuple[type[UserInterruptError], ...] = ()) -> Iterator[None]:
+    """Turn Ctrl-C into a UserInterruptError which says that the same command continues. also: UserInterruptError, where
+    a part of the work raises its own, which says less."""
     caught: tuple[type[BaseException], ...] = (KeyboardInterrupt, *also)
     try:
         yield
     except caught as interruption:
-        raise LeftError(
+        raise UserInterruptError(
             "Interrupted", happened, "Run the same command again: it goes on where it stopped.", saved
         ) from interruption
 

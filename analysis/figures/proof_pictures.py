@@ -13,7 +13,7 @@ from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes, ratio_ticks
 
 MARKS = {"right": ("o", BLUE), "in the set": ("D", ORANGE), "missed": ("X", VERMILLION), "invisible": (".", GREY)}
-NOTHING_SAID = "no name"
+NO_ANSWER = "no name"
 
 
 def proof_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
@@ -80,10 +80,10 @@ def _size_picture(singles: Sequence[Outcome]) -> Picture:
 
 def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
     seen = [single for single in singles if single.detectable]
-    answers = [item.named_names[0] if item.named else NOTHING_SAID for item in seen]
-    wrong = {name for item, name in zip(seen, answers, strict=True) if name not in (NOTHING_SAID, item.names[0])}
+    answers = [item.named_names[0] if item.named else NO_ANSWER for item in seen]
+    wrong = {name for item, name in zip(seen, answers, strict=True) if name not in (NO_ANSWER, item.names[0])}
     names = sorted({item.names[0] for item in seen} | wrong)
-    columns = [*names, NOTHING_SAID]
+    columns = [*names, NO_ANSWER]
     counts = np.zeros((len(names), len(columns)))
     for each, name in zip(seen, answers, strict=True):
         counts[names.index(each.names[0]), columns.index(name)] += 1

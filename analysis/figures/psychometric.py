@@ -12,12 +12,12 @@ from analysis.figures.style import (
     BLACK,
     BLUE,
     GREY,
+    draw_no_data_note,
     name_panel_axes,
     new_figure,
     newton_ticks,
     panel_grid,
     plain_axes,
-    say_nothing_to_draw,
 )
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import TARGET
@@ -61,7 +61,7 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
     estimate, k = fit.persons[person], len(fit.frequencies_hz)
     played = [(place, shares) for place in range(k) if (shares := shares_of_person(answers, person, place))]
     if not played:
-        return say_nothing_to_draw(new_figure(4.0, 2.0), "There is no answer to draw.")
+        return draw_no_data_note(new_figure(4.0, 2.0), "There is no answer to draw.")
     figure, places = panel_grid(len(played), _LINE_IN)
     for axes, (place, shares) in zip(places, played, strict=False):
         levels = [10.0 ** (share.level_db / 20.0) for share in shares]

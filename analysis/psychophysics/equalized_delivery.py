@@ -24,7 +24,7 @@ class Delivery:
     """Off the direction over what was delivered along it."""
 
     @property
-    def as_wanted(self) -> bool:
+    def is_as_wanted(self) -> bool:
         return self.off_axis <= NEAR and all(abs(ratio - 1) <= NEAR for ratio in self.along if ratio is not None)
 
 
@@ -39,7 +39,7 @@ def deliveries(trials: Sequence[Trial]) -> tuple[Delivery, ...]:
 
 def delivery_warning(found: Sequence[Delivery]) -> str:
     """A warning that names the frequencies with deviations; empty where there are none."""
-    off = [delivery for delivery in found if not delivery.as_wanted]
+    off = [delivery for delivery in found if not delivery.is_as_wanted]
     if not off:
         return ""
     texts = [

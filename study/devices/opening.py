@@ -91,11 +91,11 @@ def open_device(
         from study.devices.loop_process.remote_device import open_remotely
 
         return open_remotely(name, settings, seed)
-    from study.devices.rigs_by_name import rig_named
+    from study.devices.rigs_by_name import find_rig
     from study.devices.safe import SafeDevice
     from study.devices.telemetry import Ring
 
-    rig = rig_named(name, settings, seed)
+    rig = find_rig(name, settings, seed)
     ring: Ring | None = None
     try:
         ring = Ring(telemetry) if telemetry or (own_process and not clock.virtual) else None

@@ -86,7 +86,7 @@ def build_recording(
     if problems := recording_problems(recording):
         raise ImportRefusedError(what, "; ".join(problems))
     notes = import_notes.sentences([part.label for part in planned])
-    return Built(recording, (*notes, *_said_of_units(wanted), *filter(None, (_odd_rate(recording), repeats))))
+    return Built(recording, (*notes, *_unit_remark(wanted), *filter(None, (_odd_rate(recording), repeats))))
 
 
 class _Counter:
@@ -148,7 +148,7 @@ def _unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
     return _ChannelUnit(unit.si, unit.factor, unit.offset, channel.quantity or quantity_of(unit.si))
 
 
-def _said_of_units(wanted: ImportMap) -> Iterator[str]:
+def _unit_remark(wanted: ImportMap) -> Iterator[str]:
     """Remarks on units that cannot be verified: those of computed channels, and channels without one."""
     for computed in (entry for entry in wanted.computed if entry.role != "helper"):
         yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or UNSTATED}."

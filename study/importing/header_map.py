@@ -36,7 +36,7 @@ _NUMBER = re.compile(r"\d+")
 _NAMED = 3
 
 
-def read_headed(path: Path) -> Arrays:
+def read_without_map(path: Path) -> Arrays:
     """A map for a file that no map describes. Raises CannotReadError; ImportRefusedError also for an invalid field in a
     column whose name states a role, a quantity or a time, or where every column has one."""
     arrays = read_arrays(path, CsvMap())

@@ -30,7 +30,7 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
     first = recordings[0]
     if set(first.response.quantities) & KNOWN:
         return recordings, ""
-    if named := _said_by_names(first):
+    if named := _quantities_in_names(first):
         return tuple(_with_quantity(each, named) for each in recordings), _sentence_of_names(first, named)
     if not is_driven(recordings):
         if set(first.response.units) != {UNSTATED}:
@@ -50,7 +50,7 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
     )
 
 
-def _said_by_names(recording: Recording) -> tuple[str, ...]:
+def _quantities_in_names(recording: Recording) -> tuple[str, ...]:
     """Quantities of the responses, where a name determines one that nothing else determines; else empty."""
     from equalizer.signals.quantity_words import quantity_in  # only where a quantity is missing
 

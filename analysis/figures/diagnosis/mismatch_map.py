@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.figures.diagnosis.stage_style import STAGES, Stage
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, new_figure, ratio_ticks, say_nothing_to_draw
+from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, ratio_ticks
 from equalizer.signals.signal import FloatArray
 
 _LOUDEST = 300.0
@@ -77,7 +77,7 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
     seconds."""
     layout = _make_layout(maps, input_)
     if not layout.stages or not layout.bands:
-        return say_nothing_to_draw(new_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
+        return draw_no_data_note(new_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
     figure = new_figure(_WIDTH_IN, 0.9 + len(layout.levels) * (_BETWEEN_IN + _ROW_IN * len(layout.channels)))
     axes, beside = _add_axes(figure, layout)
     table, frames = _fill_table(maps, input_, layout)

@@ -8,7 +8,7 @@ from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, RealAnswer
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.diagnosis.stage_style import AFTER, MEASURED, RETUNED
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, new_figure, plain_axes, say_nothing_to_draw
+from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, draw_no_data_note, new_figure, plain_axes
 
 _LOWEST = 1e-4
 """Share of the signal below which nothing is drawn."""
@@ -44,7 +44,7 @@ def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
 
 def _draw_answer(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]]) -> Figure:
     if excerpt is None or not rows:
-        return say_nothing_to_draw(new_figure(8.6, 1.6), "There are no held-out data to draw.")
+        return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
     figure = new_figure(8.8, 3.4)
     grid = figure.add_gridspec(1, 2, width_ratios=[1.75, 1])
     _draw_excerpt(figure.add_subplot(grid[0, 0]), excerpt)

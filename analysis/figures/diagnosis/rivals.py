@@ -15,7 +15,7 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.figures.diagnosis.stage_style import AFTER, RETUNED
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, ratio_ticks, say_nothing_to_draw
+from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, plain_axes, ratio_ticks
 from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
@@ -77,7 +77,7 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
 def draw_rivals(tried: Sequence[TriedExplanation], retuned: TriedExplanation, held: bool = True) -> Figure:
     """The chosen one on top, marked where it is held to be true."""
     if not tried:
-        return say_nothing_to_draw(new_figure(7.4, 1.4), "Nothing was tried.")
+        return draw_no_data_note(new_figure(7.4, 1.4), "Nothing was tried.")
     figure = new_figure(8.8, 1.05 + 0.3 * len(tried))
     axes = figure.add_subplot()
     plain_axes(axes)

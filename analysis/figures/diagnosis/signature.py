@@ -10,7 +10,7 @@ from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.result.findings import Signature
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes, say_nothing_to_draw
+from analysis.figures.style import BLACK, BLUE, GREY, draw_no_data_note, new_figure, plain_axes
 from analysis.wording import typeset
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
@@ -44,7 +44,7 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
 def draw_signature(signature: Signature) -> Figure:
     figure = new_figure(8.8, 4.0)
     if not len(signature.measured_at):
-        return say_nothing_to_draw(figure, "Too few samples show this effect to draw it.")
+        return draw_no_data_note(figure, "Too few samples show this effect to draw it.")
     axes = figure.add_subplot()
     plain_axes(axes)
     along, x_factor = _scaled_label(signature.along, signature.measured_at)

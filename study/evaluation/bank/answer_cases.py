@@ -35,7 +35,7 @@ def main(arguments: list[str]) -> None:
     """Read case names from standard input until it ends; answer each and print its name."""
     cases = Path(arguments[0]).resolve()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; the parent ends us
-    stay_apart(cases)
+    isolate_process(cases)
     digest = engine_digest()
     for line in sys.stdin:
         answer(cases / line.strip(), digest)
@@ -43,7 +43,7 @@ def main(arguments: list[str]) -> None:
         sys.stdout.flush()
 
 
-def stay_apart(cases: Path) -> None:
+def isolate_process(cases: Path) -> None:
     """Install an audit hook: from here on this process cannot import the challenge, open or list any path beside
     `cases`, or start a program."""
     sys.modules[APART] = cast(ModuleType, None)

@@ -63,7 +63,7 @@ def report_crash(wanted: RealRecording, crash: Exception) -> RealDiagnosis:
 
 def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on_progress: Progress) -> RealDiagnosis:
     """Diagnose one recording. One that cannot be diagnosed is returned as refused, with the reason. Raises only
-    LeftError."""
+    UserInterruptError."""
     parents = wanted.parents
     try:
         read = _read(wanted, (time_left, guard), on_progress)

@@ -15,7 +15,7 @@ from analysis.diagnosis.search.time_budget import CountedBudget
 from analysis.diagnosis.types import TimeBudget
 from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
-from study.errors import LeftError, StudyError, WrongUseError, resumable
+from study.errors import StudyError, UserInterruptError, WrongUseError, resumable
 from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, report_crash
 from study.evaluation.real.inject_real import carriers, run_injections
@@ -71,7 +71,7 @@ def diagnose_folder(
     plan: RealPlan, on_progress: Progress, clock: Clock | None = None, executor: Executor | None = None
 ) -> WrittenReal:
     """Diagnose a folder and write page and table. `on_progress(step, share)`. executor: does it on its workers, which
-    may share no disk. Resumable after LeftError. Raises StudyError."""
+    may share no disk. Resumable after UserInterruptError. Raises StudyError."""
     if executor is not None and plan.seconds is not None:
         raise WrongUseError(
             "Seconds are of this computer's processor",
@@ -84,7 +84,7 @@ def diagnose_folder(
     kept = kept_answers(plan.out, found.recordings, plan.seconds)
     _make_writable(plan.out)
     saved = f"What was answered so far is in {plan.out}."
-    with resumable("Not all recordings were diagnosed.", saved, also=(LeftError,)):
+    with resumable("Not all recordings were diagnosed.", saved, also=(UserInterruptError,)):
         if executor is None:
             answers = _answers(plan, found, kept, on_progress, time)
         else:

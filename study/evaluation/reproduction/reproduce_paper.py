@@ -15,7 +15,7 @@ from equalizer.identification.state_space.held_out import HeldOut, validate_on_t
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from study.devices.opening import FRICTIONLESS
-from study.errors import LeftError, StudyError, resumable
+from study.errors import StudyError, UserInterruptError, resumable
 from study.evaluation.reproduction.reproduce_baselines import play_baselines
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, play_equalized
 from study.evaluation.reproduction.reproduce_recordings import CachedRecording, RecordingRequest, record_or_load
@@ -86,12 +86,12 @@ CENTRE_NAME, SLICK_NAME, HAND_NAME = "centre", "frictionless", "hand"
 
 
 def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]) -> WrittenReproduction:
-    """Make all figures. `on_progress(share)`, 0 to 1. Resumable after LeftError. Raises StudyError."""
+    """Make all figures. `on_progress(share)`, 0 to 1. Resumable after UserInterruptError. Raises StudyError."""
     wanted = _recordings_to_make(plan)
     models = _model_names()
     steps = Steps(_weights(plan, wanted, models), on_progress)
     saved = f"Sessions, recordings and models so far are in {plan.out}."
-    with resumable("The reproduction is not finished.", saved, also=(LeftError,)):
+    with resumable("The reproduction is not finished.", saved, also=(UserInterruptError,)):
         _make_folders(plan)
         recordings = {name: record_or_load(plan, each, steps.of(f"recording {name}")) for name, each in wanted.items()}
         collected = _sit(plan, steps)

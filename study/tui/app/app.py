@@ -21,7 +21,7 @@ from study.tui import home_messages
 from study.tui.app import outcomes
 from study.tui.app.app_start import AppStart
 from study.tui.app.archive_screens import ArchiveScreens, ArchiveWanted, command_for
-from study.tui.app.engine_line import EngineLine, EngineSaid
+from study.tui.app.engine_line import EngineLine, EngineMessage
 from study.tui.app.load_screens import load_screens
 from study.tui.app.sitting_screens import SittingScreens
 from study.tui.departure import leave_with_the_terminal
@@ -103,7 +103,7 @@ class HapteqApp(App[None]):
         await self._sitting.prepare()
         self._engine.send(first)
 
-    async def on_engine_said(self, event: EngineSaid) -> None:
+    async def on_engine_message(self, event: EngineMessage) -> None:
         message = event.message
         match message:
             case Finished():

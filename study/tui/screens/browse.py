@@ -11,9 +11,9 @@ from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import DirectoryTree, Footer, Input, Static
 
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.home_messages import DiagnosisWanted, SessionWanted
 from study.tui.screens.help import HelpScreen
-from study.tui.take_off import take_off
 
 LOG, DIAGNOSIS = "events.jsonl", "diagnosis.json"
 
@@ -92,12 +92,12 @@ class BrowseScreen(ModalScreen[None]):
         self.app.push_screen(HelpScreen(HELP))
 
     def action_leave(self) -> None:
-        take_off(self, None)
+        dismiss_screen(self, None)
 
     def _open(self, path: Path) -> None:
         wanted = SessionWanted(str(path.parent)) if path.name == LOG else DiagnosisWanted(str(path))
         self.app.post_message(wanted)
-        take_off(self, None)
+        dismiss_screen(self, None)
 
     def _say(self, text: str) -> None:
         self.query_one("#said", Static).update(text)

@@ -9,9 +9,9 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import Screen
 from textual.widgets import Footer, Input, Label, Static
 
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.engine.from_engine import Calibrated, LayDown, SensorKept
 from study.tui.home_messages import CalibrateWanted, CalibrationStopped, KeepWanted, LaidDown
-from study.tui.take_off import take_off
 
 HELP = """\
 # The accelerometer in six positions
@@ -126,7 +126,7 @@ class SensorScreen(Screen[None]):
     def action_leave(self) -> None:
         if self._under_way:
             self.post_message(CalibrationStopped())
-        take_off(self, None)
+        dismiss_screen(self, None)
 
     @on(Input.Changed)
     def _unsay(self) -> None:

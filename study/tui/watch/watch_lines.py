@@ -6,6 +6,7 @@ from study.tui.watch.watch_words import (
     SYMBOLS,
     catch_words,
     clock_time,
+    describe_activity,
     device_words,
     dose_words,
     drift_words,
@@ -17,7 +18,6 @@ from study.tui.watch.watch_words import (
     staircase_title,
     time_words,
     verdict,
-    what_goes_on,
 )
 
 BELL = "\a"
@@ -39,14 +39,14 @@ def changes(before: WatchView | None, now: WatchView) -> list[str]:
     if now.shown_run != before.shown_run and now.shown_run is not None:
         lines.append(staircase_title(now))
     if now.standing != before.standing:
-        lines.append(f"{now.standing.upper()}: {what_goes_on(now)}")
+        lines.append(f"{now.standing.upper()}: {describe_activity(now)}")
     return lines
 
 
 def status(view: WatchView) -> list[str]:
     """The whole view, without what is in the log anyway."""
     lines = [
-        f"{SYMBOLS[view.standing]} {view.standing.upper()} {view.session}: {what_goes_on(view)}",
+        f"{SYMBOLS[view.standing]} {view.standing.upper()} {view.session}: {describe_activity(view)}",
         f"Protocol   {view.protocol}; {view.answers} answers",
         f"Staircase  {staircase_title(view)}",
         f"Time       {time_words(view.exposure)} of this sitting",

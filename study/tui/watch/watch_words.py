@@ -38,7 +38,7 @@ def duration(seconds: float) -> str:
     return f"{minutes // 60} h {minutes % 60:02d} min"
 
 
-def what_goes_on(view: WatchView) -> str:
+def describe_activity(view: WatchView) -> str:
     """Activity in words: "trial 12 of test run 2, 35 Hz: waiting for the answer, 4 s"."""
     if view.reason:
         return view.reason

@@ -37,7 +37,7 @@ from study.workflows.forked_map import map_forked, processor_s
 READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
 """Progress after reading, after fitting a model where none was given, and after the diagnosis."""
 
-TWIN_SAID = (
+TWIN_REMARK = (
     "No model was given. The session was compared with the simulated device's twin: a linear model, identified from "
     "recordings without a hand at the handle, as `hapteq twin` writes it."
 )
@@ -228,7 +228,7 @@ def _model(
     if plan.model is not None:
         return FirstModel(read_given_model(plan.model, found), ())
     if found.simulated:
-        return FirstModel(_twin(within), (TWIN_SAID,))
+        return FirstModel(_twin(within), (TWIN_REMARK,))
     # Imported here: a given model needs no fit of a first one.
     from study.workflows.diagnosis.fit_without_model import first_model_of, fit_linear_model
 

@@ -26,7 +26,7 @@ from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracki
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
-from study.errors import DeviceError, LeftError, StudyError, WrongUseError
+from study.errors import DeviceError, StudyError, UserInterruptError, WrongUseError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.disk.json_document import write_json
@@ -217,7 +217,7 @@ def _play_both(
             if device.fault() is Fault.FORCE_LEFT:
                 raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, AGAIN, NOTHING) from None
             happened = f"{len(measured)} of {len(forces)} plays were measured; the force was released."
-            raise LeftError("Interrupted", happened, AGAIN, NOTHING) from interruption
+            raise UserInterruptError("Interrupted", happened, AGAIN, NOTHING) from interruption
     return measured
 
 
