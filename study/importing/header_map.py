@@ -34,11 +34,12 @@ _TIME = re.compile(
 )
 _NUMBER = re.compile(r"\d+")
 _NAMED = 3
+"""Most names that an error lists."""
 
 
 def read_without_map(path: Path) -> Arrays:
-    """A map for a file that no map describes. Raises CannotReadError; ImportRefusedError also for an invalid field in a
-    column whose name states a role, a quantity or a time, or where every column has one."""
+    """Read the arrays of a file that no map describes. Raises CannotReadError, and ImportRefusedError for an invalid
+    field in a column whose name states a role, a quantity or a time, or where every column has one."""
     arrays = read_arrays(path, CsvMap())
     faulty = [name for name, array in arrays.by_name.items() if _fault(array)]
     columns = [name_signal(header) for header in arrays.by_name] if faulty else []

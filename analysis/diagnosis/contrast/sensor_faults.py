@@ -11,7 +11,7 @@ from analysis.diagnosis.contrast.actuator_faults import (
     BEGUN,
     GRID,
     delays_to_try,
-    drift_course,
+    drift_shape,
     median_frequency_hz,
 )
 from analysis.diagnosis.contrast.fault import (
@@ -167,7 +167,7 @@ def _offset(channel: _Channel, shift: float) -> Variant:
 def _drift(channel: _Channel, total: float, begun: float) -> Variant:
     def undo(part: Part) -> Part:
         response = part.response.copy()
-        response[:, list(channel.numbers)] -= total * drift_course(part, begun)[:, None]
+        response[:, list(channel.numbers)] -= total * drift_shape(part, begun)[:, None]
         return replace(part, response=response)
 
     return Variant((undo,), proportional_number("total", total), *WIDELY)

@@ -7,8 +7,9 @@ from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray
 
 PAST = 6
-"""Past samples of each signal that the command is predicted from."""
+"""Past samples of each signal from which the command is predicted."""
 _LEAST = 200
+"""Fewest known samples for the test."""
 
 
 def is_in_closed_loop(recording: Recording) -> bool:
@@ -25,6 +26,8 @@ def is_in_closed_loop(recording: Recording) -> bool:
 
 
 def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> bool:
+    """Whether past responses improve the prediction of the command from its own past: Granger causality, by the ratio
+    of the rms residuals of two autoregressions."""
     signals = [recording.response.samples]
     if recording.position is not None:
         signals.append(recording.position.samples)

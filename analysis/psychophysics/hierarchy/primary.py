@@ -27,7 +27,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class PersonEstimate:
-    """One person's numbers, drawn towards the others' where their own answers say little."""
+    """One person's parameters, shrunk towards the population's where their own answers say little (posterior mode)."""
 
     subject: str
     thresholds_n: tuple[float, ...]
@@ -40,6 +40,8 @@ class PersonEstimate:
 
 @dataclass(frozen=True, slots=True)
 class PrimaryAnalysis:
+    """Estimates of the hierarchical psychometric model."""
+
     family: Family
     trials: int
     frequencies_hz: tuple[float, ...]
@@ -52,11 +54,11 @@ class PrimaryAnalysis:
     limit: DirectionLimit
     persons: tuple[PersonEstimate, ...]
     runs: tuple[RunLikelihood, ...]
-    """Each person at each frequency by those answers alone."""
+    """Likelihood of each person's threshold at each frequency, by those answers alone."""
     person_sd_db: float
-    """Between people, at all frequencies."""
+    """Standard deviation between people, common to all frequencies."""
     frequency_sd_db: float
-    """Person x frequency: between people, beyond what they share over frequencies."""
+    """Standard deviation of the interaction person x frequency."""
     slope: float
     slope_log_sd: float
     criterion_sd: float

@@ -25,8 +25,9 @@ class Bodies:
     ports: FloatArray
     """(n, r): the directions along which forces act; the driven axes first, then joints."""
     acts: tuple[AxisForce | JointForce, ...]
-    """One per force."""
+    """One per force: its law."""
     port: tuple[int, ...]
+    """One per force: index of the port at which it acts."""
     numbers: tuple[FloatArray, ...]
     """Parameters of each force's law."""
 
@@ -148,6 +149,8 @@ def _output_matrix(linear: LinearSteps, outward: FloatArray, ports: tuple[int, .
 
 
 def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
+    """The forces in the form of the compiled kernel: distinct laws once each; for every force the index of its law and
+    port, and the ranges of its parameters and of its memory. Raises ValueError for too many laws."""
     laws: list[object] = []
     places: list[tuple[int, ...]] = []
     used = kept = 0
@@ -157,7 +160,7 @@ def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
         places.append((laws.index(act.law), ports.index(port), used, used + len(numbers), kept, kept + act.memory))
         used, kept = used + len(numbers), kept + act.memory
     if len(laws) > LAWS:
-        raise ValueError(f"{len(laws)} different forces act at once; at most {LAWS} can be played")
+        raise ValueError(f"{len(laws)} different force laws act at once; simulate at most {LAWS}")
     return Forces(
         ports,
         tuple(law_address(law) for law in (*laws, *(no_force,) * (LAWS - len(laws)))),
