@@ -35,6 +35,7 @@ SAME = 2.0
 """Ratio of squared misfits below which two causes cannot be told apart. On the simulated omega.3 a hand that becomes
 one and a half of what it was leaves 1.2 to 1.7 times what a gain leaves: friction is more there than its law."""
 DELAY_STEPS = 3
+"""Gauss-Newton steps for a delay, in which the response is not linear."""
 DEVIATIONS = 4.0
 """Standard errors beyond which a number is more than the scatter."""
 

@@ -13,6 +13,7 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.wording import number
 
 _COLUMNS = 6
+"""Panels side by side."""
 _COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
 _STYLES: tuple[LineStyleType, ...] = ("-", "--", "-.", ":", (0, (5, 1)))
 

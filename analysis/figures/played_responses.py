@@ -16,6 +16,7 @@ from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, draw_no_data_n
 _AXES = "xyz"
 _COLOURS = (BLUE, VERMILLION, GREEN)
 _LOWEST_DB, _HIGHEST_DB = -55.0, 12.0
+"""Range of the vertical axis."""
 _TICKS_HZ = (5, 10, 20, 35)
 
 

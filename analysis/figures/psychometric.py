@@ -32,9 +32,11 @@ from analysis.psychophysics.hierarchy.observed_shares import (
 from protocols.procedure.staircase import to_db
 
 _LINE_IN = 2.2
+"""Height of a row of panels, inches."""
 _SMALLEST, _LARGEST = 2.5, 7.5
 """Marker sizes in points: of a single trial, and of `_MANY` or more."""
 _MANY = 100
+"""Number of trials from which a marker has its largest size."""
 
 
 def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:

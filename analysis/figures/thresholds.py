@@ -22,6 +22,7 @@ from analysis.psychophysics.threshold_table import ThresholdTable
 _SPREAD = 0.5
 """Width taken by the participants of one frequency, in steps between frequencies."""
 _LEGEND_LIMIT = 24
+"""Most participants for whom there is a legend."""
 _STOPPED_AT = 1.07
 """Height of the row of stopped runs, as a multiple of the cap."""
 

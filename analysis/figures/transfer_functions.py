@@ -18,6 +18,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _BIN_OCTAVES = 1 / 24
+"""Width of a bin in which lines are averaged for drawing, octaves."""
 _DIM = "#B8B8B8"
 _BAND = "#EEF3E6"
 

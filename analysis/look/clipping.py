@@ -18,6 +18,7 @@ CLIPPING = "clipping"
 LEAST_SAMPLES = 5
 """Samples at an extreme below which they are chance."""
 LEAST_RUNS = 2
+"""Fewest runs of equal readings at the top that count as clipping."""
 _STEPS = 3.0
 """Least extrapolated rise beyond the extreme, in steps of rounding."""
 SETTLES = 0.4

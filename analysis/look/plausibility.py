@@ -19,6 +19,7 @@ _SMALLEST = {
 }  # fmt: skip
 """Rms below which a unit is doubted."""
 G, IN_G = 9.80665, (0.97, 1.03)
+"""Standard gravity in m/s², and the range of a mean reading that looks as if it were in units of it."""
 STRONG = 0.5
 """Mean over rms from which an offset is reported."""
 

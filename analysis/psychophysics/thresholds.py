@@ -189,3 +189,4 @@ def _mean_of_measured(values: Sequence[float | None]) -> float | None:
 
 
 _SAME_LEVEL = 1e-9
+"""Relative difference below which two levels are the same, rounding apart."""

@@ -15,6 +15,7 @@ from analysis.wording import NONE, capitalise, end_sentence, p_value, signed_num
 
 _STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With what was found"))
 _MOST_PLACES = 12
+"""Most rows of the table of mismatches."""
 _SHARE = (
     "In order of how much of the channel's whole signal is missing. Share: mismatch over signal there; where a state "
     "is named, of the mismatch's power that sits in it."

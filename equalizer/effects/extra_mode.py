@@ -15,6 +15,7 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 LOWEST_HZ, STARTS = 2.0, 2
+"""Lowest resonance that is tried, and number of modes that are suggested."""
 RATIOS = (0.01, 0.04, 0.12)
 """Damping ratios to start from."""
 FINER, COARSER = np.linspace(0.96, 1.04, 9), np.geomspace(0.4, 2.5, 5)

@@ -14,7 +14,9 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 FASTEST_HZ, STARTS = 15.0, 2
+"""Fastest variation of a grip (a tremor is slower), and number of suggestions."""
 _FINER = 16
+"""Zero padding of the spectrum: points per line."""
 
 
 @compile_law

@@ -25,6 +25,7 @@ MOST_DIFFERENCE = 0.05
 """J against finite differences. Another unit or convention gives at least 40 %, a forgotten arm's length some 10 %."""
 
 DEGREES = (4, 3, 2, 1)
+"""Degrees of the polynomial, tried from the highest: the first with enough positions is taken."""
 SPARE = 2
 """Times as many positions as terms: below it a lower degree is taken."""
 NEAR_SHARE = 0.3

@@ -14,6 +14,7 @@ WARN_FROM = 0.02
 """Relative difference of inertia: moves an acceleration by 2 %, a fifth of the staircases' finest step (1 dB)."""
 
 NEAR_M = 1e-6
+"""Distance below which two positions are the same."""
 ODD_SHARE = 0.5
 """Below this share of the others' asymmetry a line is one that holds: its own arm is the odd one."""
 UPRIGHT = 1e-3

@@ -12,6 +12,7 @@ IntArray = npt.NDArray[np.signedinteger]
 BoolArray = npt.NDArray[np.bool_]
 
 LEAST_CORRELATION = 0.5
+"""Least correlation of two signals for their offset to be trusted."""
 RIVAL = 0.98
 """Height of a second peak, relative to the highest, at which the offset is ambiguous."""
 

@@ -53,6 +53,7 @@ _PREFIXABLE: dict[str, Dimension] = {
 _FORCE, _LENGTH = _PREFIXABLE["N"], _PREFIXABLE["m"]
 _TORQUE: Dimension = (1, 2, -2, 0, 0, 0)
 _POUND, _INCH = 0.45359237, 0.0254
+"""Kilograms in a pound, metres in an inch (exact by definition)."""
 _POUND_FORCE = _POUND * 9.80665
 _FIXED: dict[str, Unit] = {
     "1": Unit("1", 1.0, (0, 0, 0, 0, 0, 0)),

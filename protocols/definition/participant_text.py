@@ -12,6 +12,7 @@ from protocols.definition.staircase_rule import STRICT
 Sentence = Annotated[str, Field(min_length=1, max_length=500)]
 Key = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 LONGEST_SCALE = 11
+"""Most steps of a rating scale."""
 
 
 @dataclass(frozen=True, config=STRICT)

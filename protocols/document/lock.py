@@ -10,6 +10,7 @@ from protocols.document.hashing import protocol_hash
 
 FORMAT = "hapteq-protocol-lock"
 VERSION = 1
+"""Version of the lock's format."""
 
 
 class LockError(ValueError):

@@ -26,6 +26,7 @@ _PROCESS_NOISE = 1e-12
 """Process noise of all states per sample, relative to their size: without it the Riccati equation has no stabilising
 solution."""
 _DOUBLINGS = 40
+"""Most doublings: the filter then has run over 2^40 samples."""
 _MATRIX = types.float64[:, ::1]
 _READ = types.Array(types.float64, 2, "C", readonly=True)
 

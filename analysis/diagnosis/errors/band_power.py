@@ -19,6 +19,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
 
 WINDOW_S, OCTAVES = 1.0, 0.5
+"""Length of a Welch window in s, and width of a band in octaves."""
 LOWEST, HIGHEST = 2.0, 0.48
 """Edges of the bands, relative to a window's own line, and relative to the sample rate."""
 LONGEST_S, LEAST = 8.0, 256

@@ -12,6 +12,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _NEARLY_STILL_HZ = 1e-6
+"""Frequency at which the derivative of the inverse at 0 Hz is computed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,6 +20,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 _ROUNDS = 2
+"""Fits: the band in which forces are compared depends on the model, so the fit is repeated."""
 
 
 def wants_rigid_model(recordings: Sequence[Recording]) -> bool:

@@ -11,6 +11,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _WELL_CONDITIONED = 1e8
+"""Largest condition number of the mode shapes for which modal coordinates are used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

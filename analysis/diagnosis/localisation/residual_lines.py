@@ -16,6 +16,7 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 _WINDOW_S = 1.0
+"""Length of a window where nothing is periodic."""
 _DRIVEN_IN_BAND = 1e-4
 """Share of the strongest band's power of the command below which a band is not driven."""
 _DRIVEN_IN_WINDOW = 1e-2

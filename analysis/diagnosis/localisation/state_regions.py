@@ -13,7 +13,9 @@ from equalizer.signals.signal import FloatArray
 
 StateKind = Literal["position", "velocity", "command", "response", "time"]
 _BINS = 12
+"""Bins of a state, with equally many samples each."""
 PERMUTATIONS = 60
+"""Permutations of blocks; the p-value is that of a gamma distribution fitted to them."""
 _CONCENTRATED = 1.5
 """Least ratio of a bin's mean square to the expected one, for the bin to belong to a region."""
 _LEAST_SHARE = 0.05

@@ -21,6 +21,7 @@ from equalizer.effects.placing import axis_letter
 _NAME, _FREE, _OWN_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
 _NUMBER = re.compile(r"(?<![A-Za-z_\d])\d[\d.]*(?:[eE][+-]?\d+)?")
 MOST = 6
+"""Most candidates that a diagnosis lists."""
 REFINING = {
     "drifting_friction": ("coulomb_friction",),
     "condition_dependent_friction": ("coulomb_friction",),

@@ -14,6 +14,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _AT_THE_EDGE = 1e-3
+"""Relative distance from a bound at which a parameter counts as being at it."""
 _LOSSES = 1e-6
 """Negative eigenvalue of a matrix that rounding may cause, over the largest."""
 

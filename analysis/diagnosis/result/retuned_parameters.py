@@ -11,6 +11,7 @@ from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
 _LISTED = 4
+"""Most re-tuned parameters that a sentence lists."""
 
 
 @dataclass(frozen=True, slots=True)

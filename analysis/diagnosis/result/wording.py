@@ -38,6 +38,7 @@ from analysis.diagnosis.unit_wording import probability_text, share_text
 from analysis.wording import capitalise, conjoin, end_sentence, p_text
 
 _PLACES_NAMED = 3
+"""Most places that a sentence lists."""
 _NOT_MORE = (
     "What is left is no more than the noise seems to be; only repeats of a drive would show that nothing else is "
     "missing."

@@ -17,9 +17,12 @@ from equalizer.signals.signal import FloatArray
 _CYCLES = 5.0
 """Cycles of the effect's change in the excerpt."""
 _SHORTEST_S, _LONGEST_S = 0.1, 3.0
+"""Shortest and longest stretch that is drawn."""
 _MARKERS = {"before": "s", "retuned": "D", "after": "o"}
 _STRETCHES = 60
+"""Number of stretches from which the drawn one is chosen."""
 _STANDING = 0.01
+"""Weight of a constant change beside a varying one, when a stretch is chosen."""
 
 ChannelErrors = Mapping[str, Mapping[str, float]]
 

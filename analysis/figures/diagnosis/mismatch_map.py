@@ -24,11 +24,13 @@ _LETTER_IN = 0.075
 _ROW_IN, _BETWEEN_IN = 0.25, 0.2
 """Height of a row of cells, and between panels."""
 _MOST_LEVELS = 4
+"""Most levels drawn separately; more are grouped."""
 _NUMBERED = 1.15
 """Residual over noise below which a cell has no number."""
 _SQUARE = ((-0.46, -0.46), (0.46, -0.46), (0.46, 0.46), (-0.46, 0.46), (-0.46, -0.46))
 _UNIT = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
 _WIDTH_IN = 8.8
+"""Width of the figure, inches."""
 _FINE, _GAP = 4, 0.25
 """Points per cell, along each side, and cells between panels: a whole number of points."""
 _NUMBERS_FIT = 10

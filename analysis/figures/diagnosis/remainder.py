@@ -15,6 +15,7 @@ from analysis.figures.picture import Picture
 from analysis.figures.style import GREY, draw_no_data_note, new_figure, plain_axes, power_of_ten
 
 _COLUMNS = 3
+"""Panels side by side."""
 _SIGNAL = Line2D([], [], color=GREY, linewidth=0.9, label="measured")
 _NOISE = Line2D([], [], color=GREY, linewidth=4, alpha=0.4, label="noise")
 

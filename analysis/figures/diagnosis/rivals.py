@@ -20,6 +20,7 @@ from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 8
+"""Most rivals that are drawn."""
 _SEEN = "The data that were fitted to and chosen by; rivals are not tried on held-out data."
 _BOTH = "Filled: the data that were fitted to and chosen by; open: held-out data, by which nothing was chosen."
 _ORDINALS = ("first", "second", "third", "fourth", "fifth")

@@ -18,6 +18,7 @@ from analysis.wording import conjoin, number, p_text, signed_number
 from protocols.trial import Trial
 
 LEVEL = 0.05
+"""Level of significance."""
 
 
 @dataclass(frozen=True, slots=True)

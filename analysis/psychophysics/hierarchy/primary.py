@@ -23,6 +23,7 @@ from equalizer.signals.signal import FloatArray
 from protocols.procedure.staircase import to_db
 
 CONFIDENCE = 0.95
+"""Default confidence of all intervals."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
 LEAST_SAMPLES = 64
+"""Fewest samples of a recording."""
 ALL_NOISE = 0.97
 """Relative simulation error above which a model explains less than a twentieth of the response's power."""
 

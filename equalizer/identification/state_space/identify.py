@@ -50,6 +50,7 @@ from equalizer.signals.summary import Summarised, Summary
 FIRST_SEARCH = 0.8
 """Share of the progress that is reported for the first search; poles are relaxed in the rest."""
 BAND_POINTS = 200
+"""Points of the integral over the band."""
 WIDTHS = np.sinh(np.linspace(-4, 4, 41))
 """Frequencies about a slow pole, in half-widths of its peak: dense at the peak, up to 27 away."""
 SAMPLED_BEFORE_WRITTEN = 1.0

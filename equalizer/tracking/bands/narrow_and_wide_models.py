@@ -34,9 +34,11 @@ RIGID_OCTAVES = 0.6
 """Width in octaves of the lowest part of the narrow band to which the rigid model is fitted: below the first
 resonance."""
 RIGID_LINES = 30
+"""Lines at which the rigid model is compared."""
 LEAST_REACH = 2.0
 """Least ratio of the two bands' upper ends: a high band with a single direction needs an octave."""
 BINS_PER_OCTAVE = 6
+"""Bins per octave in which two models are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,6 +8,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 WORST_CONDITION = 1e6
+"""Largest condition number of the response that is inverted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,6 +16,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 STOPBAND_DB = 60.0
+"""Attenuation of the filters outside their band."""
 CAUSAL_ORDER = 3
 """Odd, so that both sides of a crossover fall off alike: 12 dB per octave."""
 

@@ -26,6 +26,7 @@ DRIFT = 0.1
 TERMS_PER_OCTAVE = 1.7
 """Number of Chebyshev polynomials in log frequency, per octave, that describe the smooth remainder."""
 LINES_PER_OCTAVE = 100
+"""Lines per octave on which modes are fitted to a model's response."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,6 +21,7 @@ from equalizer.tracking.workspace.workspace_models import Place, WorkspaceError,
 
 Interpolation = Literal["blended forces", "modal"]
 LINES = 300
+"""Lines on which interpolations are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,6 +14,7 @@ FREQUENCY_SCALE = 0.3
 ALONE = 0.6
 """Cost of a mode without a partner; a pair may cost twice as much at most."""
 LEAST_LIKENESS = 0.5
+"""Least likeness (MAC, 0 to 1) of the shapes of two modes that are matched."""
 LEAST_MARGIN = 0.1
 """Smallest difference in cost to the best matching without one of the pairs."""
 WEAK = 0.1

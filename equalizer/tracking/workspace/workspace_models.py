@@ -11,6 +11,7 @@ Place = tuple[float, float, float]
 """x, y, z in metres."""
 
 SAME_PLACE_M = 1e-4
+"""Distance below which two places are the same."""
 
 
 class WorkspaceError(ValueError):
