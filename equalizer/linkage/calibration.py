@@ -164,4 +164,6 @@ def inertia_about(calibration: LinkageCalibration, place_m: FloatArray) -> tuple
             found = np.linalg.lstsq(terms, weights * calibration.inertia_kg.reshape(-1, 9), rcond=None)[0]
             linear = [powers.index((axis == 0, axis == 1, axis == 2)) for axis in range(3)]
             return found[powers.index((0, 0, 0))].reshape(3, 3), found[linear].reshape(3, 3, 3) / reach_m
-    raise ValueError(f"{len(away)} positions do not tell how the inertia changes: it takes eight in space")
+    raise ValueError(
+        f"{len(away)} positions do not tell how the inertia changes: read at least eight, not in one plane"
+    )

@@ -44,15 +44,17 @@ def offset_by_correlation(reference: Samples, other: Samples, about_s: float, wi
     offsets_s = reference.times_s[0] - other.times_s[0] + lags / rate_hz
     allowed = (np.abs(offsets_s - about_s) <= within_s) & _has_enough_overlap(lags, len(first), len(second))
     if allowed.sum() < 8:
-        raise NoOffsetError("the two signals do not overlap within the range of offsets that is searched")
+        raise NoOffsetError("the two signals do not overlap within the range of offsets that is searched; widen it")
     offsets_s, correlation = offsets_s[allowed], correlation[allowed]
     peak = int(np.argmax(np.abs(correlation)))
     best = abs(correlation[peak])
     if best < LEAST_CORRELATION:
-        raise NoOffsetError(f"the two signals agree nowhere (highest correlation {best:.2f})")
+        raise NoOffsetError(
+            f"the two signals agree nowhere (highest correlation {best:.2f}); give two signals of the same quantity"
+        )
     if not 0 < peak < len(correlation) - 1:
         raise NoOffsetError(
-            f"the two signals agree best at the end of the range that is searched ({offsets_s[peak]:g} s)"
+            f"the two signals agree best at the end of the range that is searched ({offsets_s[peak]:g} s); widen it"
         )
     _refuse_rivals(offsets_s, np.abs(correlation), peak)
     return _interpolate_peak(offsets_s, correlation, peak)

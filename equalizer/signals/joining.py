@@ -16,7 +16,7 @@ def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
     Raises ValueError for no parts, or for parts of different devices, rates or channels.
     """
     if not parts:
-        raise ValueError("there is nothing to join")
+        raise ValueError("there is nothing to join; give at least one recording")
     first = parts[0]
     for part in parts[1:]:
         if (part.device, part.sample_rate_hz) != (first.device, first.sample_rate_hz):

@@ -39,7 +39,9 @@ def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, 
     locked: time of the lock in words, for the message.
     """
     if protocol.name != lock.name:
-        raise LockError(f"the lock is that of protocol {lock.name}, not of {protocol.name}")
+        raise LockError(
+            f"the lock is that of protocol {lock.name}, not of {protocol.name}; give the lock of this protocol"
+        )
     now = protocol_hash(protocol)
     if now != lock.hash:
         raise LockError(

@@ -139,7 +139,7 @@ def _join_parts(
 
 def _check_alike(recordings: Sequence[Recording]) -> None:
     if not recordings:
-        raise TransferEstimateError("there is no recording to estimate from")
+        raise TransferEstimateError("there is no recording to estimate from; give at least one")
     first = recordings[0]
     for number, other in enumerate(recordings[1:], start=2):
         for what, wanted, found in (

@@ -104,7 +104,8 @@ def track_under_cap(
     alone = force_peaks(there, require_cap(cap_n))
     if not alone.fits:
         raise TrackingError(
-            f"the other forces alone reach {alone.peak_n:.3g} N at row {alone.at_sample}, above the cap of {cap_n:g} N"
+            f"the other forces alone reach {alone.peak_n:.3g} N at row {alone.at_sample}, above the cap of {cap_n:g} "
+            "N; lower them, or raise the cap"
         )
     task = _CappedTask(problem, r, there, cap_n)
     free = track(stored_gains(problem, len(r)), r)

@@ -54,5 +54,7 @@ def controller_cases(controller: RealtimeController, seed: int = 1) -> Controlle
 def _cap_factor(forces: FloatArray, cap_n: float, way: str) -> float:
     longest = float(np.linalg.norm(forces, axis=1).max())
     if not longest >= NO_FORCE * cap_n:
-        raise TrackingError(f"the {way} comes to no force: there is nothing to play")
+        raise TrackingError(
+            f"the {way} comes to no force: there is nothing to play; give a transient with content in the model's band"
+        )
     return OF_CAP * cap_n / longest

@@ -64,7 +64,7 @@ class InterpolationChoice:
 def held_out_model(model: IdentifiedModel, band_hz: tuple[float, float]) -> HeldOutPlace:
     """A model of a place, taken as the truth there. Raises ValueError without a place."""
     if model.place_m is None:
-        raise ValueError("the model that is held out does not say where it was identified")
+        raise ValueError("the model that is held out does not say where it was identified; identify it with its place")
     frequency_hz = np.geomspace(*band_hz, LINES)
     return HeldOutPlace(model.place_m, frequency_hz, model_response(model, frequency_hz))
 
