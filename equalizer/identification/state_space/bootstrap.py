@@ -8,12 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from equalizer.identification.state_space.refinement import FittedForm, refine
+from equalizer.identification.state_space.relaxed_poles import SlowPole
 from equalizer.identification.state_space.stable_poles import Radius
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray
 
+BAND_POINTS = 200
+"""Points of the integral over the band."""
+WIDTHS = np.sinh(np.linspace(-4, 4, 41))
+"""Frequencies about a slow pole, in half-widths of its peak: dense at the peak, up to 27 away."""
 STEPS = 3
 """Levenberg-Marquardt steps of each refit: a draw of the noise moves the minimum little."""
 
@@ -51,3 +56,15 @@ def response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> Floa
     middle = model_response(model, frequency_hz)
     squares = [np.abs(model_response(model.with_parameters(row), frequency_hz) - middle) ** 2 for row in model.samples]
     return np.asarray(np.sqrt(np.mean(squares, axis=0)), dtype=np.float64)
+
+
+def scatter_of_draws(model: IdentifiedModel, frequency_hz: FloatArray, slow: tuple[SlowPole, ...]) -> float | None:
+    """Relative scatter as an integral over the band: also between lines, where a narrow resonance has its peak."""
+    if model.samples is None or len(frequency_hz) < 2:
+        return None
+    low, high = frequency_hz[0], frequency_hz[-1]
+    peaks = [pole.frequency_hz + WIDTHS / (2 * np.pi * pole.decay_s) for pole in slow]
+    grid = np.unique(np.clip(np.concatenate([np.linspace(low, high, BAND_POINTS), *peaks]), low, high))
+    each_hz = np.gradient(grid)[:, None, None]
+    size = np.sqrt((each_hz * np.abs(model_response(model, grid)) ** 2).sum())
+    return float(np.sqrt((each_hz * response_deviation(model, grid) ** 2).sum()) / size)

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.identification.state_space.bootstrap import parameter_draws, response_deviation
+from equalizer.identification.state_space.bootstrap import parameter_draws, scatter_of_draws
 from equalizer.identification.state_space.candidates import (
     Candidate,
     Start,
@@ -42,17 +42,11 @@ from equalizer.identification.state_space.relaxed_poles import RelaxedFit, SlowP
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
 from equalizer.signals.summary import Summarised, Summary
 
 FIRST_SEARCH = 0.8
 """Share of the progress that is reported for the first search; poles are relaxed in the rest."""
-BAND_POINTS = 200
-"""Points of the integral over the band."""
-WIDTHS = np.sinh(np.linspace(-4, 4, 41))
-"""Frequencies about a slow pole, in half-widths of its peak: dense at the peak, up to 27 away."""
 SAMPLED_BEFORE_WRITTEN = 1.0
 """Delay of one sample: a response is read just before its row's command is written."""
 
@@ -198,7 +192,7 @@ def _assess_model(
         cost=cost,
         rms_relative_error=float(np.sqrt((error**2).mean())),
         worst_relative_error=float(error.max()),
-        scatter=(scatter := _scatter(model, lines.frequency_hz[inside], slow)),
+        scatter=(scatter := scatter_of_draws(model, lines.frequency_hz[inside], slow)),
         misfit=misfit,
         expected_error=None if scatter is None else float(np.hypot(scatter, misfit.most)),
         lines=int(inside.sum()),
@@ -208,18 +202,6 @@ def _assess_model(
         bound_costs=after.bound_costs,
         remarks=(*fit_remarks(cost, misfit, slow, after.bound_costs, settings), *outside_remark(chosen)),
     )
-
-
-def _scatter(model: IdentifiedModel, frequency_hz: FloatArray, slow: tuple[SlowPole, ...]) -> float | None:
-    """Relative scatter as an integral over the band: also between lines, where a narrow resonance has its peak."""
-    if model.samples is None or len(frequency_hz) < 2:
-        return None
-    low, high = frequency_hz[0], frequency_hz[-1]
-    peaks = [pole.frequency_hz + WIDTHS / (2 * np.pi * pole.decay_s) for pole in slow]
-    grid = np.unique(np.clip(np.concatenate([np.linspace(low, high, BAND_POINTS), *peaks]), low, high))
-    each_hz = np.gradient(grid)[:, None, None]
-    size = np.sqrt((each_hz * np.abs(model_response(model, grid)) ** 2).sum())
-    return float(np.sqrt((each_hz * response_deviation(model, grid) ** 2).sum()) / size)
 
 
 def _refuse_foreign(records: tuple[Recording, ...], like: FrequencyResponse) -> None:

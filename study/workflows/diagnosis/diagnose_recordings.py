@@ -105,14 +105,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
     plain = plan.model is None and not plan.clean
-    found = read_input(plan.sources, plan.seed, plain, plan.force_constants)
-    clean: DiagnosisInput | None = None
-    if plan.clean:
-        # Imported here: most diagnoses have no recordings of the device in order.
-        from study.workflows.diagnosis.clean_recordings import with_clean
-
-        both = with_clean(found, plan.sources, plan.clean, plan.seed)
-        found, clean = both.found, both.clean
+    found, clean = _add_clean(plan, read_input(plan.sources, plan.seed, plain, plan.force_constants))
     on_progress("reading", READ)
     time_left = _time_budget(plan)
     guard = crash_guard()
@@ -142,6 +135,17 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     return Answer(
         findings, plan, (*found.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
     )
+
+
+def _add_clean(plan: DiagnosePlan, found: DiagnosisInput) -> tuple[DiagnosisInput, DiagnosisInput | None]:
+    """The recordings, and those of the device in order in the same form; None where the plan has none."""
+    if not plan.clean:
+        return found, None
+    # Imported here: most diagnoses have no recordings of the device in order.
+    from study.workflows.diagnosis.clean_recordings import with_clean
+
+    both = with_clean(found, plan.sources, plan.clean, plan.seed)
+    return both.found, both.clean
 
 
 def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
