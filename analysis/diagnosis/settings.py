@@ -43,7 +43,7 @@ STILL_SHARE = 0.01  # of the mean square of the motion that is fitted, below whi
 
 # Which error measure suits (`error_measure_rule`, `closed_loop`). By hand.
 FED_BACK_SHARE = 0.1  # of the command's rms that must differ from the recorded excitation: then the loop is closed
-FORETOLD_SHARE = 0.05  # of what its own past leaves of a command that the responses may leave (test of Granger 1969)
+PREDICTED_SHARE = 0.05  # of what its own past leaves of a command that the responses may leave (test of Granger 1969)
 DIES_OUT_SHARE = 1 / 3  # of the longest record, within which a plant that holds itself comes to rest
 SETTLED_CONSTANTS = 5.0  # time constants after which a motion is gone; principle: exp(-5) is below 1 %
 MOST_LEFT_OUT = 0.25  # share of a recording that may be left out until then
@@ -82,7 +82,7 @@ STATES_NAMED = 2  # per axis or channel; principle: what depends on one state is
 STARTS_PER_CLAIM = 4
 WEAKEST_START, STRONGEST_START = 0.1, 6.0  # factors by which a starting value's strength may be wrong
 MOST_FITTED, LEAST_FITTED = 10, 4  # hypotheses that get a first fit
-WORTH_FITTING = 0.2  # share of the best one's foreseen gain that another must foresee
+WORTH_FITTING = 0.2  # share of the best predicted gain that another candidate's must reach
 MOST_REFINED = 3  # fits that are taken to the end
 WORTH_REFINING = 0.5  # share of the best one's gain that such a fit must have gained
 SAME_START = 0.01  # of what two starts of a law leave, that they may differ by to be one
@@ -146,7 +146,7 @@ LEARNED_TOO_MUCH = 0.3  # share of the signal from which what a device in order 
 # Rattling play (`impacts`). By hand.
 VARIES_ERROR = 3.0  # rms between periods, over the noise, from which a response is irregular
 PEAKED_KURTOSIS = 10.0  # or of what is left, where nothing repeats; 3 for noise
-IMPACTS_LEAST_SPREAD = 0.05  # rms of a logarithm of amplitude; principle: no simulation foresees it better
+IMPACTS_LEAST_SPREAD = 0.05  # rms of a logarithm of amplitude; principle: no simulation predicts it better
 IMPACTS_SHARE, IMPACTS_ERROR = 0.6, 3.0  # of the linear model's misfit to be taken, and most that is left over chance
 IMPACTS_AS_GOOD = 1.1  # times the named one's misfit, up to which a rival is as good
 
@@ -179,7 +179,7 @@ LAW_SNAP = 0.003  # relative: so near a simple exponent, and so much more error,
 LAW_BEATS = 0.5  # of a catalogue rival's excess that a law may leave at most
 LAW_STABLE = 0.2  # jackknife error of a factor over stretches, as a share; principle: five standard errors from none
 LAW_PLACEBO = 0.5  # of what chance leaves of a shuffled force, that a law may leave of the missing one at most
-LAW_SAME = 0.05  # of what a law foretells: laws that are no further apart are one, written in two ways (issue 16)
+LAW_SAME = 0.05  # of what a law predicts: laws that are no further apart are one, written in two ways (issue 16)
 LAW_COMMAND_TAKEN = 0.5  # of its axis's command, beyond which a force is the balance's trivial solution; by hand
 LAW_NEAR = 0.03  # of a whole or half exponent, that is then no number to be told
 

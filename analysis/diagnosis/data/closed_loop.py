@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from analysis.diagnosis.settings import FED_BACK_SHARE, FORETOLD_SHARE
+from analysis.diagnosis.settings import FED_BACK_SHARE, PREDICTED_SHARE
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray
 
@@ -41,7 +41,7 @@ def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> boo
     others = np.column_stack([measured[rows - back] for back in range(PAST)])
     alone, helped = _residual_rms(command[rows], own), _residual_rms(command[rows], np.hstack([own, others]))
     # A smooth command is predicted by its own past alone, so that the test has no power.
-    return bool(alone > 1e-6 * _rms(command[:, None]) and helped < FORETOLD_SHARE * alone)
+    return bool(alone > 1e-6 * _rms(command[:, None]) and helped < PREDICTED_SHARE * alone)
 
 
 def _residual_rms(aim: FloatArray, by: FloatArray) -> float:
